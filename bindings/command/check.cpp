@@ -18,16 +18,17 @@ public:
     std::string name() const override { return "check"; }
     std::string doc() const override { return "finds what is wrong with a graph, without running it"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
-        files_.declare(app);
-        app.add_flag("--races", races_,
-                     "runs frames in other orders of the points and in two states, and compares the bits");
-        app.add_option("-f,--frames", frames_text_,
-                       "with --races: the frames that are compared, 24-26 [default: the two after the first]")
-            ->type_name("FIRST-LAST");
-        untrusted_.declare(app, "graph");
+        graph_.declare(options);
+        files_.declare(options);
+        options.add_flag("--races", races_,
+                         "runs frames in other orders of the points and in two states, and compares the bits");
+        options
+            .add_option("-f,--frames", frames_text_,
+                        "with --races: the frames that are compared, 24-26 [default: the two after the first]")
+            .type_name("FIRST-LAST");
+        untrusted_.declare(options, "graph");
     }
 
     void confine(const CommonOptions& common) override

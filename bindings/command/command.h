@@ -4,7 +4,6 @@
 // which is any Error that rises out of run().
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bindings/command/options.h"
 #include "runtime/error.h"
 
 namespace rapid {
@@ -31,7 +31,7 @@ public:
     virtual std::string name() const = 0;
     virtual std::string doc() const = 0;
     // Declares the options that run() will read.
-    virtual void declare(CLI::App& app) = 0;
+    virtual void declare(Options& options) = 0;
     virtual int run(const CommonOptions& common) = 0;
 };
 

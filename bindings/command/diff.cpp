@@ -22,17 +22,18 @@ public:
     std::string name() const override { return "diff"; }
     std::string doc() const override { return "compares two cache files or sequences by id"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("A", a_, "a file, or a sequence such as cache.####.vdb")->type_name("")->required();
-        app.add_option("B", b_, "the other")->type_name("")->required();
-        app.add_option_function<std::string>(
-               "--tolerance", [this](const std::string& text) { tolerance_ = read_tolerance(text); },
-               fmt::format("of P: times the diagonal of the bounds; of the rest: relative [default {}]",
-                           default_tolerance))
-            ->type_name("X");
-        app.add_flag("--json", json_, "as JSON");
-        untrusted_.declare(app, "file");
+        options.add_option("A", a_, "a file, or a sequence such as cache.####.vdb").type_name("").required();
+        options.add_option("B", b_, "the other").type_name("").required();
+        options
+            .add_option(
+                "--tolerance", [this](const std::string& text) { tolerance_ = read_tolerance(text); },
+                fmt::format("of P: times the diagonal of the bounds; of the rest: relative [default {}]",
+                            default_tolerance))
+            .type_name("X");
+        options.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(options, "file");
     }
 
     void confine(const CommonOptions& common) override

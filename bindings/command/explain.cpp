@@ -21,18 +21,19 @@ public:
     std::string name() const override { return "explain"; }
     std::string doc() const override { return "tells what a graph's plan keeps and leaves out, and why"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
-        files_.declare(app);
-        app.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
-            ->type_name("GRAPH");
-        app.add_option_function<std::string>(
-               "--state", [this](const std::string& text) { state_after_ = read_frames(text).last; },
-               "computes the frames up to this one, and tells what each node then keeps, as a snapshot holds it")
-            ->type_name("FRAME");
-        app.add_flag("--json", json_, "as JSON");
-        untrusted_.declare(app, "graph");
+        graph_.declare(options);
+        files_.declare(options);
+        options.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
+            .type_name("GRAPH");
+        options
+            .add_option(
+                "--state", [this](const std::string& text) { state_after_ = read_frames(text).last; },
+                "computes the frames up to this one, and tells what each node then keeps, as a snapshot holds it")
+            .type_name("FRAME");
+        options.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(options, "graph");
     }
 
     void confine(const CommonOptions& common) override

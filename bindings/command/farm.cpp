@@ -53,16 +53,16 @@ public:
     std::string name() const override { return "farm"; }
     std::string doc() const override { return "tells of jobs on a farm, cancels them, and runs again what is missing"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("ACTION", action_, "status, cancel or retry")
-            ->type_name("")
-            ->required()
-            ->check(CLI::IsMember({"status", "cancel", "retry"}));
-        app.add_option("FILE", file_, "FARM.json, which --farm has written beside the outputs")
-            ->type_name("")
-            ->required();
-        app.add_flag("--json", json_, "with status: as JSON");
+        options.add_option("ACTION", action_, "status, cancel or retry")
+            .type_name("")
+            .required()
+            .one_of({"status", "cancel", "retry"});
+        options.add_option("FILE", file_, "FARM.json, which --farm has written beside the outputs")
+            .type_name("")
+            .required();
+        options.add_flag("--json", json_, "with status: as JSON");
     }
 
     int run(const CommonOptions&) override

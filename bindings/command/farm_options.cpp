@@ -56,26 +56,28 @@ void require_free(const FarmJob& job)
 
 }  // namespace
 
-void FarmOptions::declare(CLI::App& app)
+void FarmOptions::declare(Options& options)
 {
-    app.add_option_function<std::string>(
-           "--farm",
-           [this](const std::string& text) {
-               if (text != "slurm") throw Error(fmt::format("--farm = \"{}\"; it must be slurm", text));
-               farm_ = text;
-           },
-           "submits to a farm in place of running here: slurm")
-        ->type_name("slurm");
-    app.add_option_function<std::vector<std::string>>(
-           "--farm-options",
-           [this](const std::vector<std::string>& texts) {
-               for (const std::string& text : texts)
-                   for (std::string& word : split_words(text)) options_.push_back(std::move(word));
-           },
-           "options of sbatch, untouched: \"-p fx -t 2:00:00\"")
-        ->type_name("OPTIONS")
-        ->allow_extra_args(false);
-    app.add_flag("--dry-run", dry_run_, "with --farm: prints the scripts, and submits nothing");
+    options
+        .add_option(
+            "--farm",
+            [this](const std::string& text) {
+                if (text != "slurm") throw Error(fmt::format("--farm = \"{}\"; it must be slurm", text));
+                farm_ = text;
+            },
+            "submits to a farm in place of running here: slurm")
+        .type_name("slurm");
+    options
+        .add_repeated(
+            "--farm-options",
+            [this](const std::vector<std::string>& texts) {
+                for (const std::string& text : texts)
+                    for (std::string& word : split_words(text)) options_.push_back(std::move(word));
+            },
+            "options of sbatch, untouched: \"-p fx -t 2:00:00\"")
+        .type_name("OPTIONS")
+        .one_value();
+    options.add_flag("--dry-run", dry_run_, "with --farm: prints the scripts, and submits nothing");
 }
 
 void FarmOptions::check() const
@@ -85,19 +87,11 @@ void FarmOptions::check() const
     if (dry_run_) throw Error("--dry-run is for --farm; give --farm slurm, too");
 }
 
-std::vector<std::string> FarmOptions::words(const CLI::App& app, const std::vector<std::string>& others) const
+std::vector<std::string> FarmOptions::words(const Options& options, const std::vector<std::string>& others) const
 {
     std::vector<std::string> skipped = {"--farm", "--farm-options", "--dry-run", "--threads", "--quiet"};
     skipped.insert(skipped.end(), others.begin(), others.end());
-    std::vector<std::string> words = {app.get_name()};
-    for (const CLI::Option* option : app.get_options()) {
-        const std::string name = option->get_name(false, false);
-        if (option->count() == 0 || std::find(skipped.begin(), skipped.end(), name) != skipped.end()) continue;
-        const bool is_flag = option->get_items_expected_max() == 0;
-        for (const std::string& value : option->results())
-            words.push_back(is_flag ? name : name.starts_with('-') ? fmt::format("{}={}", name, value) : value);
-    }
-    return words;
+    return options.words(skipped);
 }
 
 int FarmOptions::submit(FarmJob job) const

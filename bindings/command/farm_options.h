@@ -12,14 +12,14 @@ namespace rapid {
 
 class FarmOptions {
 public:
-    void declare(CLI::App& app);
+    void declare(Options& options);
 
     // Error: an option that needs --farm without it.
     void check() const;
     bool asked() const { return !farm_.empty(); }
 
     // The arguments of the command, as they were given: without those above, without --threads, and without `others`.
-    std::vector<std::string> words(const CLI::App& app, const std::vector<std::string>& others) const;
+    std::vector<std::string> words(const Options& options, const std::vector<std::string>& others) const;
 
     // Submits the job and tells its ids; with --dry-run prints its scripts. Error: no Slurm; what sbatch says; a job of
     // the same folder that still runs.

@@ -59,27 +59,30 @@ PictureSize read_size(const std::string& text)
 
 }  // namespace
 
-void FileOptions::declare(CLI::App& app)
+void FileOptions::declare(Options& options)
 {
-    app.add_option_function<std::vector<std::string>>(
-           "-o,--output",
-           [this](const std::vector<std::string>& texts) {
-               for (const std::string& text : texts) parse_output_target(text);
-               files_.outputs = texts;
-           },
-           "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
-           ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
-           "attributes behind a colon are written besides P, v and id, without them all are")
-        ->type_name("PATTERN[:ATTR,ATTR]")
-        ->allow_extra_args(false);
-    app.add_option_function<std::string>(
-           "--camera", [this](const std::string& text) { read_camera(text, files_.pictures); },
-           "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
-        ->type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
-    app.add_option_function<std::string>(
-           "--size", [this](const std::string& text) { files_.pictures.size = read_size(text); },
-           "for pictures [default 1280x720]")
-        ->type_name("WIDTHxHEIGHT");
+    options
+        .add_repeated(
+            "-o,--output",
+            [this](const std::vector<std::string>& texts) {
+                for (const std::string& text : texts) parse_output_target(text);
+                files_.outputs = texts;
+            },
+            "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
+            ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
+            "attributes behind a colon are written besides P, v and id, without them all are")
+        .type_name("PATTERN[:ATTR,ATTR]")
+        .one_value();
+    options
+        .add_option(
+            "--camera", [this](const std::string& text) { read_camera(text, files_.pictures); },
+            "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
+        .type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
+    options
+        .add_option(
+            "--size", [this](const std::string& text) { files_.pictures.size = read_size(text); },
+            "for pictures [default 1280x720]")
+        .type_name("WIDTHxHEIGHT");
 }
 
 bool FileOptions::makes_films() const

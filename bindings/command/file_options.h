@@ -11,7 +11,7 @@ namespace rapid {
 
 class FileOptions {
 public:
-    void declare(CLI::App& app);
+    void declare(Options& options);
 
     const FileOutputs& files() const { return files_; }
     // The -o as the user gave them.

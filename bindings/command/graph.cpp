@@ -16,14 +16,15 @@ public:
     std::string name() const override { return "graph"; }
     std::string doc() const override { return "draws a graph: its nodes, from Create to Solve and back"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
-        app.add_option("-o,--output", file_,
-                       "the file: .svg, .dot (Graphviz's language) or .json (nodes, edges and their places) [default: "
-                       ".dot to standard output]")
-            ->type_name("FILE");
-        untrusted_.declare(app, "graph");
+        graph_.declare(options);
+        options
+            .add_option("-o,--output", file_,
+                        "the file: .svg, .dot (Graphviz's language) or .json (nodes, edges and their places) [default: "
+                        ".dot to standard output]")
+            .type_name("FILE");
+        untrusted_.declare(options, "graph");
     }
 
     void confine(const CommonOptions& common) override

@@ -20,11 +20,11 @@ public:
     std::string name() const override { return "info"; }
     std::string doc() const override { return "tells what a cache file or sequence holds"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("FILE", file_, "a file, or a sequence such as cache.####.vdb")->type_name("")->required();
-        app.add_flag("--json", json_, "as JSON");
-        untrusted_.declare(app, "file");
+        options.add_option("FILE", file_, "a file, or a sequence such as cache.####.vdb").type_name("").required();
+        options.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(options, "file");
     }
 
     void confine(const CommonOptions& common) override

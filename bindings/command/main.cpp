@@ -2,16 +2,19 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <list>
 #include <new>
 #include <optional>
 
 #include "bindings/command/command.h"
+#include "bindings/command/options.h"
 #include "bindings/command/or_throw.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/output_file.h"
@@ -183,9 +186,10 @@ int run(const Arguments& arguments)
     app.require_subcommand(0, 1);  // behind one the name of another is an argument: `rapid nodes merge`
     CommonOptions common;
     const std::vector<std::unique_ptr<Command>> commands = make_commands();
+    std::list<Options> declared;
     for (const auto& command : commands) {
         CLI::App* options = app.add_subcommand(command->name(), command->doc());
-        command->declare(*options);
+        command->declare(declared.emplace_back(*options));
         declare_common(*options, common);
     }
 

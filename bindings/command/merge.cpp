@@ -17,16 +17,16 @@ public:
     std::string name() const override { return "merge"; }
     std::string doc() const override { return "puts the parts of a run together, bit for bit as the whole run"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("-o,--output", output_, "the files of the whole: #### is the frame's number")
-            ->type_name("WHOLE")
-            ->required();
-        app.add_option("PART", parts_, "the files of each part, as -o of run had them; {part} stands for all parts")
-            ->type_name("")
-            ->required();
-        app.add_flag("--quiet", quiet_, "says nothing but errors");
-        untrusted_.declare(app, "file");
+        options.add_option("-o,--output", output_, "the files of the whole: #### is the frame's number")
+            .type_name("WHOLE")
+            .required();
+        options.add_option("PART", parts_, "the files of each part, as -o of run had them; {part} stands for all parts")
+            .type_name("")
+            .required();
+        options.add_flag("--quiet", quiet_, "says nothing but errors");
+        untrusted_.declare(options, "file");
     }
 
     void confine(const CommonOptions& common) override

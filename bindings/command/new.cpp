@@ -50,11 +50,11 @@ public:
     std::string name() const override { return "new"; }
     std::string doc() const override { return "makes a scene and its test in this folder, to begin with"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("NAME", name_, "of the scene, such as sparks: makes sparks.lua and test_sparks.lua")
-            ->type_name("")
-            ->required();
+        options.add_option("NAME", name_, "of the scene, such as sparks: makes sparks.lua and test_sparks.lua")
+            .type_name("")
+            .required();
     }
 
     int run(const CommonOptions&) override

@@ -26,13 +26,14 @@ public:
     std::string name() const override { return "nodes"; }
     std::string doc() const override { return "lists the nodes, or tells all about one"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("NAME", name_, "tells of this node alone")->type_name("");
-        auto* json = app.add_flag("--json", json_, "as JSON");
-        app.add_flag("--annotations", annotations_,
-                     "as the Lua language server reads them: the text of lua/rapid.d.lua")
-            ->excludes(json);
+        options.add_option("NAME", name_, "tells of this node alone").type_name("");
+        const Option json = options.add_flag("--json", json_, "as JSON");
+        options
+            .add_flag("--annotations", annotations_,
+                      "as the Lua language server reads them: the text of lua/rapid.d.lua")
+            .excludes(json);
     }
 
     int run(const CommonOptions&) override

@@ -38,17 +38,19 @@ double read_sample(const std::string& text)
 
 }  // namespace
 
-void PartOptions::declare(CLI::App& app)
+void PartOptions::declare(Options& options)
 {
-    app.add_option_function<std::string>(
-           "--part", [this](const std::string& text) { part_ = read_part(text); },
-           "simulates one of N subsets of the points, which `rapid merge` puts together; file names get _part03of16 "
-           "before the frame's number, or in place of {part}")
-        ->type_name("K/N");
-    app.add_option_function<std::string>(
-           "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
-           "simulates this part of the points, 0.01 for a hundredth: a preview with the same ids and paths")
-        ->type_name("FRACTION");
+    options
+        .add_option(
+            "--part", [this](const std::string& text) { part_ = read_part(text); },
+            "simulates one of N subsets of the points, which `rapid merge` puts together; file names get _part03of16 "
+            "before the frame's number, or in place of {part}")
+        .type_name("K/N");
+    options
+        .add_option(
+            "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
+            "simulates this part of the points, 0.01 for a hundredth: a preview with the same ids and paths")
+        .type_name("FRACTION");
 }
 
 }  // namespace rapid

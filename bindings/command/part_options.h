@@ -10,7 +10,7 @@ namespace rapid {
 
 class PartOptions {
 public:
-    void declare(CLI::App& app);
+    void declare(Options& options);
 
     const std::optional<RunPart>& part() const { return part_; }
     const std::optional<double>& sample() const { return sample_; }

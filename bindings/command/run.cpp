@@ -31,46 +31,53 @@ public:
     std::string name() const override { return "run"; }
     std::string doc() const override { return "computes the frames of a graph and writes them"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app_ = &app;
-        graph_.declare(app);
-        app.add_option_function<std::string>(
-               "-f,--frames",
-               [this](const std::string& text) {
-                   const FrameSelection frames = read_frames(text);
-                   options_.frames = RunFrames{frames.first, frames.last, frames.step};
-               },
-               fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
-                           "[default: {} from the first]",
-                           default_frames))
-            ->type_name("FRAMES");
-        files_.declare(app);
-        part_.declare(app);
-        app.add_option("--stats", options_.statistics, "writes points and seconds of each frame as JSON")
-            ->type_name("FILE");
-        app.add_option("--profile", options_.profile,
-                       "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
-            ->type_name("FILE");
-        app.add_option("--events", options_.events,
-                       "writes births, contacts and deaths with their places and times as points (any format that can "
-                       "be read: .csv, .bgeo, .npz, ...)")
-            ->type_name("FILE");
-        declare_cache(app);
-        app.add_flag("--durable", durable_, "a frame has its name when it is on the disk, and outlasts a power cut");
-        app.add_flag("--keep-all", keep_all_,
-                     "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
-                     "the same");
-        app.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
-        untrusted_.declare(app, "graph");
-        app.add_option("--claims", options_.claims)->group("");  // internal: where rows of a wedge note what they write
-        app.add_flag("--watch", watch_, "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
-        farm_.declare(app);
-        app.add_option_function<std::string>(
-               "--parts", [this](const std::string& text) { parts_ = read_whole("--parts", text, 1); },
-               "with --farm: tasks, each of one part of the points, which are then merged [default 1]")
-            ->type_name("N");
-        app.add_flag(Watch::tell_option, tell_)->group("");  // internal: a run of --watch
+        given_ = &options;
+        graph_.declare(options);
+        options
+            .add_option(
+                "-f,--frames",
+                [this](const std::string& text) {
+                    const FrameSelection frames = read_frames(text);
+                    options_.frames = RunFrames{frames.first, frames.last, frames.step};
+                },
+                fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
+                            "[default: {} from the first]",
+                            default_frames))
+            .type_name("FRAMES");
+        files_.declare(options);
+        part_.declare(options);
+        options.add_option("--stats", options_.statistics, "writes points and seconds of each frame as JSON")
+            .type_name("FILE");
+        options
+            .add_option("--profile", options_.profile,
+                        "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
+            .type_name("FILE");
+        options
+            .add_option("--events", options_.events,
+                        "writes births, contacts and deaths with their places and times as points (any format that can "
+                        "be read: .csv, .bgeo, .npz, ...)")
+            .type_name("FILE");
+        declare_cache(options);
+        options.add_flag("--durable", durable_,
+                         "a frame has its name when it is on the disk, and outlasts a power cut");
+        options.add_flag(
+            "--keep-all", keep_all_,
+            "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
+            "the same");
+        options.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
+        untrusted_.declare(options, "graph");
+        options.add_option("--claims", options_.claims).internal();  // where rows of a wedge note what they write
+        options.add_flag("--watch", watch_,
+                         "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
+        farm_.declare(options);
+        options
+            .add_option(
+                "--parts", [this](const std::string& text) { parts_ = read_whole("--parts", text, 1); },
+                "with --farm: tasks, each of one part of the points, which are then merged [default 1]")
+            .type_name("N");
+        options.add_flag(Watch::tell_option, tell_).internal();  // a run of --watch
     }
 
     void confine(const CommonOptions& common) override
@@ -132,24 +139,27 @@ public:
     }
 
 private:
-    void declare_cache(CLI::App& app)
+    void declare_cache(Options& options)
     {
         RunCacheOptions& cache = options_.cache;
-        app.add_option("--cache", cache.folder,
-                       "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame "
-                       "that is still to be computed; frames that are there already are left as they are")
-            ->type_name("DIR");
-        app.add_option_function<std::string>(
-               "--cache-every",
-               [&cache](const std::string& text) { cache.every = read_whole("--cache-every", text, 0); },
-               "a snapshot after every N-th frame, and the last [default 10]; 0: none")
-            ->type_name("N");
-        app.add_flag("--again", cache.again, "computes and writes all frames, whatever the cache holds");
-        app.add_option_function<std::string>(
-               "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
-               "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
-            ->type_name("SECONDS");
-        app.add_flag("--cache-replace", cache.replace)->group("");  // internal, of wedge: another run's is no error
+        options
+            .add_option("--cache", cache.folder,
+                        "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame "
+                        "that is still to be computed; frames that are there already are left as they are")
+            .type_name("DIR");
+        options
+            .add_option(
+                "--cache-every",
+                [&cache](const std::string& text) { cache.every = read_whole("--cache-every", text, 0); },
+                "a snapshot after every N-th frame, and the last [default 10]; 0: none")
+            .type_name("N");
+        options.add_flag("--again", cache.again, "computes and writes all frames, whatever the cache holds");
+        options
+            .add_option(
+                "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
+                "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
+            .type_name("SECONDS");
+        options.add_flag("--cache-replace", cache.replace).internal();  // of wedge: another run's is no error
     }
 
     bool caches() const { return !options_.cache.folder.empty(); }
@@ -186,7 +196,7 @@ private:
         job.name = "rapid-" + std::filesystem::path(graph_.file()).stem().string();
         const std::vector<std::string> folders = or_throw(output_folders(options_.files));
         job.outputs = folders.empty() ? "." : folders.front();
-        job.words = farm_.words(*app_, {"--parts"});
+        job.words = farm_.words(*given_, {"--parts"});
         job.words.emplace_back("--quiet");
         // Each task has a cache of its own.
         std::string cache = (std::filesystem::absolute(job.scripts()) / "cache").string();
@@ -220,7 +230,7 @@ private:
         return access;
     }
 
-    CLI::App* app_ = nullptr;
+    Options* given_ = nullptr;
     SceneArguments graph_;
     FileOptions files_;
     PartOptions part_;

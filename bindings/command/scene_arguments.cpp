@@ -20,41 +20,46 @@ Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 
 }  // namespace
 
-void SceneArguments::declare(CLI::App& app)
+void SceneArguments::declare(Options& options)
 {
-    app.add_option("GRAPH", file_, "the graph file, such as graphs/first.lua")->type_name("")->required();
-    app.add_option_function<std::vector<std::string>>(
-           "--set",
-           [this](const std::vector<std::string>& texts) {
-               for (const std::string& text : texts) {
-                   const std::size_t equals = text.find('=');
-                   if (equals == std::string::npos || equals == 0)
-                       throw Error(fmt::format("--set \"{}\"; it must be NAME=VALUE", text));
-                   settings_[text.substr(0, equals)] = text.substr(equals + 1);
-               }
-           },
-           "gives a rapid.param of the graph a value, or a node's parameter: solve.substeps=4")
-        ->type_name("NAME=VALUE")
-        ->allow_extra_args(false);
-    app.add_option_function<std::string>(
-           "--seed", [this](const std::string& text) { options_.seed = read_seed(text); },
-           "replaces the seed of every create")
-        ->type_name("N");
-    app.add_option_function<std::string>(
-           "--script-timeout",
-           [this](const std::string& text) { options_.script_seconds = read_positive("--script-timeout", text); },
-           fmt::format("time that scripts may take, a frame [default {:g}]", options_.script_seconds))
-        ->type_name("SECONDS");
-    app.add_option_function<std::string>(
-           "--script-memory",
-           [this](const std::string& text) { options_.script_memory = read_bytes("--script-memory", text); },
-           fmt::format("memory that a script's state may take: bytes, or 512M, 1G [default {}G]",
-                       options_.script_memory >> 30))
-        ->type_name("BYTES");
-    app.add_option_function<std::string>(
-           "--memory", [](const std::string& text) { set_memory_budget(read_bytes("--memory", text)); },
-           "memory that the run may take: bytes, or 512M, 16G [default: what is free]")
-        ->type_name("BYTES");
+    options.add_option("GRAPH", file_, "the graph file, such as graphs/first.lua").type_name("").required();
+    options
+        .add_repeated(
+            "--set",
+            [this](const std::vector<std::string>& texts) {
+                for (const std::string& text : texts) {
+                    const std::size_t equals = text.find('=');
+                    if (equals == std::string::npos || equals == 0)
+                        throw Error(fmt::format("--set \"{}\"; it must be NAME=VALUE", text));
+                    settings_[text.substr(0, equals)] = text.substr(equals + 1);
+                }
+            },
+            "gives a rapid.param of the graph a value, or a node's parameter: solve.substeps=4")
+        .type_name("NAME=VALUE")
+        .one_value();
+    options
+        .add_option(
+            "--seed", [this](const std::string& text) { options_.seed = read_seed(text); },
+            "replaces the seed of every create")
+        .type_name("N");
+    options
+        .add_option(
+            "--script-timeout",
+            [this](const std::string& text) { options_.script_seconds = read_positive("--script-timeout", text); },
+            fmt::format("time that scripts may take, a frame [default {:g}]", options_.script_seconds))
+        .type_name("SECONDS");
+    options
+        .add_option(
+            "--script-memory",
+            [this](const std::string& text) { options_.script_memory = read_bytes("--script-memory", text); },
+            fmt::format("memory that a script's state may take: bytes, or 512M, 1G [default {}G]",
+                        options_.script_memory >> 30))
+        .type_name("BYTES");
+    options
+        .add_option(
+            "--memory", [](const std::string& text) { set_memory_budget(read_bytes("--memory", text)); },
+            "memory that the run may take: bytes, or 512M, 16G [default: what is free]")
+        .type_name("BYTES");
 }
 
 SceneOptions SceneArguments::scene_options() const

@@ -13,7 +13,7 @@ namespace rapid {
 
 class SceneArguments {
 public:
-    void declare(CLI::App& app);
+    void declare(Options& options);
 
     const std::string& file() const { return file_; }
     const std::optional<std::uint64_t>& seed() const { return options_.seed; }

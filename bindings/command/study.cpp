@@ -102,11 +102,11 @@ public:
     std::string name() const override { return "study"; }
     std::string doc() const override { return "shows the error of a scene against its run time, at many settings"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
+        graph_.declare(options);
         const auto list = [&](const char* option, std::vector<std::string>& texts, const char* type, const char* doc) {
-            app.add_option(option, texts, doc)->type_name(type)->allow_extra_args(false);
+            options.add_option(option, texts, doc).type_name(type).one_value();
         };
         list("--sweep", sweep_, "NODE.PARAM=A,B,...",
              "of a graph: the values that a node's parameter takes; NODE is its name, or its type where one node has "
@@ -114,30 +114,33 @@ public:
         list("--reference", reference_, "VALUE",
              "of a graph: the value that is taken for right (of several swept parameters: NODE.PARAM=VALUE)");
         list("--lines", lines_, "NODE.PARAM", "of a graph: a swept parameter that tells the lines of the plot apart");
-        app.add_option_function<std::string>(
-               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]",
-                           default_frames))
-            ->type_name("FRAMES");
+        options
+            .add_option(
+                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+                fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]",
+                            default_frames))
+            .type_name("FRAMES");
         const SceneStudy defaults;
-        app.add_option(
-               "--error", error_,
-               fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]", defaults.error))
-            ->check(CLI::IsMember({"rms", "max", "p95", "residual"}))
-            ->type_name("NORM");
-        app.add_option("--error-frames", error_frames_, "of a graph: all but the first, or the last [default all]")
-            ->check(CLI::IsMember({"all", "last"}))
-            ->type_name("all|last");
-        app.add_option_function<std::string>(
-               "--repeat", [this](const std::string& text) { repeat_ = read_repeat(text); },
-               fmt::format("timed runs of each row, of which the median is shown [default {}, or what the study says]",
-                           defaults.repeat_runs))
-            ->type_name("N");
-        app.add_option("-o,--output", folder_, "where study.json and study.svg are written [default: here]")
-            ->type_name("DIR");
-        app.add_flag("--json", json_, "prints what study.json holds, in place of the table");
-        app.add_flag("--quiet", quiet_, "no progress");
-        untrusted_.declare(app, "graph");
+        options
+            .add_option("--error", error_,
+                        fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]",
+                                    defaults.error))
+            .one_of({"rms", "max", "p95", "residual"})
+            .type_name("NORM");
+        options.add_option("--error-frames", error_frames_, "of a graph: all but the first, or the last [default all]")
+            .one_of({"all", "last"})
+            .type_name("all|last");
+        options
+            .add_option(
+                "--repeat", [this](const std::string& text) { repeat_ = read_repeat(text); },
+                fmt::format("timed runs of each row, of which the median is shown [default {}, or what the study says]",
+                            defaults.repeat_runs))
+            .type_name("N");
+        options.add_option("-o,--output", folder_, "where study.json and study.svg are written [default: here]")
+            .type_name("DIR");
+        options.add_flag("--json", json_, "prints what study.json holds, in place of the table");
+        options.add_flag("--quiet", quiet_, "no progress");
+        untrusted_.declare(options, "graph");
     }
 
     // Each scene runs in a copy of this process.

@@ -51,26 +51,27 @@ public:
     std::string name() const override { return "test"; }
     std::string doc() const override { return "runs script-level tests"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app.add_option("FILES", files_, "test files, or folders of test_*.lua")->type_name("")->required();
-        app.add_option("--filter", filter_, "only tests whose name matches this Lua pattern")->type_name("PATTERN");
-        app.add_option_function<std::string>(
-               "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
-               "files that run at a time [default: the number of processors]")
-            ->type_name("N");
-        app.add_option("--format", format_, "what is printed: text, tap or junit")
-            ->type_name("")
-            ->check(CLI::IsMember(
-                std::vector<std::string>(std::begin(TestReport::formats), std::end(TestReport::formats))));
-        app.add_option_function<std::string>(
-               "--slowest", [this](const std::string& text) { slowest_ = read_whole("--slowest", text, 1); },
-               "lists the N slowest tests with their seconds; text only")
-            ->type_name("N");
-        untrusted_.declare(app, "test");
+        options.add_option("FILES", files_, "test files, or folders of test_*.lua").type_name("").required();
+        options.add_option("--filter", filter_, "only tests whose name matches this Lua pattern").type_name("PATTERN");
+        options
+            .add_option(
+                "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
+                "files that run at a time [default: the number of processors]")
+            .type_name("N");
+        options.add_option("--format", format_, "what is printed: text, tap or junit")
+            .type_name("")
+            .one_of({std::begin(TestReport::formats), std::end(TestReport::formats)});
+        options
+            .add_option(
+                "--slowest", [this](const std::string& text) { slowest_ = read_whole("--slowest", text, 1); },
+                "lists the N slowest tests with their seconds; text only")
+            .type_name("N");
+        untrusted_.declare(options, "test");
         // Internal: the process of one file.
-        app.add_option("--child-of", parent_)->group("");
-        app.add_option("--already-run", already_run_)->group("");
+        options.add_option("--child-of", parent_).internal();
+        options.add_option("--already-run", already_run_).internal();
     }
 
     // The processes that run the files are sandboxed; this one runs no script and no plugin.

@@ -18,26 +18,28 @@ public:
     std::string name() const override { return "trace"; }
     std::string doc() const override { return "tells the lives of single points"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
-        app.add_option_function<std::string>(
-               "--id",
-               [this](const std::string& text) {
-                   std::istringstream words(text);
-                   for (std::string word; std::getline(words, word, ',');) ids_.push_back(read_whole("--id", word, 0));
-               },
-               "the points, by their ids: 17 or 17,40")
-            ->type_name("N[,M...]")
-            ->required();
-        app.add_option("--of", create_, "the create whose points they are [default: every one]")->type_name("NAME");
-        app.add_option_function<std::string>(
-               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               fmt::format("the frames that are told; all before them are computed too [default: {} from the first]",
-                           default_frames))
-            ->type_name("FRAMES");
-        app.add_flag("--json", json_, "as JSON");
-        untrusted_.declare(app, "graph");
+        graph_.declare(options);
+        options
+            .add_option(
+                "--id",
+                [this](const std::string& text) {
+                    std::istringstream words(text);
+                    for (std::string word; std::getline(words, word, ',');) ids_.push_back(read_whole("--id", word, 0));
+                },
+                "the points, by their ids: 17 or 17,40")
+            .type_name("N[,M...]")
+            .required();
+        options.add_option("--of", create_, "the create whose points they are [default: every one]").type_name("NAME");
+        options
+            .add_option(
+                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+                fmt::format("the frames that are told; all before them are computed too [default: {} from the first]",
+                            default_frames))
+            .type_name("FRAMES");
+        options.add_flag("--json", json_, "as JSON");
+        untrusted_.declare(options, "graph");
     }
 
     void confine(const CommonOptions& common) override

@@ -21,16 +21,18 @@ void add_own_paths(SandboxAccess& access, const CommonOptions& common)
 
 }  // namespace
 
-void UntrustedOptions::declare(CLI::App& app, const std::string& whose)
+void UntrustedOptions::declare(Options& options, const std::string& whose)
 {
-    app.add_flag("--untrusted", untrusted_,
-                 "keeps the process from all files but those that it is asked to read and write, from sockets and from "
-                 "other processes");
-    app.add_flag(sandboxed_option, sandboxed_)->group("");  // internal: the restarted process
-    app.add_option("--allow-read", allowed_,
-                   fmt::format("a file or folder that an --untrusted {} may read, too", whose))
-        ->type_name("PATH")
-        ->allow_extra_args(false);
+    options.add_flag(
+        "--untrusted", untrusted_,
+        "keeps the process from all files but those that it is asked to read and write, from sockets and from "
+        "other processes");
+    options.add_flag(sandboxed_option, sandboxed_).internal();  // the restarted process
+    options
+        .add_option("--allow-read", allowed_,
+                    fmt::format("a file or folder that an --untrusted {} may read, too", whose))
+        .type_name("PATH")
+        .one_value();
 }
 
 void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,

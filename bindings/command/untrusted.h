@@ -24,7 +24,7 @@ public:
 class UntrustedOptions {
 public:
     // whose: what --allow-read is for, "graph" or "file".
-    void declare(CLI::App& app, const std::string& whose);
+    void declare(Options& options, const std::string& whose);
     bool asked() const { return untrusted_; }
 
     // Sandboxes the process, if that is asked for. access: what the command itself reads and writes, besides

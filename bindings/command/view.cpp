@@ -43,27 +43,30 @@ public:
     std::string name() const override { return "view"; }
     std::string doc() const override { return "shows a scene, or files, in the browser while it is computed"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        graph_.declare(app);
-        app.add_option_function<std::string>(
-               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               "the frames to compute: 1-240 or 100 [default: 240 from the first]")
-            ->type_name("FRAMES");
-        app.add_option_function<std::string>(
-               "--port",
-               [this](const std::string& text) {
-                   port_ = static_cast<int>(std::min<std::int64_t>(read_whole("--port", text, 0), 65536));
-                   if (port_ > 65535) throw Error(fmt::format("--port = {}; it must be at most 65535", text));
-               },
-               "the port of the page; 0, the default, takes a free one")
-            ->type_name("N");
-        app.add_flag("--no-open", no_open_, "does not open the page in a browser");
-        app.add_option("--cache", cache_,
-                       "keeps frames in this folder, too: those that memory has no room for, and for the next view of "
-                       "the same scene")
-            ->type_name("DIR");
-        untrusted_.declare(app, "graph");
+        graph_.declare(options);
+        options
+            .add_option(
+                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+                "the frames to compute: 1-240 or 100 [default: 240 from the first]")
+            .type_name("FRAMES");
+        options
+            .add_option(
+                "--port",
+                [this](const std::string& text) {
+                    port_ = static_cast<int>(std::min<std::int64_t>(read_whole("--port", text, 0), 65536));
+                    if (port_ > 65535) throw Error(fmt::format("--port = {}; it must be at most 65535", text));
+                },
+                "the port of the page; 0, the default, takes a free one")
+            .type_name("N");
+        options.add_flag("--no-open", no_open_, "does not open the page in a browser");
+        options
+            .add_option("--cache", cache_,
+                        "keeps frames in this folder, too: those that memory has no room for, and for the next view of "
+                        "the same scene")
+            .type_name("DIR");
+        untrusted_.declare(options, "graph");
     }
 
     // The sandbox makes no sockets: the one that listens is there before.

@@ -29,42 +29,47 @@ public:
     std::string name() const override { return "wedge"; }
     std::string doc() const override { return "runs a graph at many settings"; }
 
-    void declare(CLI::App& app) override
+    void declare(Options& options) override
     {
-        app_ = &app;
-        graph_.declare(app);
-        app.add_option_function<std::vector<std::string>>(
-               "--vary",
-               [this](const std::vector<std::string>& texts) {
-                   for (const std::string& text : texts)
-                       settings_.push_back(read_swept_setting("--vary", text, "NAME"));
-               },
-               "the values of a rapid.param, or of a node's parameter: solve.substeps=1,4")
-            ->type_name("NAME=A,B,...")
-            ->allow_extra_args(false)
-            ->required();
-        app.add_flag("--zip", zip_, "the n-th values of all that is varied go together, in place of all combinations");
-        app.add_option_function<std::string>(
-               "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-               fmt::format("the frames to write, as of run [default: {} from the first]", default_frames))
-            ->type_name("FRAMES");
-        files_.declare(app);
-        app.add_option_function<std::string>(
-               "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
-               "rows that run at a time, which share the threads [default 1]")
-            ->type_name("N");
-        app.add_option("--cache", cache_, "rows keep snapshots too, in folders below this one, as of run")
-            ->type_name("DIR");
-        app.add_option_function<std::string>(
-               "--cache-every",
-               [this](const std::string& text) { every_ = fmt::format("{}", read_whole("--cache-every", text, 0)); },
-               "with --cache: as of run")
-            ->type_name("N");
-        app.add_flag("--again", again_, "computes rows that are done, too");
-        app.add_flag("--quiet", quiet_, "no progress and no table");
-        farm_.declare(app);
-        app.add_option(collect_option, collect_)->group("");  // internal: what comes last on a farm
-        untrusted_.declare(app, "graph");
+        given_ = &options;
+        graph_.declare(options);
+        options
+            .add_repeated(
+                "--vary",
+                [this](const std::vector<std::string>& texts) {
+                    for (const std::string& text : texts)
+                        settings_.push_back(read_swept_setting("--vary", text, "NAME"));
+                },
+                "the values of a rapid.param, or of a node's parameter: solve.substeps=1,4")
+            .type_name("NAME=A,B,...")
+            .one_value()
+            .required();
+        options.add_flag("--zip", zip_,
+                         "the n-th values of all that is varied go together, in place of all combinations");
+        options
+            .add_option(
+                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
+                fmt::format("the frames to write, as of run [default: {} from the first]", default_frames))
+            .type_name("FRAMES");
+        files_.declare(options);
+        options
+            .add_option(
+                "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
+                "rows that run at a time, which share the threads [default 1]")
+            .type_name("N");
+        options.add_option("--cache", cache_, "rows keep snapshots too, in folders below this one, as of run")
+            .type_name("DIR");
+        options
+            .add_option(
+                "--cache-every",
+                [this](const std::string& text) { every_ = fmt::format("{}", read_whole("--cache-every", text, 0)); },
+                "with --cache: as of run")
+            .type_name("N");
+        options.add_flag("--again", again_, "computes rows that are done, too");
+        options.add_flag("--quiet", quiet_, "no progress and no table");
+        farm_.declare(options);
+        options.add_option(collect_option, collect_).internal();  // what comes last on a farm
+        untrusted_.declare(options, "graph");
     }
 
     // The processes of the rows confine themselves; this one runs no script but in a copy of itself.
@@ -117,7 +122,7 @@ private:
             job.tasks.push_back({rows[row].label(), {words.begin() + 2, words.end()}});
             job.words.assign(words.begin(), words.begin() + 2);  // run GRAPH
         }
-        job.last.push_back(farm_.words(*app_, {"--jobs"}));
+        job.last.push_back(farm_.words(*given_, {"--jobs"}));
         job.last.back().push_back(fmt::format("{}={}", collect_option, folder.string()));
         job.last_needs_all = false;
         return farm_.submit(std::move(job));
@@ -177,7 +182,7 @@ private:
                                           "--quiet",
                                           "--stats=" + statistics.string(),
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
-        for (const std::string& frames : app_->get_option("--frames")->results()) words.push_back("--frames=" + frames);
+        for (const std::string& frames : given_->values_of("--frames")) words.push_back("--frames=" + frames);
         // What a row has done is known by its journal: one of the same fingerprint is not run again.
         const fs::path of_rows = cache_.empty() ? folder / "wedge.cache" : fs::path(cache_);
         words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
@@ -201,13 +206,13 @@ private:
         for (const std::string& plugin : common.plugins) words.push_back("--plugin=" + plugin);
         for (const char* option :
              {"--set", "--seed", "--script-timeout", "--script-memory", "--memory", "--camera", "--size"})
-            for (const std::string& value : app_->get_option(option)->results())
+            for (const std::string& value : given_->values_of(option))
                 words.push_back(fmt::format("{}={}", option, value));
         for (const auto& [name, value] : row.settings) words.push_back(fmt::format("--set={}={}", name, value));
         for (const std::string& word : untrusted_.words()) words.push_back(word);
     }
 
-    CLI::App* app_ = nullptr;
+    Options* given_ = nullptr;
     SceneArguments graph_;
     FileOptions files_;
     UntrustedOptions untrusted_;

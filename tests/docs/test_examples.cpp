@@ -1,6 +1,7 @@
 // The examples of docs/extending.md, compiled into this program, do what their comments say.
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 
 #include "bindings/command/command.h"
@@ -138,7 +139,8 @@ TEST_CASE("the example of a command counts points", "[docs]")
     for (const std::unique_ptr<Command>& command : make_commands()) {
         if (command->name() != "count") continue;
         CLI::App app;
-        command->declare(app);
+        Options options(app);
+        command->declare(options);
         app.parse("\"" + file.string() + "\"");
         int status = status_failed;
         CHECK(printed_by([&] { status = command->run({}); }) == "3\n");

@@ -10,6 +10,8 @@ set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 if(RAPID_SANITIZE OR RAPID_POISON)
   set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g1 -DNDEBUG")
 endif()
+# Of code that goes over no points: it compiles in four fifths of the time.
+set(rapid_light_options $<$<CONFIG:Release>:-O1>)
 
 add_library(rapid_public INTERFACE)
 target_compile_features(rapid_public INTERFACE cxx_std_20)

@@ -1,4 +1,4 @@
-# bin/rapid; rapid::host (include/rapid, promised) with its module for Python; the library and its deferred part, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
+# bin/rapid and its programs; rapid::host (include/rapid, promised) with its module for Python; the library and its deferred part, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
 # config for find_package(rapid).
 include(CMakePackageConfigHelpers)
 
@@ -7,6 +7,8 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/rapid)
 install(TARGETS rapid rapid_public EXPORT rapidTargets)
 install(TARGETS rapid_host_library EXPORT rapidHostTargets)
 install(TARGETS rapid_command)
+get_property(rapid_programs GLOBAL PROPERTY rapid_programs)
+install(TARGETS ${rapid_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/rapid)
 install(TARGETS rapid_deferred LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 # Of the runtime's headers those that are promised to plugins and to programs without Lua, and what they include; the
 # others are the library's own.

@@ -1,9 +1,10 @@
-# rapid_layer(NAME SOURCE...)
+# rapid_layer(NAME [LIGHT] SOURCE...)
 #
 # A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
 # that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
 # ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
-# time. They are the part of the library that is loaded when it is first needed (runtime/deferred.h).
+# time. They are the part of the library that is loaded when it is first needed (runtime/deferred.h). LIGHT: it goes over no
+# points (RapidPrecompiled.cmake).
 #
 # rapid_in_batches(TARGET), behind what the target links, has its sources compiled eight at a time, as one, where
 # RAPID_BATCHES is on: what they include takes most of their time. So no two files of a target may give different things
@@ -53,18 +54,32 @@ target_compile_options(rapid_batched INTERFACE
 
 function(rapid_in_batches target)
   if(RAPID_BATCHES)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    # Of about eight, without a remainder that pays for all headers again.
+    get_target_property(sources ${target} SOURCES)
+    list(LENGTH sources count)
+    math(EXPR batches "(${count} + 4) / 8")
+    if(batches EQUAL 0)
+      set(batches 1)
+    endif()
+    math(EXPR size "(${count} + ${batches} - 1) / ${batches}")
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${size})
     target_link_libraries(${target} PRIVATE rapid_batched)
   endif()
 endfunction()
 
 function(rapid_layer name)
-  rapid_split_deferred(with without ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 layer "LIGHT" "" "")
+  rapid_split_deferred(with without ${layer_UNPARSED_ARGUMENTS})
   set(parts "")
   if(without)
     add_library(rapid_${name} OBJECT ${without})
     target_link_libraries(rapid_${name} PRIVATE rapid_private)
-    target_precompile_headers(rapid_${name} REUSE_FROM rapid_precompiled)
+    if(layer_LIGHT)
+      target_compile_options(rapid_${name} PRIVATE ${rapid_light_options})
+      target_precompile_headers(rapid_${name} REUSE_FROM rapid_precompiled_light)
+    else()
+      target_precompile_headers(rapid_${name} REUSE_FROM rapid_precompiled)
+    endif()
     rapid_in_batches(rapid_${name})
     list(APPEND parts rapid_${name})
   endif()

@@ -22,8 +22,10 @@ set(rapid_hot_files
   solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp
   solver/motion/damped_motion.cpp solver/motion/free_paths.cpp)
 
-# Each an object of its own, which a level replaces.
-set_source_files_properties(${rapid_hot_files} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+# Each an object of its own where a level replaces it.
+if(RAPID_LEVELS)
+  set_source_files_properties(${rapid_hot_files} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endif()
 
 # rapid_level(LEVEL PART...): the library for processors of this level. Parts: all of the library.
 function(rapid_level level)

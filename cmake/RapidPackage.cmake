@@ -11,7 +11,7 @@ if(HELP2MAN AND NOT RAPID_SANITIZE)
     COMMAND ${PROJECT_SOURCE_DIR}/setup/man_pages $<TARGET_FILE:rapid_command> ${PROJECT_VERSION} ${pages}
     COMMAND sh -c "gzip -9nf '${pages}'/*.1"
     COMMAND ${CMAKE_COMMAND} -E touch ${pages}/stamp
-    DEPENDS rapid_command setup/man_pages VERBATIM)
+    DEPENDS rapid_command ${rapid_programs} setup/man_pages VERBATIM)
   add_custom_target(rapid_man ALL DEPENDS ${pages}/stamp)
   install(DIRECTORY ${pages}/ DESTINATION ${manual_dir} FILES_MATCHING PATTERN "*.1.gz")
 endif()

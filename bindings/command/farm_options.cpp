@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "bindings/command/programs.h"
 #include "bindings/command/slurm.h"
 #include "runtime/files/whole_file.h"
 
@@ -12,8 +13,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string this_program() { return fs::read_symlink("/proc/self/exe").string(); }
 
 // The words of a text, as a shell splits them at spaces; a part in quotes is one word.
 std::vector<std::string> split_words(const std::string& text)
@@ -99,7 +98,7 @@ int FarmOptions::submit(FarmJob job) const
     job.options = options_;
     job.folder = fs::current_path();
     job.outputs = fs::absolute(job.outputs).lexically_normal();
-    const std::string program = this_program(), tasks = script_of_tasks(job, program);
+    const std::string program = command_file().string(), tasks = script_of_tasks(job, program);
     const std::string last = job.last.empty() ? std::string() : script_of_last(job, program);
     if (dry_run_) {
         print(fmt::format("# sbatch --array=1-{} {} {}\n{}", job.tasks.size(), fmt::join(job.options, " "),

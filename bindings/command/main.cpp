@@ -10,12 +10,14 @@
 #include <cstring>
 #include <exception>
 #include <list>
+#include <map>
 #include <new>
 #include <optional>
 
 #include "bindings/command/command.h"
 #include "bindings/command/options.h"
 #include "bindings/command/or_throw.h"
+#include "bindings/command/programs.h"
 #include "bindings/command/untrusted.h"
 #include "runtime/files/output_file.h"
 
@@ -155,6 +157,16 @@ std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
     return status_refused;
 }
 
+int become(const Program& program, const Arguments& arguments)
+{
+    try {
+        become_program(program, arguments);
+    } catch (const Error& error) {
+        print_error(error, false);
+        return status_refused;
+    }
+}
+
 int run_command(Command& command, const CommonOptions& common)
 {
     try {
@@ -186,10 +198,15 @@ int run(const Arguments& arguments)
     app.require_subcommand(0, 1);  // behind one the name of another is an argument: `rapid nodes merge`
     CommonOptions common;
     const std::vector<std::unique_ptr<Command>> commands = make_commands();
+    const bool is_rapid = commands.size() > 1;  // or a program, with its own
+    std::map<std::string, Command*> all;        // null: a program, which knows its options
+    for (const auto& command : commands) all[command->name()] = command.get();
+    if (is_rapid)
+        for (const Program& program : programs()) all[program.name] = nullptr;
     std::list<Options> declared;
-    for (const auto& command : commands) {
-        CLI::App* options = app.add_subcommand(command->name(), command->doc());
-        command->declare(declared.emplace_back(*options));
+    for (const auto& [name, command] : all) {
+        CLI::App* options = app.add_subcommand(name, command ? command->doc() : program(name).doc);
+        if (command) command->declare(declared.emplace_back(*options));
         declare_common(*options, common);
     }
 
@@ -197,6 +214,8 @@ int run(const Arguments& arguments)
         print(app.help());
         return finish(status_done);
     }
+    const std::size_t place = find_command(app, arguments);
+    if (place < arguments.size() && !all.at(arguments[place])) return become(program(arguments[place]), arguments);
     if (const std::optional<int> status = read_arguments(app, arguments)) return *status;
     for (const auto& command : commands)
         if (app.got_subcommand(command->name())) return run_command(*command, common);

@@ -116,3 +116,51 @@ describe("standard output", function()
     assert.equal("standard output can't be written: No space left on device\n", result.stderr)
   end)
 end)
+
+describe("a command that is a program of its own", function()
+  it("is listed with the others, in order of name", function()
+    local names = {}
+    local list = rapid("--help").stdout:match "\nSubcommands:\n(.*)"
+    for line in list:gmatch "[^\n]+" do names[#names + 1] = line:match "^  (%l+)" end
+    local sorted = { unpack(names) }
+    table.sort(sorted)
+    assert.same(sorted, names)
+    local listed = " " .. table.concat(names, " ") .. " "
+    for _, name in ipairs { "run", "study", "view", "wedge" } do
+      assert.truthy(listed:find(" " .. name .. " ", 1, true), name)
+    end
+  end)
+
+  it("gets all arguments, and options may stand before its name", function()
+    local result = rapid "--threads 2 wedge --set nonsense nothing.lua"
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find("rapid wedge: ", 1, true), result.stderr)
+    local misspelt = rapid("study some.lua --jsno").stderr
+    assert.equal('rapid study: unknown option "--jsno"; did you mean "--json"?\n', misspelt)
+    assert.equal(0, rapid("view --help").status)
+  end)
+
+  it("knows no other command", function()
+    local result = command.shell '"${RAPID%/bin/rapid}/libexec/rapid/view" run scene.lua'
+    assert.equal(2, result.status)
+    assert.truthy(result.stderr:find('unknown command "run"', 1, true), result.stderr)
+  end)
+
+  it("has the command, not itself, do what others do for it", function()
+    local folder = command.folder()
+    folder:write("scene.lua", scene)
+    local told = rapid("wedge scene.lua --vary count=2,3 --farm slurm --dry-run", { cwd = folder.path }).stdout
+    assert.truthy(told:find("/rapid run ", 1, true), told)
+    assert.truthy(told:find("/rapid wedge ", 1, true), told)
+    assert.is_nil(told:find("libexec", 1, true), told)
+  end)
+
+  it("that is not there is named, with its place", function()
+    local folder = command.folder()
+    local line = 'mkdir bin && cp "$RAPID" bin/rapid && bin/rapid view scene.lua'
+    local result = command.shell(line, { cwd = folder.path })
+    assert.equal(2, result.status)
+    local place = folder.path .. "/libexec/rapid/view can't be started (No such file or directory)"
+    assert.truthy(result.stderr:find(place, 1, true), result.stderr)
+  end)
+end)

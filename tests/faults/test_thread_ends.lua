@@ -6,7 +6,8 @@ local library = require "tests.faults.library"
 describe("a library of Rapid", function()
   it("has no variables of threads with destructors that glibc would know", function()
     local folder = library:match "^(.*)/"
-    local names = command.shell("ls librapid*.so ../bin/rapid | grep -v librapid_fault", { cwd = folder })
+    local all = "ls librapid*.so ../bin/rapid ../libexec/rapid/* | grep -v librapid_fault"
+    local names = command.shell(all, { cwd = folder })
     assert.match("librapid.so\n.*librapid_deferred.so\n", names.stdout .. names.stdout)
     for name in names.stdout:gmatch "[^\n]+" do
       local undefined = command.shell("nm -D --undefined-only " .. command.quoted(name), { cwd = folder })

@@ -71,10 +71,22 @@ const std::set<std::string> small_tools = {
     "runtime/memory_budget.h",      "runtime/memory_watch.h",    "runtime/path_list.h", "runtime/printable.h",
     "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/stopwatch.h", "runtime/threads.h"};
 
+// A folder of a program that `rapid` becomes.
+bool is_program(const std::string& folder) { return fs::exists(fs::path(RAPID_SOURCE_DIR) / folder / "program.txt"); }
+
+std::vector<std::string> folders_of_programs()
+{
+    std::vector<std::string> folders;
+    for (const auto& entry : fs::directory_iterator(fs::path(RAPID_SOURCE_DIR) / "bindings"))
+        if (const std::string folder = "bindings/" + entry.path().filename().string(); is_program(folder))
+            folders.push_back(folder);
+    return folders;
+}
+
 bool is_inside_of_rapid(const std::string& header)
 {
     const std::string folder = fs::path(header).parent_path().string();
-    if (folder == "bindings/command" || folder == "bindings/view" || folder == "include/rapid") return false;
+    if (folder == "bindings/command" || folder == "include/rapid" || is_program(folder)) return false;
     return folder != "runtime/files" && small_tools.count(header) == 0;
 }
 
@@ -155,11 +167,26 @@ TEST_CASE("what programs include is what is installed", "[layers]")
     }
 }
 
+TEST_CASE("neither the command nor a program knows another program", "[layers]")
+{
+    std::vector<std::string> folders = folders_of_programs();
+    folders.push_back("bindings/command");
+    for (const std::string& folder : folders)
+        for (const Include& include : includes_below(folder)) {
+            const std::string into = fs::path(include.included).parent_path().string();
+            CAPTURE(include.file, include.included);
+            CHECK((into == folder || !include.ours || !is_program(into)));
+        }
+}
+
 TEST_CASE("a command is a program like others", "[layers]")
 {
     // By file, what it includes in quotes.
     std::map<std::string, std::set<std::string>> includes;
-    for (const char* const folder : {"bindings/command", "bindings/view"})
+    std::vector<std::string> folders = folders_of_programs();
+    REQUIRE(folders.size() >= 3);
+    folders.push_back("bindings/command");
+    for (const std::string& folder : folders)
         for (const Include& include : includes_below(folder))
             if (include.ours) includes[include.file].insert(include.included);
     REQUIRE(includes.size() > 50);

@@ -1,4 +1,4 @@
-#include "bindings/command/process_pool.h"
+#include "bindings/wedge/process_pool.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,6 +14,7 @@
 #include <map>
 
 #include "bindings/command/command.h"
+#include "bindings/command/programs.h"
 #include "bindings/command/signals.h"
 #include "runtime/files/file_error.h"
 
@@ -25,7 +26,8 @@ struct Running {
     Descriptor errors;  // what it says on standard error
 };
 
-[[noreturn]] void become(const std::vector<std::string>& words, int errors, pid_t parent, const sigset_t& signals)
+[[noreturn]] void become(const std::string& program, const std::vector<std::string>& words, int errors, pid_t parent,
+                         const sigset_t& signals)
 {
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != parent) _exit(status_failed);  // it ended before the line above
@@ -37,7 +39,7 @@ struct Running {
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
-    execv("/proc/self/exe", arguments.data());
+    execv(program.c_str(), arguments.data());
     _exit(127);
 }
 
@@ -74,6 +76,7 @@ int run_processes(std::size_t count, int jobs, const std::function<std::vector<s
     sigaddset(&waited, SIGCHLD);
     sigprocmask(SIG_BLOCK, &waited, &before);
 
+    const std::string program = command_file();
     const pid_t parent = getpid();
     std::map<pid_t, Running> running;
     std::size_t next = 0;
@@ -96,7 +99,7 @@ int run_processes(std::size_t count, int jobs, const std::function<std::vector<s
             if (!errors) throw file_error("no memory for what a process says", errno);
             const pid_t child = fork();
             if (child < 0) throw file_error("no process", errno);
-            if (child == 0) become(arguments, errors.number(), parent, before);
+            if (child == 0) become(program, arguments, errors.number(), parent, before);
             running.emplace(child, Running{next++, std::move(errors)});
         }
         const int signal = sigwaitinfo(&waited, nullptr);

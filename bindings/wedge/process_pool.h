@@ -13,7 +13,7 @@ struct EndedProcess {
     int status = 0;       // of the exit; 128 + the number of a signal
 };
 
-// Runs this program `count` times, at most `jobs` at a time, in order; `words` gives the arguments of each. `ended`
+// Runs `rapid` `count` times, at most `jobs` at a time, in order; `words` gives the arguments of each. `ended`
 // hears how each ended, in this thread. What they print goes nowhere. A signal that ends this process (Ctrl-C, SIGTERM,
 // ...) is passed on to those that run; then it returns 128 + its number, when all have ended; else 0.
 //

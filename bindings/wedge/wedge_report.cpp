@@ -1,4 +1,4 @@
-#include "bindings/command/wedge_report.h"
+#include "bindings/wedge/wedge_report.h"
 
 #include <fmt/format.h>
 

@@ -13,6 +13,7 @@
 #include "bindings/command/command.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/or_throw.h"
+#include "bindings/command/programs.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/signals.h"
 #include "bindings/command/untrusted.h"
@@ -41,7 +42,7 @@ std::filesystem::path page_folder()
 class View : public Command, public Confined {
 public:
     std::string name() const override { return "view"; }
-    std::string doc() const override { return "shows a scene, or files, in the browser while it is computed"; }
+    std::string doc() const override { return program(name()).doc; }
 
     void declare(Options& options) override
     {

@@ -11,11 +11,12 @@
 #include "bindings/command/file_options.h"
 #include "bindings/command/frame_selection.h"
 #include "bindings/command/or_throw.h"
-#include "bindings/command/process_pool.h"
+#include "bindings/command/programs.h"
 #include "bindings/command/scene_arguments.h"
 #include "bindings/command/untrusted.h"
-#include "bindings/command/wedge_report.h"
-#include "bindings/command/wedge_rows.h"
+#include "bindings/wedge/process_pool.h"
+#include "bindings/wedge/wedge_report.h"
+#include "bindings/wedge/wedge_rows.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/temporary_folder.h"
 
@@ -27,7 +28,7 @@ namespace fs = std::filesystem;
 class WedgeCommand : public Command, public Confined {
 public:
     std::string name() const override { return "wedge"; }
-    std::string doc() const override { return "runs a graph at many settings"; }
+    std::string doc() const override { return program(name()).doc; }
 
     void declare(Options& options) override
     {

@@ -1,4 +1,4 @@
-#include "bindings/command/machine.h"
+#include "bindings/study/machine.h"
 
 #include <fmt/format.h>
 #include <luajit.h>

@@ -1,4 +1,4 @@
-#include "bindings/command/study_run.h"
+#include "bindings/study/study_run.h"
 
 #include <unistd.h>
 

@@ -1,0 +1,50 @@
+#include "bindings/command/programs.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "bindings/command/program_list.h"
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path this_file() { return fs::read_symlink("/proc/self/exe"); }
+
+}  // namespace
+
+std::span<const Program> programs() { return program_list; }
+
+const Program& program(std::string_view name)
+{
+    return *std::find_if(std::begin(program_list), std::end(program_list),
+                         [&](const Program& one) { return one.name == name; });
+}
+
+fs::path command_file()
+{
+    const fs::path file = this_file();
+    const bool is_program = file.parent_path().filename() == "rapid";  // libexec/rapid/NAME
+    return is_program ? (file.parent_path() / command_folder / "rapid").lexically_normal() : file;
+}
+
+void become_program(const Program& program, std::vector<std::string> arguments)
+{
+    const fs::path file = (this_file().parent_path() / programs_folder / program.name).lexically_normal();
+    std::string name = "rapid";
+    std::vector<char*> words = {name.data()};
+    for (std::string& argument : arguments) words.push_back(argument.data());
+    words.push_back(nullptr);
+    execv(file.c_str(), words.data());
+    const int error = errno;
+    throw Error(fmt::format("{} can't be started ({}); it belongs beside {}, and is built by `ninja rapid_{}`",
+                            file.string(), std::strerror(error), this_file().string(), program.name));
+}
+
+}  // namespace rapid

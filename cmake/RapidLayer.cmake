@@ -10,8 +10,8 @@
 # RAPID_BATCHES is on: what they include takes most of their time. So no two files of a target may give different things
 # one name, in anonymous namespaces either.
 #
-# rapid_link_layers(TARGET NAME...) links layers into a target, with both parts; rapid_link_parts(TARGET PART...) links
-# parts.
+# rapid_link_layers(TARGET [WITHOUT_DEFERRED] NAME...) links layers into a target, with both parts or the first;
+# rapid_link_parts(TARGET PART...) links parts.
 
 # The headers of ours that bring OpenVDB with them.
 function(rapid_openvdb_headers result)
@@ -101,8 +101,12 @@ function(rapid_link_parts target)
 endfunction()
 
 function(rapid_link_layers target)
-  foreach(name ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 link "WITHOUT_DEFERRED" "" "")
+  foreach(name ${link_UNPARSED_ARGUMENTS})
     get_property(parts GLOBAL PROPERTY rapid_parts_of_${name})
+    if(link_WITHOUT_DEFERRED)
+      list(FILTER parts EXCLUDE REGEX "_deferred$")
+    endif()
     rapid_link_parts(${target} ${parts})
   endforeach()
 endfunction()

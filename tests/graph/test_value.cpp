@@ -5,13 +5,13 @@
 namespace rapid {
 namespace {
 
-struct Thing : Object {
-    explicit Thing(std::string_view kind) : kind_(kind) {}
+struct KindOnly : Object {
+    explicit KindOnly(std::string_view kind) : kind_(kind) {}
     std::string_view kind() const override { return kind_; }
     std::string_view kind_;
 };
 
-Value thing(std::string_view kind) { return ObjectPtr(std::make_shared<Thing>(kind)); }
+Value thing(std::string_view kind) { return ObjectPtr(std::make_shared<KindOnly>(kind)); }
 
 struct Nothing : FrameFunction {
     Value call(const Frame&) const override { return {}; }

@@ -10,7 +10,7 @@ namespace {
 using test::NodeTest;
 using test::points_at;
 
-constexpr double h = 1.0 / 24;
+constexpr double frame_length = 1.0 / 24;
 
 // Points on their way into a Solve, with what a simulation's gravity adds.
 Flow falling(PointSet points, const std::shared_ptr<Simulation>& simulation)
@@ -25,8 +25,8 @@ TEST_CASE("solve advances the points by a frame, and feeds them back to Create",
     NodeTest solve("solve", {});
     const Flow flow = solve.evaluate(2, {falling(points_at({{0, 10, 0}}), simulation)});
 
-    CHECK(flow.points.P()[0].y() == Approx(10 - 9.81 * h * h / 2).epsilon(1e-7));
-    CHECK(flow.points.v()[0].y() == Approx(-9.81 * h).epsilon(1e-6));
+    CHECK(flow.points.P()[0].y() == Approx(10 - 9.81 * frame_length * frame_length / 2).epsilon(1e-7));
+    CHECK(flow.points.v()[0].y() == Approx(-9.81 * frame_length).epsilon(1e-6));
     CHECK(flow.dynamics.empty());
     CHECK(simulation->state.P().shares_values_with(flow.points.P()));
     CHECK(simulation->state.size() == 1);
@@ -47,7 +47,7 @@ TEST_CASE("points age by their own time, and die at their life", "[solve]")
 {
     PointSet points = points_at({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
     const auto floats = [](std::vector<float> values) { return Column<float>(std::span<const float>(values)); };
-    const float frame = h;
+    const float frame = frame_length;
     points.set("age", floats({0, 0, 1, 1}));
     points.set("dt", floats({frame, 0.01f, frame, frame}));
     points.set("life", floats({10, 10, 1 + 0.5f * frame, 1 + 2 * frame}));
@@ -77,7 +77,7 @@ TEST_CASE("without life nothing dies, and without age nothing ages", "[solve]")
     NodeTest solve("solve", {});
     CHECK(solve(2, points).column_names() == std::vector<std::string>{"P", "id", "v"});
     points.add({"age", 5.0f});
-    CHECK(test::values_of<float>(solve(2, points), "age") == std::vector<float>{5 + float(h)});
+    CHECK(test::values_of<float>(solve(2, points), "age") == std::vector<float>{5 + float(frame_length)});
     CHECK(solve.figures.died == 0);
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("only points of the group of solve move and age", "[solve]")
     const PointSet after = solve.evaluate(2, {falling(points, simulation)}).points;
     CHECK(after.P()[0] == Vec3f(0, 0, 0));
     CHECK(after.P()[1].y() < 0);
-    CHECK(test::values_of<float>(after, "age") == std::vector<float>{0, float(h)});
+    CHECK(test::values_of<float>(after, "age") == std::vector<float>{0, float(frame_length)});
 }
 
 TEST_CASE("columns that are not shared are not copied from frame to frame", "[solve]")

@@ -32,39 +32,39 @@ int marks(const Picture& picture, int left, int top, int width, int height)
     return count;
 }
 
-constexpr Colour red = {200, 10, 10}, blue = {10, 10, 200};
+constexpr Colour red_pixel = {200, 10, 10}, blue_pixel = {10, 10, 200};
 
 TEST_CASE("a contact sheet has tiles in order, each in its place")
 {
-    const Picture sheet = contact_sheet({{plain(800, 400, red), {"a"}},
-                                         {plain(80, 40, blue), {"b"}},
+    const Picture sheet = contact_sheet({{plain(800, 400, red_pixel), {"a"}},
+                                         {plain(80, 40, blue_pixel), {"b"}},
                                          {{}, {"failed"}},
-                                         {plain(800, 400, blue), {"d"}}});
+                                         {plain(800, 400, blue_pixel), {"d"}}});
     REQUIRE(sheet.width == 2 * 400 + 3 * 12);
     const int pitch = 200 + 22 + 2 * 12;
     REQUIRE(sheet.height == 2 * pitch + 12);
-    CHECK(at(sheet, 12 + 200, 12 + 100) == red);
-    CHECK(at(sheet, 12, 12) == red);
-    CHECK(at(sheet, 12 + 399, 12 + 199) == red);
-    CHECK(at(sheet, 12 + 412 + 200, 12 + 100) == blue);
-    CHECK(at(sheet, 12 + 412 + 200, 12 + pitch + 100) == blue);
-    CHECK(at(sheet, 12 + 200, 12 + pitch + 100) != red);
+    CHECK(at(sheet, 12 + 200, 12 + 100) == red_pixel);
+    CHECK(at(sheet, 12, 12) == red_pixel);
+    CHECK(at(sheet, 12 + 399, 12 + 199) == red_pixel);
+    CHECK(at(sheet, 12 + 412 + 200, 12 + 100) == blue_pixel);
+    CHECK(at(sheet, 12 + 412 + 200, 12 + pitch + 100) == blue_pixel);
+    CHECK(at(sheet, 12 + 200, 12 + pitch + 100) != red_pixel);
     CHECK(marks(sheet, 12, 12 + pitch, 400, 200) == 0);  // there is no picture
 }
 
 TEST_CASE("a picture of another shape is fitted into its tile")
 {
-    const Picture sheet = contact_sheet({{plain(200, 100, red), {}}, {plain(100, 200, blue), {}}});
+    const Picture sheet = contact_sheet({{plain(200, 100, red_pixel), {}}, {plain(100, 200, blue_pixel), {}}});
     const int left = 12 + 412, top = 12;
-    CHECK(at(sheet, left + 200, top + 1) == blue);
-    CHECK(at(sheet, left + 200, top + 198) == blue);
-    CHECK(at(sheet, left + 200 - 60, top + 100) != blue);  // 50 pixels to each side of the middle
-    CHECK(at(sheet, left + 200 - 40, top + 100) == blue);
+    CHECK(at(sheet, left + 200, top + 1) == blue_pixel);
+    CHECK(at(sheet, left + 200, top + 198) == blue_pixel);
+    CHECK(at(sheet, left + 200 - 60, top + 100) != blue_pixel);  // 50 pixels to each side of the middle
+    CHECK(at(sheet, left + 200 - 40, top + 100) == blue_pixel);
 }
 
 TEST_CASE("labels stay below their own tile, however long, and in ASCII")
 {
-    const Picture sheet = contact_sheet({{plain(200, 100, red), {std::string(5000, 'W'), "\xff\n"}}, {{}, {}}});
+    const Picture sheet = contact_sheet({{plain(200, 100, red_pixel), {std::string(5000, 'W'), "\xff\n"}}, {{}, {}}});
     CHECK(marks(sheet, 12, 12 + 200 + 2, 400, 2 * 22) > 100);
     CHECK(marks(sheet, 12 + 400 + 1, 12 + 200 + 2, 400, 2 * 22) == 0);
 }

@@ -25,7 +25,7 @@ constexpr std::size_t spheres_a_task = 2048;
 constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
 
 // What single precision can't decide.
-bool touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
+bool spheres_touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
 {
     const double d = double(spheres.reach[a]) + double(spheres.reach[b]);
     return (spheres.P[a] - spheres.P[b]).squaredNorm() < d * d;
@@ -123,7 +123,7 @@ void ContactSearch::find_within(const CellGrid& grid)
                 const std::uint32_t a = grid.place[m], skipped = static_cast<std::uint32_t>(m + 1) - grid.begin(from);
                 spheres.for_each(grid, m, blur_, skipped, [&](std::uint32_t o, bool certain) {
                     const std::uint32_t b = grid.place[o];
-                    if (!certain && !touch(spheres_, a, b)) return;
+                    if (!certain && !spheres_touch(spheres_, a, b)) return;
                     pairs.emplace_back(std::min(a, b), std::max(a, b));
                 });
             }
@@ -149,7 +149,7 @@ void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
             last_cell = cell;
             spheres.for_each(fine, m, blur_, 0, [&](std::uint32_t o, bool certain) {
                 const std::uint32_t b = coarse.place[o];
-                if (certain || touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
+                if (certain || spheres_touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
             });
         }
     };

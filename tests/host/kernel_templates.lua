@@ -17,7 +17,7 @@ local function swapped(...) local a, b = ... return b, a end
 local function first_true(...) local a, b, c = ... return a or b or c end
 local function passed(...) return ... end
 local function three(a) return a.x, a.y, a.z end
-local function product(n, x) if n <= 0 then return 1 end return x * product(n - 1, x) end
+local function product(n, x) if n > 0 then return x * product(n - 1, x) end return 1 end
 local limit, tiny, zero, minus_zero, large = 0.25, 1e-40, 0, -0, 3e38
 local tint, spin, on, off, none = vec3(0.2, -0.4, 1.5), quat(0.5, 0.5, -0.5, 0.5), true, false, nil
 local word, which = "a", "f"
@@ -182,6 +182,7 @@ templates.graph = [[
 -- The first lines of kernels, by their place in the chain.
 templates.openings = {
   points = "  :points { name = \"k%d\", reads = names, writes = names, kernel = function(p, frame)",
+  vararg = "  :points { name = \"k%d\", reads = names, writes = names, kernel = function(...) local p, frame = ...",
   group = "  :points { name = \"k%d\", group = \"a\", reads = names, writes = names, kernel = function(p, frame)",
   action = "  :action { name = \"k%d\", reads = names, writes = names, kernel = function(p, step)",
   delete = "  :delete { name = \"k%d\", where = function(p)",

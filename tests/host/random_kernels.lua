@@ -277,7 +277,7 @@ local function helper(number, scope)
   return { ("local function %s(%s)"):format(f.name, table.concat(names, ", ")), body, "end" }
 end
 
-local places = { "points", "points", "points", "group", "action", "delete", "node" }
+local places = { "points", "points", "points", "points", "vararg", "group", "action", "delete", "node" }
 
 -- Returns a kernel: its place in the chain, and its body.
 local function kernel(number, scope, given_place)
@@ -285,7 +285,7 @@ local function kernel(number, scope, given_place)
   local within = inner(scope)
   within.p, within.frame, within.is_step = true, place ~= "delete", place == "action"
   within.is_pure, within.params, within.is_birth = place == "delete", place == "node", place == "birth"
-  within.computes_names = place == "points" or place == "group" or place == "action"
+  within.computes_names = place ~= "delete" and place ~= "node" and place ~= "birth"
   within.returns = place == "delete" and { pick { "B", "B", "M" } } or {}
   local body = statement_list(within, 3, 2 + below(5))
   if chance(0.15) then
@@ -304,7 +304,7 @@ local sizes = { 3, 31, 32, 33, 60, 100, 127, 128, 129, 200, 256, 257, 300 }
 
 function random_kernels.scene()
   fresh = 0
-  local scope = inner { calls = {}, only_lanes = chance(0.6) }
+  local scope = inner { calls = {}, only_lanes = chance(0.7) }
   local made = { helpers = block {}, kernels = {}, size = pick(sizes), is_emitted = chance(0.15) }
   if chance(0.03) then made.size = 4200 end -- two chunks
   for k = 1, below(4) do made.helpers[k] = helper(k, scope) end

@@ -76,7 +76,8 @@ describe("random kernels", function()
       end
     end
     assert.equal("", table.concat(faults, "\n\n"))
+    if kernels < 100 then return end
     assert.is_true(in_lanes > 0.3 * made_kernels, "few of the kernels are programs of lanes")
-    assert.is_true(errors < 0.5 * number, "many of the scenes end with an error")
+    assert.is_true(errors < 0.3 * number, "many of the scenes end with an error")
   end)
 end)

@@ -1,35 +1,47 @@
 #include "runtime/elementary.h"
 
 #include <cmath>
+#include <limits>
+
+#include "runtime/large_angle.h"
 
 namespace rapid {
 namespace {
 
+using elementary::Quarters;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
 // An angle that is none, or infinite, is not within, either.
 bool is_reduced(double x) { return std::abs(x) <= elementary::most_angle; }
 
-// of_library: for the lanes beyond.
-template <class OfLibrary>
-Doubles sine_of_lanes(const Doubles& x, std::int64_t quarters, const OfLibrary& of_library)
+Quarters<double> quarters_of(double x)
+{
+    if (is_reduced(x)) return Quarters<double>(x);
+    if (!(std::abs(x) < infinity)) return {0, x - x, 0};  // no number
+    return quarters_of_large(x);
+}
+
+Doubles sine_of_lanes(const Doubles& x, std::int64_t quarters)
 {
     Doubles value = by_registers(
-        x, [&](const Register& part) __attribute__((always_inline)) { return elementary::sine(part, quarters); });
+        x, [&](const Register& part)
+               __attribute__((always_inline)) { return elementary::sine(Quarters<Register>(part), quarters); });
     if (!any(!(magnitude(x) <= elementary::most_angle))) return value;
     for (std::uint32_t l = 0; l < lanes; ++l)
-        if (!is_reduced(x[l])) value[l] = of_library(x[l]);
+        if (!is_reduced(x[l])) value[l] = elementary::sine(quarters_of(x[l]), quarters);
     return value;
 }
 
 }  // namespace
 
-double sine(double x) { return is_reduced(x) ? elementary::sine(x, 0) : std::sin(x); }
-double cosine(double x) { return is_reduced(x) ? elementary::sine(x, 1) : std::cos(x); }
+double sine(double x) { return elementary::sine(quarters_of(x), 0); }
+double cosine(double x) { return elementary::sine(quarters_of(x), 1); }
 double exponential(double x) { return elementary::exponential(x); }
 
 SineAndCosine sine_and_cosine(double x)
 {
-    if (!is_reduced(x)) return {std::sin(x), std::cos(x)};
-    const elementary::Quarters<double> reduced(x);
+    const Quarters<double> reduced = quarters_of(x);
     const double of_sine = elementary::sine_of_rest(reduced.r, reduced.tail);
     const double of_cosine = elementary::cosine_of_rest(reduced.r, reduced.tail);
     const bool is_odd = (reduced.n & 1) != 0;
@@ -37,13 +49,22 @@ SineAndCosine sine_and_cosine(double x)
     return {(reduced.n & 2) != 0 ? -sine : sine, ((reduced.n + 1) & 2) != 0 ? -cosine : cosine};
 }
 
-Doubles sine(const Doubles& x)
+// sin / cos, or of an odd number of quarter turns -cos / sin, each in two parts.
+double tangent(double x)
 {
-    return sine_of_lanes(x, 0, [](double beyond) { return std::sin(beyond); });
+    if (std::abs(x) < 0x1p-30) return x;
+    const auto [n, r, tail] = quarters_of(x);
+    const DoubleDouble<double> square = exact_product(r, r), half = {0.5 * square.high, 0.5 * square.low};
+    const double z = square.high;
+    const DoubleDouble<double> sine =
+        exact_sum_of_ordered(r, z * r * elementary::sine_series(z) + (tail - half.high * tail));
+    const DoubleDouble<double> most = exact_sum_of_ordered(1.0, -half.high);
+    const DoubleDouble<double> cosine =
+        exact_sum_of_ordered(most.high, most.low + ((z * z * elementary::cosine_series(z) - r * tail) - half.low));
+    return ((n & 1) != 0 ? -cosine / sine : sine / cosine).high;
 }
-Doubles cosine(const Doubles& x)
-{
-    return sine_of_lanes(x, 1, [](double beyond) { return std::cos(beyond); });
-}
+
+Doubles sine(const Doubles& x) { return sine_of_lanes(x, 0); }
+Doubles cosine(const Doubles& x) { return sine_of_lanes(x, 1); }
 
 }  // namespace rapid

@@ -1,22 +1,89 @@
--- math.sin, math.cos and math.exp, by runtime/elementary.h: the same bits on any processor, and for kernels of one
--- point and of many. They take the place of Lua's own before any other file is read.
+-- The functions of `math` that are Rapid's own: with the same bits on any processor, interpreted, compiled, and for
+-- kernels of one point and of many. They replace LuaJIT's before any other file is read.
+--
+-- LuaJIT's interpreter and its compiled code differ in squares. The C library's functions differ between its versions,
+-- and between processors with fused multiplication and without.
 --
 -- Vararg for the reason that vec3.lua gives.
 local ffi = require "ffi"
 
-local type = type
+local select, tonumber, type = select, tonumber, type
 
--- functions: light userdata of double (*)(double), by name; library: the table `math`.
-local function replace(functions, library)
-  for name, address in pairs(functions) do
-    local own, of_lua = ffi.cast("double (*)(double)", address), library[name]
-    library[name] = function(...)
-      local x = ...
-      if type(x) ~= "number" then x = of_lua(...) and tonumber(x) end -- a text that is a number; or Lua's error
-      local y = own(x)
+-- An argument that may be text, as Lua takes it.
+local function number_in(name, place, ...)
+  local value = select(place, ...)
+  local kind = place > select("#", ...) and "no value" or type(value)
+  local number = (kind == "number" or kind == "string") and tonumber(value)
+  if number then return number end
+  error(("bad argument #%d to '%s' (number expected, got %s)"):format(place, name, kind), 3)
+end
+
+local function of_one(name, own)
+  return function(...)
+    local x = ...
+    if type(x) ~= "number" then x = number_in(name, 1, ...) end
+    local y = own(x)
+    return y
+  end
+end
+
+local function of_two(name, own)
+  return function(...)
+    local x, y = ...
+    if type(x) ~= "number" or type(y) ~= "number" then x, y = number_in(name, 1, ...), number_in(name, 2, ...) end
+    local z = own(x, y)
+    return z
+  end
+end
+
+-- With a base, or without.
+local function logarithm(own, own_of_base)
+  return function(...)
+    local x, base = ...
+    if type(x) ~= "number" then x = number_in("log", 1, ...) end
+    if select("#", ...) > 1 then
+      if type(base) ~= "number" then base = number_in("log", 2, ...) end
+      local y = own_of_base(x, base)
       return y
     end
+    local y = own(x)
+    return y
   end
+end
+
+-- Also the operator ^ (lua/power_operator.lua), with its errors.
+local function power(own)
+  return function(...)
+    local x, y = ...
+    if type(x) ~= "number" or type(y) ~= "number" then
+      if type(x) == "string" then x = tonumber(x) or x end
+      if type(y) == "string" then y = tonumber(y) or y end
+      local wrong = x
+      if type(x) == "number" then wrong = y end
+      if type(wrong) == "table" or type(wrong) == "cdata" then return (x ^ y) end -- by its metatable
+      if type(wrong) ~= "number" then
+        error(("attempt to perform arithmetic on a %s value"):format(type(wrong)), 2)
+      end
+    end
+    if y == 2 then return x * x end
+    local z = own(x, y)
+    return z
+  end
+end
+
+-- functions1, functions2: light userdata of double (*)(double) and of double (*)(double, double), by their names in
+-- Lua; library: the table `math`.
+local function replace(functions1, functions2, library)
+  local own = {}
+  for name, address in pairs(functions2) do
+    own[name] = ffi.cast("double (*)(double, double)", address)
+    library[name] = of_two(name, own[name])
+  end
+  for name, address in pairs(functions1) do
+    local f = ffi.cast("double (*)(double)", address)
+    library[name] = name == "log" and logarithm(f, own.log) or of_one(name, f)
+  end
+  library.pow = power(own.pow)
 end
 
 return { replace = replace }

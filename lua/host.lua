@@ -4,7 +4,7 @@
 -- The chunk is called with the host's native functions and returns a table of entry points.
 local native = ...
 
-require("elementary").replace(native.elementary, math)
+require("elementary").replace(native.math_functions1, native.math_functions2, math)
 
 local bytecode = require "bytecode"
 local describe = require "describe"

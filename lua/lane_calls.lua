@@ -71,7 +71,8 @@ local function operation(op)
   end
 end
 
-local function of_library(name, count)
+-- A function of bindings/host/math_functions.h, of one number or of two.
+local function of_host(name, count)
   return function(program, _, args)
     numbers(args, count)
     if #args > count then give_up("math." .. name .. " takes more") end
@@ -100,11 +101,25 @@ natives[math.sqrt], natives[math.abs] = operation "SquareRoot", operation "Absol
 natives[math.floor], natives[math.ceil] = operation "Floor", operation "Ceiling"
 natives[math.sin], natives[math.cos], natives[math.exp] = operation "Sine", operation "Cosine", operation "Exponential"
 natives[math.min], natives[math.max] = extreme "Least", extreme "Most"
-for _, name in ipairs { "tan", "asin", "acos", "atan", "log", "log10", "sinh", "cosh", "tanh" } do
-  natives[math[name]] = of_library(name, 1)
+for _, name in ipairs { "tan", "asin", "acos", "atan", "log10", "sinh", "cosh", "tanh" } do
+  natives[math[name]] = of_host(name, 1)
 end
-natives[math.atan2] = of_library("atan2", 2)
+natives[math.atan2], natives[math.ldexp] = of_host("atan2", 2), of_host("ldexp", 2)
 
+local natural, with_base = operation "Logarithm", of_host("log", 2)
+natives[math.log] = function(program, state, args)
+  return (#args > 1 and with_base or natural)(program, state, args)
+end
+
+-- A square is a product, as everywhere.
+natives[math.pow] = function(program, _, args)
+  numbers(args, 2)
+  local x, y = args[1], args[2]
+  if lane.constant_of(program, y) == 2 then
+    return { { kind = "number", id = program:emit("Multiply", x.id, x.id) } }
+  end
+  return { { kind = "number", id = program:emit("Power", x.id, y.id) } }
+end
 local type_names = { number = "number", vector = "cdata", flag = "boolean", point = "cdata", frame = "cdata",
                      step = "cdata", params = "userdata", detail = "userdata", method = "function" }
 
@@ -140,4 +155,4 @@ end
 natives[vector.type] = function(_, _, args) return construct(vector.type, args) end
 natives[vector.quat] = function(_, _, args) return construct(vector.quat, args) end
 
-return { methods = methods, natives = natives, power = of_library("pow", 2) }
+return { methods = methods, natives = natives }

@@ -220,15 +220,6 @@ for op in pairs(arithmetic) do
   effects[op .. "VV"] = with(of_b, of_c)
 end
 
--- Powers are the C library's; a square is a product, as LuaJIT compiles it.
-function effects.POW(at)
-  local base, exponent = reg(at, at.b), reg(at, at.c)
-  if base.kind == "number" and constant_of(at.program, exponent) == 2 then
-    return { kind = "number", id = at.program:emit("Multiply", base.id, base.id) }
-  end
-  return calls.power(at.program, at.state, { base, exponent })[1]
-end
-
 function effects.UGET(at)
   local f, place = at.f, at.d + 1
   local _, value = debug.getupvalue(f, place)

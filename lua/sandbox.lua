@@ -5,6 +5,7 @@
 -- Rapid's own.
 local ffi = require "ffi"
 local describe = require "describe"
+local power_operator = require "power_operator"
 local protected = require "protected"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
@@ -118,6 +119,7 @@ local function make(native, run)
   env.rawequal = rawequal
   env.string, env.bit = strings, copy(require "bit")
   env.math = copy(math, { "random", "randomseed" })
+  env[power_operator.name] = math.pow
   env.table = copy(table, { "foreach", "foreachi", "getn" })
   env.table.sort = protected.sort
   env.coroutine = copy(coroutine)
@@ -144,6 +146,8 @@ local function make(native, run)
     if type(text) ~= "string" then return nil, "load takes a text, not " .. describe.kind(text) end
     if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
     local chunk, message = loadstring(text, name)
+    local with_calls = chunk and power_operator.rewrite(text)
+    if with_calls then chunk, message = loadstring(with_calls, name) end
     if not chunk then return nil, message end
     return setfenv(chunk, env)
   end

@@ -4,7 +4,7 @@
 #include <lua.hpp>
 
 #include "bindings/host/kernel_moment.h"
-#include "runtime/elementary.h"
+#include "bindings/host/math_functions.h"
 #include "runtime/lanes/kernel_random.h"
 #include "runtime/noise.h"
 #include "runtime/shapes/level_set/density_grid.h"
@@ -109,11 +109,13 @@ void set_kernel_functions(lua_State* L)
     set("mesh_value", &mesh_value);
     set("vector_grid_sample", &vector_grid_sample);
     set("fog_sample", &fog_sample);
-    lua_newtable(L);
-    set("sin", static_cast<double (*)(double)>(&sine));
-    set("cos", static_cast<double (*)(double)>(&cosine));
-    set("exp", static_cast<double (*)(double)>(&exponential));
-    lua_setfield(L, -2, "elementary");
+    const auto set_all = [&](const char* field, const auto& functions) {
+        lua_newtable(L);
+        for (const auto& [name, function] : functions) set(name.data(), function);
+        lua_setfield(L, -2, field);
+    };
+    set_all("math_functions1", math_functions1);
+    set_all("math_functions2", math_functions2);
 }
 
 }  // namespace rapid

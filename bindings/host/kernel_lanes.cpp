@@ -3,31 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <lua.hpp>
 #include <string>
 #include <utility>
 
 #include "bindings/host/lua_text.h"
+#include "bindings/host/math_functions.h"
 #include "bindings/host/script_host.h"
 
 namespace rapid {
 namespace {
 
 constexpr std::size_t most_inputs = 200;
-
-// Functions of the C library that programs call by the names that they have in Lua.
-constexpr std::pair<std::string_view, LaneProgram::Function1> functions1[] = {
-    {"tan", [](double x) { return std::tan(x); }},   {"asin", [](double x) { return std::asin(x); }},
-    {"acos", [](double x) { return std::acos(x); }}, {"atan", [](double x) { return std::atan(x); }},
-    {"log", [](double x) { return std::log(x); }},   {"log10", [](double x) { return std::log10(x); }},
-    {"sinh", [](double x) { return std::sinh(x); }}, {"cosh", [](double x) { return std::cosh(x); }},
-    {"tanh", [](double x) { return std::tanh(x); }},
-};
-constexpr std::pair<std::string_view, LaneProgram::Function2> functions2[] = {
-    {"atan2", [](double y, double x) { return std::atan2(y, x); }},
-    {"pow", [](double x, double y) { return std::pow(x, y); }},
-};
 
 // The functions below read fields of the table at the top of the stack.
 
@@ -94,8 +81,8 @@ LaneProgram program_of(lua_State* L)
     program.steady = instructions_of(L, "steady");
     program.steady_column = static_cast<std::uint16_t>(size_of(L, "steady_column"));
     program.code = instructions_of(L, "code");
-    add_functions(L, "functions1", functions1, program.functions1);
-    add_functions(L, "functions2", functions2, program.functions2);
+    add_functions(L, "functions1", math_functions1, program.functions1);
+    add_functions(L, "functions2", math_functions2, program.functions2);
     return program;
 }
 

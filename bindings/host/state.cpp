@@ -156,9 +156,10 @@ void State::open_libraries()
     leave_out_current_folder(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();
-    for (const char* name : {"elementary", "describe", "engine_errors", "vec3", "bytecode", "lane_program",
-                             "lane_calls", "lanes", "kernel", "detail", "numeric", "shape", "ramp", "protected",
-                             "sandbox", "shared_state", "study", "text", "rapid"}) {
+    for (const char* name :
+         {"elementary", "describe", "engine_errors", "vec3",    "bytecode", "lane_program", "lane_calls",
+          "lanes",      "kernel",   "detail",        "numeric", "shape",    "ramp",         "power_operator",
+          "protected",  "sandbox",  "shared_state",  "study",   "text",     "rapid"}) {
         lua_getglobal(L_, "package");
         lua_getfield(L_, -1, "preload");
         const std::string text = read_text(folder / (std::string(name) + ".lua"));

@@ -12,6 +12,7 @@
 #include "runtime/items.h"
 #include "runtime/lanes/kernel_random.h"
 #include "runtime/lanes/lane_tile.h"
+#include "runtime/power.h"
 
 namespace rapid {
 namespace {
@@ -83,6 +84,12 @@ struct Cosine {
 struct Exponential {
     Doubles operator()(const Doubles& a) const { return exponential(a); }
 };
+struct Logarithm {
+    Doubles operator()(const Doubles& a) const { return logarithm(a); }
+};
+struct Power {
+    Doubles operator()(const Doubles& a, const Doubles& b) const { return power(a, b); }
+};
 struct Round {  // to a float
     Doubles operator()(const Doubles& a) const { return widen(narrow(a)); }
 };
@@ -127,7 +134,7 @@ struct Most {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return most(a, b); }
 };
 
-// t = function k of the C library, of a, and of a and b
+// t = function k of a, and of a and b
 bool call1(Tile& tile, const Now& now)
 {
     const double* const a = tile.numbers(now.a);
@@ -387,6 +394,8 @@ constexpr std::pair<std::string_view, LaneOperation> operations[] = {
     {"Sine", of_one<Sine>},
     {"Cosine", of_one<Cosine>},
     {"Exponential", of_one<Exponential>},
+    {"Logarithm", of_one<Logarithm>},
+    {"Power", of_two<Power>},
     {"Call1", call1},
     {"Call2", call2},
     {"Less", of_two<std::less<>>},

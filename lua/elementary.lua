@@ -1,13 +1,14 @@
 -- The functions of `math` that are Rapid's own: with the same bits on any processor, interpreted, compiled, and for
 -- kernels of one point and of many. They replace LuaJIT's before any other file is read.
 --
--- LuaJIT's interpreter and its compiled code differ in squares. The C library's functions differ between its versions,
--- and between processors with fused multiplication and without.
+-- LuaJIT's interpreter and its compiled code differ in the least and the largest of numbers that are NaN or zeros of
+-- both signs, in ceil between -1 and -0.5, and in squares. The C library's functions differ between its versions, and
+-- between processors with fused multiplication and without.
 --
 -- Vararg for the reason that vec3.lua gives.
 local ffi = require "ffi"
 
-local select, tonumber, type = select, tonumber, type
+local floor, select, tonumber, type = math.floor, select, tonumber, type
 
 -- An argument that may be text, as Lua takes it.
 local function number_in(name, place, ...)
@@ -51,6 +52,31 @@ local function logarithm(own, own_of_base)
   end
 end
 
+-- The least or the largest: NaN if one of the numbers is, and a zero is +0. LuaJIT's own has the second operand in
+-- these cases, and compiled code swaps operands.
+local function extreme(name, of_lua)
+  local function any_number(...)
+    local x, y = ...
+    local count = select("#", ...)
+    if type(x) ~= "number" then x = number_in(name, 1, ...) end
+    if count < 2 then
+      y = x
+    elseif type(y) ~= "number" then
+      y = number_in(name, 2, ...)
+    end
+    if x ~= x or y ~= y then x = x + y else x = of_lua(x, y) + 0 end
+    if count > 2 then x = any_number(x, select(3, ...)) end
+    return x
+  end
+  return any_number
+end
+
+local function ceiling(...)
+  local x = ...
+  if type(x) ~= "number" then x = number_in("ceil", 1, ...) end
+  return -floor(-x)
+end
+
 -- Also the operator ^ (lua/power_operator.lua), with its errors.
 local function power(own)
   return function(...)
@@ -83,7 +109,8 @@ local function replace(functions1, functions2, library)
     local f = ffi.cast("double (*)(double)", address)
     library[name] = name == "log" and logarithm(f, own.log) or of_one(name, f)
   end
-  library.pow = power(own.pow)
+  library.min, library.max = extreme("min", library.min), extreme("max", library.max)
+  library.ceil, library.pow = ceiling, power(own.pow)
 end
 
 return { replace = replace }

@@ -89,10 +89,10 @@ local function of_host(name, count)
 end
 
 local function extreme(op)
-  return function(program, state, args)
+  return function(program, _, args)
     numbers(args, math.max(#args, 1))
     local id = args[1].id
-    for k = 2, #args do id = program:emit(op, id, args[k].id, state.mask) end
+    for k = 2, math.max(#args, 2) do id = program:emit(op, id, (args[k] or args[1]).id) end
     return { { kind = "number", id = id } }
   end
 end

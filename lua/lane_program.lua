@@ -39,7 +39,7 @@ local reads_lane = { visited = true, Random = true, LoadTime = true, LoadStep = 
 
 -- What takes three nodes. Of two operations in one the second takes the result of the first; of a difference that is on
 -- the left or, named From, on the right.
-local takes_three = { Choose = true, Least = true, Most = true }
+local takes_three = { Choose = true }
 local of_two = { Add = true, Subtract = true, Multiply = true }
 for first in pairs(of_two) do
   for _, second in ipairs { "Add", "Subtract", "SubtractFrom", "Multiply" } do takes_three[first .. second] = true end

@@ -114,19 +114,15 @@ bool choose(Tile& tile, const Now& now)
     return true;
 }
 
-// The least or the largest. Where the flag c is set it fails of numbers of which Lua's result depends on their order:
-// one is no number, or they are 0 of both signs.
+// The least and the largest: no number where one of them is none, and a zero is +0, as lua/elementary.lua has them.
 template <class F>
-bool extreme(Tile& tile, const Now& now)
-{
-    const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b), *const c = tile.slot(now.c);
-    if (tile.any_of([&](std::size_t k) {
-            return as_flags(c[k]) & ~((a[k] < b[k]) | (a[k] > b[k]) | (as_flags(a[k]) == as_flags(b[k])));
-        }))
-        return false;
-    tile.fill(now.to, [&](std::size_t k) { return F()(a[k], b[k]); });
-    return true;
-}
+struct Extreme {
+    Doubles operator()(const Doubles& a, const Doubles& b) const
+    {
+        const Doubles sum = a + b;
+        return (a == a) & (b == b) ? F()(a, b) + 0.0 : sum;
+    }
+};
 struct Least {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return least(a, b); }
 };
@@ -389,8 +385,8 @@ constexpr std::pair<std::string_view, LaneOperation> operations[] = {
     {"Absolute", of_one<Absolute>},
     {"Floor", of_one<ByLane<Floor>>},
     {"Ceiling", of_one<ByLane<Ceiling>>},
-    {"Least", extreme<Least>},
-    {"Most", extreme<Most>},
+    {"Least", of_two<Extreme<Least>>},
+    {"Most", of_two<Extreme<Most>>},
     {"Sine", of_one<Sine>},
     {"Cosine", of_one<Cosine>},
     {"Exponential", of_one<Exponential>},

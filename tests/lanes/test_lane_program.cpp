@@ -168,21 +168,6 @@ TEST_CASE("components of vectors are taken apart and put together", "[lanes]")
     check_vectors<double>("LoadDouble", "StoreDoubleVector");
 }
 
-TEST_CASE("the least and the largest fail where their order of arguments counts", "[lanes]")
-{
-    for (const auto& [a, b, fails] : {std::tuple{1.0, 2.0, false}, std::tuple{2.0, 2.0, false},
-                                      std::tuple{0.0, -0.0, true}, std::tuple{std::nan(""), 1.0, true}}) {
-        LaneProgram program;
-        program.constants = {a, b};
-        program.code = {{lane_operation("Least"), 7, 5, 6, LaneProgram::visited, 0},
-                        {lane_operation("StoreFloat"), 0, 7, 0, 0, 0}};
-        program.slots = 8;
-        std::vector<float> x(8, 9.0f);
-        CHECK(run(program, x).empty() != fails);
-        CHECK(x[0] == (fails ? 9.0f : static_cast<float>(std::min(a, b))));
-    }
-}
-
 TEST_CASE("two operations in one round twice, as one after the other", "[lanes]")
 {
     using Two = double (*)(double, double);

@@ -1,16 +1,16 @@
--- The functions of `math` that are Rapid's own: with the same bits on any processor, interpreted, compiled, and for
--- kernels of one point and of many. They replace LuaJIT's before any other file is read.
+-- Rapid's own functions of `math`. They give the same bits on any processor, interpreted, compiled and in lanes, and
+-- replace LuaJIT's before any other file is read.
 --
--- LuaJIT's interpreter and its compiled code differ in the least and the largest of numbers that are NaN or zeros of
--- both signs, in ceil between -1 and -0.5, and in squares. The C library's functions differ between its versions, and
--- between processors with fused multiplication and without.
+-- LuaJIT's interpreter and its compiled code give different results for squares, for ceil between -1 and -0.5, and for
+-- min and max of NaN or of zeros of both signs. The C library's functions differ between its versions, and between
+-- processors with and without fused multiplication.
 --
 -- Vararg for the reason that vec3.lua gives.
 local ffi = require "ffi"
 
 local floor, select, tonumber, type = math.floor, select, tonumber, type
 
--- An argument that may be text, as Lua takes it.
+-- Returns an argument as a number; a string may be one. Raises Lua's error otherwise.
 local function number_in(name, place, ...)
   local value = select(place, ...)
   local kind = place > select("#", ...) and "no value" or type(value)
@@ -37,7 +37,7 @@ local function of_two(name, own)
   end
 end
 
--- With a base, or without.
+-- math.log, with or without a base.
 local function logarithm(own, own_of_base)
   return function(...)
     local x, base = ...
@@ -52,8 +52,8 @@ local function logarithm(own, own_of_base)
   end
 end
 
--- The least or the largest: NaN if one of the numbers is, and a zero is +0. LuaJIT's own has the second operand in
--- these cases, and compiled code swaps operands.
+-- math.min or math.max: NaN if one of the numbers is NaN, and zeros become +0. In these cases LuaJIT's own functions
+-- return the second operand, and compiled code swaps operands.
 local function extreme(name, of_lua)
   local function any_number(...)
     local x, y = ...
@@ -77,7 +77,7 @@ local function ceiling(...)
   return -floor(-x)
 end
 
--- Also the operator ^ (lua/power_operator.lua), with its errors.
+-- math.pow, and the operator ^ with its errors (lua/power_operator.lua).
 local function power(own)
   return function(...)
     local x, y = ...

@@ -53,7 +53,9 @@ local function load_node(name)
 end
 
 -- Loops are compiled early, before the functions that they call count as hot. The limits leave room for large kernels.
-jit.opt.start("hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000", "maxmcode=16384")
+-- Without -narrow compiled code would use integers where the interpreter does not: a loop's -0 would become 0, and
+-- bit.tobit(x + 1) would become tobit(x) + 1.
+jit.opt.start("-narrow", "hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxirconst=2000", "maxmcode=16384")
 
 ffi.cdef(native.chunk_header)
 local shapes = shape.make(native)

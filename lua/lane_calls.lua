@@ -71,7 +71,7 @@ local function operation(op)
   end
 end
 
--- A function of bindings/host/math_functions.h, of one number or of two.
+-- A function of bindings/host/math_functions.h that takes one number or two.
 local function of_host(name, count)
   return function(program, _, args)
     numbers(args, count)
@@ -111,7 +111,7 @@ natives[math.log] = function(program, state, args)
   return (#args > 1 and with_base or natural)(program, state, args)
 end
 
--- A square is a product, as everywhere.
+-- The operator ^, too. A square is a product.
 natives[math.pow] = function(program, _, args)
   numbers(args, 2)
   local x, y = args[1], args[2]

@@ -1,12 +1,12 @@
--- The operator ^ in the text of scripts, as calls of a function. LuaJIT's own is the C library's when it reads
--- constants and interprets; compiled code makes a square a product.
+-- Rewrites the operator ^ in scripts to calls of math.pow. LuaJIT's own operator calls the C library when it folds
+-- constants and when it interprets, and replaces x^2 by x*x in compiled code.
 --
 --   -a.b ^ 2 ^ c      becomes      -POWER(a.b,(POWER(2,(c))))
 --
--- The left operand is the simple expression before the operator; the right one begins with any number of unary
--- operators, and another ^ behind it belongs to it. A function as an operand is left to LuaJIT, which refuses it.
+-- The left operand is the simple expression before the operator. The right operand may start with unary operators and
+-- includes any ^ that follows it. A function as an operand is left to LuaJIT, which raises the error.
 
--- No script has this name, an arrow.
+-- An upward arrow: a valid name for LuaJIT that no script uses.
 local name = "\226\134\145"
 
 local keywords = {}
@@ -15,7 +15,7 @@ for word in ("and break do else elseif end false for function goto if in local n
   keywords[word] = true
 end
 
--- The last byte of a string in quotes that begins at `first`.
+-- Returns the last byte of a quoted string that begins at `first`.
 local function end_of_quoted(text, first)
   local quote, place = text:sub(first, first), first + 1
   while true do
@@ -25,13 +25,13 @@ local function end_of_quoted(text, first)
   end
 end
 
--- The last byte of a string in long brackets, or nil where none begins.
+-- Returns the last byte of a string in long brackets, or nil if none begins at `first`.
 local function end_of_long(text, first)
   local level = text:match("^%[(=*)%[", first)
   return level and select(2, text:find("]" .. level .. "]", first, true))
 end
 
--- The last byte of a number: a sign belongs to it behind the letter of an exponent.
+-- Returns the last byte of a number. A sign belongs to it if it follows the letter of an exponent.
 local function end_of_number(text, first)
   local exponent = text:find("^0[xX]", first) and "[pP]" or "[eE]"
   local place = first
@@ -49,8 +49,8 @@ local function end_of_operator(text, first)
   return first
 end
 
--- The tokens of a text that is a program: { kind, text, first, last }, where kind is "name", "value" (a number, nil,
--- true, false or ...), "string", or the text of a keyword or an operator.
+-- Returns the tokens of a program without syntax errors: { kind, text, first, last }, where kind is "name", "string",
+-- "value" (a number, nil, true, false or ...), or the text of a keyword or an operator.
 local function tokens_of(text)
   local tokens, place = {}, text:find("^\239\187\191") and 4 or 1
   local function add(kind, last)
@@ -84,7 +84,7 @@ end
 local closing = { ["("] = ")", ["["] = "]", ["{"] = "}" }
 local opening = { [")"] = "(", ["]"] = "[", ["}"] = "{" }
 
--- The places of the brackets that belong together, by each other.
+-- Returns a map from the index of each bracket to that of its partner.
 local function pairs_of_brackets(tokens)
   local other, open = {}, {}
   for place, token in ipairs(tokens) do
@@ -98,10 +98,10 @@ local function pairs_of_brackets(tokens)
   return other
 end
 
--- What may have a call's arguments or an index behind it, if that is its last token.
+-- Tokens that may be followed by a call's arguments or an index.
 local is_end_of_prefix = { name = true, string = true, [")"] = true, ["]"] = true, ["}"] = true }
 
--- The first token of the simple expression whose last one is at `place`; nil for a function.
+-- Returns the first token of the simple expression whose last token is at `place`, or nil for a function.
 local function first_of_left(tokens, other, place)
   while true do
     local kind = tokens[place].kind
@@ -121,7 +121,7 @@ end
 
 local is_unary = { ["-"] = true, ["not"] = true, ["#"] = true }
 
--- The last token of the operand that begins at `place`; nil for a function.
+-- Returns the last token of the operand that begins at `place`, or nil for a function.
 local function last_of_right(tokens, other, place)
   while is_unary[tokens[place].kind] do place = place + 1 end
   local kind = tokens[place].kind
@@ -145,7 +145,7 @@ local function last_of_right(tokens, other, place)
   return place
 end
 
--- The text of a program with calls for its operators ^; nil if it has none. Lines stay where they are.
+-- Returns the program with its operators ^ replaced by calls, or nil if it has none. Line numbers do not change.
 local function rewrite(text)
   if not text:find("^", 1, true) then return nil end
   local tokens = tokens_of(text)

@@ -1,4 +1,4 @@
-// Rapid's own functions of Lua's `math`, by their names there: for lua/elementary.lua and for lanes.
+// Rapid's own functions of Lua's `math`, by name, for lua/elementary.lua and for lanes.
 #pragma once
 
 #include <string_view>

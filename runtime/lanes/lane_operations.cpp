@@ -114,7 +114,7 @@ bool choose(Tile& tile, const Now& now)
     return true;
 }
 
-// The least and the largest: no number where one of them is none, and a zero is +0, as lua/elementary.lua has them.
+// math.min and math.max of two numbers, as lua/elementary.lua defines them: NaN if either is NaN, and zeros become +0.
 template <class F>
 struct Extreme {
     Doubles operator()(const Doubles& a, const Doubles& b) const

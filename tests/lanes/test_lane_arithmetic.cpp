@@ -1,4 +1,5 @@
-// Operators and functions of lanes against C++, at special values and at random ones. MATH_VALUES: how many of these.
+// Compares operators and functions of lanes with C++, at special values and at random ones. MATH_VALUES sets the number
+// of the latter.
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -16,7 +17,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity(),
                  no_number = std::numeric_limits<double>::quiet_NaN();
 
-// An operation's results for all pairs of x and y.
+// The results of an operation for all pairs of x and y.
 std::vector<double> results_of(const std::string& name, std::vector<double> x, std::vector<double> y)
 {
     LaneProgram program;

@@ -1,4 +1,4 @@
--- The operator ^ as calls: rewritten programs compute what LuaJIT computes, where its powers are exact.
+-- The operator ^ as calls. Rewritten programs compute what LuaJIT computes if its powers are exact.
 local power_operator = require "power_operator"
 
 local env = setmetatable({ [power_operator.name] = math.pow }, { __index = _G })

@@ -252,6 +252,48 @@ describe("a scene of powers, least and largest", function()
   end)
 end)
 
+describe("a processor without fused multiplication", function()
+  it("computes the same functions", function()
+    local folder = command.folder()
+    local functions = { "x ^ y", "2.5 ^ x", "math.atan2(x, y)", "math.log(y, 3)" }
+    for _, name in ipairs { "sin", "cos", "tan", "atan", "exp", "sinh", "tanh" } do
+      functions[#functions + 1] = ("math.%s(x * 3)"):format(name)
+    end
+    for _, name in ipairs { "asin", "acos", "cosh" } do functions[#functions + 1] = ("math.%s(y - 1)"):format(name) end
+    functions[#functions + 1] = "math.log(x) + math.log10(y) + math.sin(x * 1e7)"
+    local text = { [[
+local rapid = require "rapid"
+return rapid.create { seed = 5, points = rapid.points.grid { size = {9999, 0, 0}, spacing = 1 } }
+  :attribute { first = 0, second = 0, third = 0 }
+]] }
+    -- The last digits of a double are those that two floats leave.
+    for k, expression in ipairs(functions) do
+      text[#text + 1] = ([[
+  :points("lanes%d", function(p) local x, y = p:rand(1) * 2, p:rand(2) + 0.5
+      local value = EXPR
+      p.first = value
+      p.second = value - p.first
+      p.third = p.third * 0.7 + (value - p.first - p.second) * 0x1p50
+    end)
+  :points("traced%d", function(p) local t = { p:rand(1) * 2, p:rand(2) + 0.5 } local x, y = t[1], t[2]
+      local value = EXPR
+      p.first = value
+      p.second = value - p.first
+      p.third = p.third * 0.7 + (value - p.first - p.second) * 0x1p50
+    end)
+]]):gsub("EXPR", expression):format(k, k)
+    end
+    folder:write("scene.lua", table.concat(text) .. "  :solve {}")
+    local variants = { fused = "", plain = "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX2_Usable,-FMA_Usable" }
+    for name, tunables in pairs(variants) do
+      local result = command.rapid(("run scene.lua -f 2 -o '%s.####.csv' --quiet"):format(name),
+        { cwd = folder.path, environment = { GLIBC_TUNABLES = tunables } })
+      assert.equal(0, result.status, result.stderr)
+    end
+    assert.truthy(folder:read "fused.0002.csv" == folder:read "plain.0002.csv")
+  end)
+end)
+
 describe("functions of the whole set and the body of a scene", function()
   it("compute as each other", function()
     local points = scene.run([[

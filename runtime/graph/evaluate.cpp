@@ -197,7 +197,7 @@ public:
         evaluation.emplace(Evaluation{
             now_, at_start, planned.node->name, planned.node->location, RandomKey(simulation_.seed, planned.node->name),
             left > 0 && at_start ? repeated_ : frame.figures, frame.warnings, write_,
-            &evaluator.plan_.simulations[planned.simulation].left_out, ranges_for_solve(planned)});
+            &evaluator.plan_.simulations[planned.simulation].left_out, ranges_for_solve(planned), planned.in_loop});
     }
     Context(const Context&) = delete;
     Context& operator=(const Context&) = delete;

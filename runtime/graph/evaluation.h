@@ -36,6 +36,8 @@ struct Evaluation {
     const std::set<std::string>* left_out = nullptr;
     // Of the attributes that a node reads for Solve: those of its parameters, and known ones.
     std::vector<AttributeRange> ranges = {};
+    // The node is between a Create and its Solve: the next frame begins with the points as that Solve leaves them.
+    bool is_fed_back = true;
 
     // Whether a node that makes this attribute or group is to make it.
     bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }

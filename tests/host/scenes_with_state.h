@@ -18,6 +18,13 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           :delete { where = function(p) return p.P.y < -0.4 end }
           :attribute { pscale = 0.01 } :trail { places = 3 } :picture { shutter = 0.5 }
           :solve { substeps = 2 })"},
+    {"trails that no solve feeds back, of points that are born and die", R"(
+        local born = rapid.create { seed = 3 }
+          :emit { source = rapid.mesh.sphere {}, rate = 150, life = {0.2, 0.4}, velocity = {1, 2, 0} }
+          :gravity {} :solve {}
+        return { main = born:trail { places = 4 },
+                 merged = born:merge(rapid.create { seed = 4 }
+                   :emit { source = rapid.mesh.sphere {}, rate = 50, life = 0.3 } :solve {}):trail { places = 2 } })"},
     {"places that points have taken, and texts", R"(
         return rapid.create { fps = 24, seed = 3 }
           :emit { source = rapid.mesh.sphere {}, rate = 150, life = {0.2, 0.4}, attributes = { name = {"a", "b"} } }

@@ -60,3 +60,56 @@ describe(":trail", function()
     end
   end)
 end)
+
+-- The trail of a point is where it was in the frames before, as the result itself has them.
+local function assert_trails_of(result, first, last, places)
+  local long = 0
+  for frame = first, last do
+    local points = result[frame]
+    for i = 1, #points do
+      local p = points[i]
+      local seen = 0
+      while frame - seen > 1 and result[frame - seen - 1]:by_id(p.id) do seen = seen + 1 end
+      assert.equal(math.min(places, seen), p.trailnum)
+      for place = 1, p.trailnum do assert.equal(result[frame - place]:by_id(p.id).P, p["trail" .. place]) end
+      long = long + p.trailnum
+    end
+  end
+  return long
+end
+
+describe(":trail where no Solve comes after it", function()
+  local emit = [[:emit { source = rapid.shape.sphere { radius = 1 }, rate = 200, velocity = {1, 2, 0}, spread = 60,
+    life = {0.1, 0.6} } ]]
+  local function run(text)
+    return rapid.run(scene.folder:write("after.lua", 'local rapid = require "rapid"\n' .. text), { frames = {1, 20} })
+  end
+
+  it("keeps the positions of the frames before, through births and deaths", function()
+    local chain = "return rapid.create {} " .. emit .. ":gravity {} "
+    assert.is_true(assert_trails_of(run(chain .. ":solve {} :trail { places = 5 }"), 1, 20, 5) > 1000)
+    assert.is_true(assert_trails_of(run(chain .. ":solve {} :trail { places = 1 }"), 1, 20, 1) > 500)
+  end)
+
+  it("does so after a node that kills points, and after a merge", function()
+    assert_trails_of(run("return rapid.create {} " .. emit .. [[:solve {}
+      :delete { where = function(p) return p.P.x > 0 end } :trail { places = 3 }]]), 1, 20, 3)
+    assert_trails_of(run("return rapid.create {} " .. emit .. ":solve {} :merge(rapid.create {} " .. emit ..
+      ":solve {}) :trail { places = 3 }"), 1, 20, 3)
+  end)
+
+  it("does so after another one, and of points that no Solve moves", function()
+    assert_trails_of(run("return rapid.create {} " .. emit .. ":trail { places = 4 } :solve {} :trail {} "
+      .. ":trail { places = 2 }"), 1, 20, 2)
+    local still = run "return rapid.create { points = rapid.points.from { P = {{1, 2, 3}} } } :trail { places = 3 }"
+    assert_trails_of(still, 1, 20, 3)
+    local newborn = run("return rapid.create {} " .. emit .. ":trail {}")
+    assert_trails_of(newborn, 1, 20, 12)
+  end)
+
+  it("has nothing to keep of a set without points", function()
+    for _, chain in ipairs { ":solve {} :trail {}", ":trail {} :solve {}", ":trail {}" } do
+      assert.equal(0, #run("return rapid.create {} " .. chain)[20])
+    end
+  end)
+end)

@@ -2,8 +2,8 @@
 //
 // At the first frame these are the initial points, numbered from 0 in their order (an id counts births in this
 // simulation; ids that they had before are dropped). At every later frame they are the points as Solve left them,
-// passed on without a copy. Every planned column and group exists from the first frame on, so that all frames have the
-// same.
+// passed on without a copy, or the initial points again where no Solve feeds any back. Every planned column and group
+// exists from the first frame on, so that all frames have the same.
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
@@ -76,7 +76,8 @@ struct Create {
     {
         Flow flow = std::move(inputs[0]);
         Simulation& simulation = *flow.simulation;
-        flow.points = now.at_start ? initial(simulation, now) : std::exchange(simulation.state, PointSet());
+        if (now.at_start) begin(simulation);
+        flow.points = now.at_start || !now.is_fed_back ? initial(now) : std::exchange(simulation.state, PointSet());
         for (const AttributeSpec& spec : simulation.columns) flow.points.set_fallback(spec);
         for (const std::string& name : simulation.groups) flow.points.group(name);
         return flow;
@@ -97,7 +98,13 @@ private:
         set.keep(kept);
     }
 
-    PointSet initial(Simulation& simulation, const Evaluation& now) const
+    void begin(Simulation& simulation) const
+    {
+        simulation.next_id = points ? static_cast<std::int64_t>(points->points.size()) : 0;
+        simulation.adopted.clear();
+    }
+
+    PointSet initial(const Evaluation& now) const
     {
         PointSet set = points ? points->points : PointSet();
         set.remove("dt");
@@ -109,9 +116,7 @@ private:
             const std::span<std::int64_t> ids = set.id().overwrite();
             std::iota(ids.begin(), ids.end(), std::int64_t{0});
         }
-        simulation.next_id = static_cast<std::int64_t>(set.size());
         if (!subset_.is_all()) keep_subset(set);
-        simulation.adopted.clear();
         return set;
     }
 

@@ -53,6 +53,13 @@ describe("what is left out", function()
     end)
   end
 
+  it("is nothing of points that no solve moves", function()
+    local folder = scene('return rapid.create { points = rapid.points.from { P = {{0, 5, 0}}, spare = {1} } }' .. emit ..
+      "} :attribute { heat = 2 }")
+    same_files(folder, "scene.lua", "-f 1-4", { "everything.####.csv" })
+    assert.matches("\n0,0,5,0,", folder:read "pruned/everything.0004.csv")
+  end)
+
   it("changes no example scene", function()
     local folder, count = command.folder(), 0
     for path in command.shell("ls $PWD/graphs/*.lua").stdout:gmatch "%S+" do

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "runtime/at_node.h"
 #include "runtime/graph/attribute_places.h"
@@ -260,29 +261,6 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
     }
 }
 
-namespace {
-
-bool gives(const PlannedNode& planned, const std::string& name)
-{
-    const Uses uses = uses_of(planned);
-    return std::find(uses.gives.begin(), uses.gives.end(), name) != uses.gives.end();
-}
-
-// Whether points of the simulation are merged with those of another that die at an age: these have ages, so that all
-// do in what comes of it.
-bool is_merged_with_mortal(const std::vector<PlannedNode>& nodes, std::size_t simulation)
-{
-    return std::any_of(nodes.begin(), nodes.end(), [&](const PlannedNode& merging) {
-        return merging.carries.size() > 1 && merging.carries.count(simulation) &&
-               std::any_of(nodes.begin(), nodes.end(), [&](const PlannedNode& other) {
-                   return other.simulation != simulation && merging.carries.count(other.simulation) &&
-                          gives(other, "life");
-               });
-    });
-}
-
-}  // namespace
-
 std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
                                               const PlanOptions& options)
 {
@@ -291,13 +269,33 @@ std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& no
     for (auto& [name, attribute] : UseCollector(nodes, simulation).collect()) {
         const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
         attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
-        attribute.asked_as_made = options.all_made && (!attribute.made_by.empty() ||
-                                                       (name == "age" && is_merged_with_mortal(nodes, simulation)));
+        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
         attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
                          attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
         attributes.push_back(std::move(attribute));
     }
     return attributes;
+}
+
+void keep_for_merges(const std::vector<PlannedNode>& nodes, std::vector<PlannedSimulation>& simulations)
+{
+    std::vector<std::set<std::size_t>> sources(simulations.size());  // the others whose points come into each
+    for (const PlannedNode& planned : nodes)
+        for (std::size_t i = 1; i < planned.inputs.size(); ++i) {
+            const std::set<std::size_t>& carries = nodes[planned.inputs[i]].carries;
+            sources[planned.simulation].insert(carries.begin(), carries.end());
+        }
+    const auto keep_in = [](PlannedSimulation& simulation, const std::string& name) {
+        const auto found = std::find_if(simulation.attributes.begin(), simulation.attributes.end(),
+                                        [&](const PlannedAttribute& attribute) { return attribute.name == name; });
+        if (found == simulation.attributes.end() || found->kept) return false;
+        return found->kept = found->kept_for_merge = true;
+    };
+    for (bool grows = true; std::exchange(grows, false);)
+        for (std::size_t into = 0; into < simulations.size(); ++into)
+            for (const PlannedAttribute& attribute : simulations[into].attributes)
+                for (const std::size_t from : sources[into])
+                    if (attribute.kept && from != into) grows |= keep_in(simulations[from], attribute.name);
 }
 
 }  // namespace rapid

@@ -1,8 +1,9 @@
 // Which attributes and groups the points of a simulation need, and who makes, writes and reads them: a liveness
 // analysis over the nodes of a plan.
 //
-// An attribute is live where a node reads it, where an output asks for it, or where a node writes it and so needs a
-// column. An attribute that is only made is left out: no node makes it then.
+// An attribute is live where a node reads it, where an output asks for it, where a node writes it and so needs a
+// column, or where its points are merged into a set that has it. An attribute that is only made is left out: no node
+// makes it then.
 #pragma once
 
 #include <set>
@@ -20,5 +21,9 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation);
 // All attributes that are known or made, in order of name, with their users.
 std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
                                               const PlanOptions& options);
+
+// Keeps an attribute that the result of a merge has in every simulation whose points reach that merge. A column that is
+// pruned there would give these points the value of others.
+void keep_for_merges(const std::vector<PlannedNode>& nodes, std::vector<PlannedSimulation>& simulations);
 
 }  // namespace rapid

@@ -64,6 +64,7 @@ std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)
     if (attribute.asked_by_name) reasons.push_back("an output asks for it");
     if (attribute.asked_as_made && attribute.read_by.empty() && attribute.written_by.empty())
         reasons.push_back(done_by(plan, attribute.made_by, "make") + ", and an output takes all that is made");
+    if (attribute.kept_for_merge) reasons.push_back("its points are merged with others that have it");
     if (reasons.empty()) reasons.push_back("nothing is left out");
     return fmt::format("{}", fmt::join(reasons, "; "));
 }

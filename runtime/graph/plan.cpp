@@ -98,12 +98,11 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     find_changes();
     warn_of_idle_nodes();
     for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);
-    for (std::size_t s = 0; s < simulations.size(); ++s) {
-        PlannedSimulation& simulation = simulations[s];
-        simulation.attributes = find_attributes(nodes, s, options);
+    for (std::size_t s = 0; s < simulations.size(); ++s) simulations[s].attributes = find_attributes(nodes, s, options);
+    keep_for_merges(nodes, simulations);
+    for (PlannedSimulation& simulation : simulations)
         for (const PlannedAttribute& attribute : simulation.attributes)
             if (!attribute.kept && attribute.name != "dt") simulation.left_out.insert(attribute.name);
-    }
     for (const std::string& warning : reads_of_no_hits(nodes, simulations)) warnings.push_back(warning);
 }
 

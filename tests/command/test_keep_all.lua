@@ -1,10 +1,13 @@
--- Omissions change no bit of the outputs: each run is compared with one that omits nothing.
+-- Omissions change no bit of the outputs: each run is compared with one that omits nothing, and with one in which another
+-- file asks for more.
 local command = require "testing.command"
+local csv_rows = require "tests.csv_rows"
 
 local function same_files(folder, scene, arguments, outputs)
-  for _, keep in ipairs { "pruned", "all" } do
-    local line = ("run %s %s %s"):format(scene, arguments, keep == "all" and "--keep-all" or "")
-    for _, output in ipairs(outputs) do line = line .. (" -o %s/%s"):format(keep, output) end
+  local further = { pruned = "", all = "--keep-all", asked = "-o other.{output}.####.csv:mass,pscale,age,life" }
+  for how, options in pairs(further) do
+    local line = ("run %s %s %s"):format(scene, arguments, options)
+    for _, output in ipairs(outputs) do line = line .. (" -o %s/%s"):format(how, output) end
     local result = command.rapid(line, { cwd = folder.path })
     assert.equal(0, result.status, result.stderr)
   end
@@ -14,6 +17,7 @@ local function same_files(folder, scene, arguments, outputs)
     if other then
       compared = compared + 1
       assert.equal(folder:read(name), folder:read("all/" .. other), name)
+      assert.equal(folder:read(name), folder:read("asked/" .. other), name)
     end
   end
   assert.truthy(compared > 0)
@@ -50,6 +54,36 @@ describe("what is left out", function()
         "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}}, spare = {1} } }" .. chain)
       same_files(folder, "scene.lua", "-f 1-8", { "named.####.csv:mass" })
       same_files(folder, "scene.lua", "-f 1-8", { "everything.####.csv" })
+    end)
+  end
+
+  -- What comes by a merge has its own values, or the defaults, whatever the points have that it comes to: an attribute
+  -- of the point at y = 5, and its value.
+  local sheet = ":attribute { pscale = 0.03, mass = 4 } "
+  local read = ':points("read", function(p) p.v = vec3(p.heat, 0, 0) end) '
+  local both = {
+    ["merged after solve"] = { sheet .. ":contact {} :solve {} :merge(other:solve {})", "pscale", 0 },
+    ["merged into points without it"] = { ":contact {} :solve {} :merge(other" .. sheet .. ":solve {})", "pscale", 0.03 },
+    ["adopted before solve"] = { sheet .. ":contact {} :merge(other) :solve {}", "mass", 1 },
+    ["made in both chains"] =
+      { ":attribute { heat = 4 } " .. read .. ":merge(other:attribute { heat = 2 }) :solve {}", "vx", 2 },
+    ["ages"] = { emit .. 'life = 0.2 } :solve {} :merge(other:solve {})', "age", 7 / 24 },
+  }
+  for what, case in pairs(both) do
+    it("leaves the points of another chain what they have: " .. what, function()
+      local chain, name, value = unpack(case)
+      local folder = scene('local other = rapid.create { points = rapid.points.from { P = {{0, 5, 0}} } }\n' ..
+        "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }" .. chain)
+      same_files(folder, "scene.lua", "-f 1-8", { "everything.####.csv" })
+      same_files(folder, "scene.lua", "-f 1-8", { "named.####.csv:" .. (name == "vx" and "mass" or name) })
+      local rows, found = csv_rows(folder:read "pruned/named.0008.csv"), 0
+      for _, row in ipairs(rows) do
+        if row.Py == 5 then
+          found = found + 1
+          assert.near(value, row[name], 1e-6)
+        end
+      end
+      assert.equal(1, found)
     end)
   end
 

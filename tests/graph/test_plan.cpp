@@ -393,6 +393,27 @@ TEST_CASE("a reader behind a merge keeps the attribute in both simulations, and 
     CHECK_FALSE(attribute(apart, "heat", 1).kept);
 }
 
+TEST_CASE("what the result of a merge has, all points that come into it keep", "[plan]")
+{
+    GraphUnderTest scene;
+    const NodePtr here = scene.node("source", {}, {}, "here"), there = scene.node("source", {}, {}, "there");
+    const Value mass(AttributeRef{"mass"}), heat(AttributeRef{"heat"});
+    const NodePtr hot = scene.node("make", {here}, {{"heat", Value(1.0)}});
+    const NodePtr heavy = scene.node("read", {scene.node("read", {hot}, {{"value", heat}})}, {{"value", mass}});
+    const NodePtr other = scene.node("make", {there}, {{"heat", Value(2.0)}});
+    const Graph graph = scene.returning({{"both", scene.node("both", {heavy, other})}, {"other", other}});
+    const Plan plan(graph, asking_for({}));
+    for (const char* name : {"mass", "heat"}) {
+        CAPTURE(name);
+        CHECK(attribute(plan, name, 0).kept);
+        CHECK(attribute(plan, name, 1).kept);
+        CHECK(attribute(plan, name, 1).kept_for_merge);
+    }
+    // Merged into points that do not have it, an attribute is left behind.
+    const Plan back(scene.returning(scene.node("both", {other, heavy})), asking_for({}));
+    CHECK_FALSE(attribute(back, "mass", back.nodes[back.outputs.at("main")].simulation).kept_for_merge);
+}
+
 TEST_CASE("with keep_all nothing is left out, and nothing is evaluated once", "[plan]")
 {
     GraphUnderTest scene;

@@ -147,10 +147,7 @@ void FrameFiles::check_film(const Format& format, const std::string& pattern) co
 void FrameFiles::resolve(const Plan& plan, bool several_frames)
 {
     scene_ = std::make_unique<SceneOfPlan>(plan);
-    const std::set<std::string> of_scene = plan.names_of_scene();
-    for (const PlannedSimulation& simulation : plan.simulations)
-        for (const PlannedAttribute& attribute : simulation.attributes)
-            if (attribute.kept && !attribute.group && !of_scene.count(attribute.name)) unasked_.insert(attribute.name);
+    for (const auto& [name, node] : plan.outputs) unasked_[name] = plan.unasked_columns(node);
     std::set<std::string> patterns;
     std::size_t of_pictures = 0;
     const auto check = [&](const std::string& pattern) {
@@ -237,11 +234,6 @@ void FrameFiles::resolve(Target& target, const Plan& plan) const
     for (const std::string& name : target.to.attributes.value_or(std::vector<std::string>()))
         if (!in_scene.count(name) && !known_attribute(name))
             throw Error(fmt::format("no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
-}
-
-void FrameFiles::remove_unasked(PointSet& points) const
-{
-    for (const std::string& name : unasked_) points.remove(name);
 }
 
 FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, const OutputTarget& to)
@@ -354,7 +346,8 @@ void FrameFiles::write(const FrameResult& result)
     for (const Target& target : targets_)
         for (const std::string& output : target.outputs) {
             PointSet points = result.outputs.at(output);
-            if (!target.to.attributes) remove_unasked(points);
+            if (!target.to.attributes)
+                for (const std::string& name : unasked_.at(output)) points.remove(name);
             submit(target.to, std::move(points),
                    info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output, false);
         }
@@ -363,9 +356,7 @@ void FrameFiles::write(const FrameResult& result)
 void FrameFiles::write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps)
 {
     const OutputTarget to{name_in_part(pattern), std::nullopt};
-    PointSet written = points;
-    if (!volumes_.count(pattern)) remove_unasked(written);
-    submit(to, std::move(written), info_of(std::llround(frame.number), frame.time, fps, to), "main", true);
+    submit(to, points, info_of(std::llround(frame.number), frame.time, fps, to), "main", true);
 }
 
 void FrameFiles::finish(bool complete)

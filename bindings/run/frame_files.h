@@ -109,7 +109,6 @@ private:
     void require_picture_memory(std::size_t patterns) const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
-    void remove_unasked(PointSet& points) const;
     std::string how_of(const OutputTarget& to, const FrameSelection& frames) const;
     const WholeFiles::File* whole_file(std::int64_t frame, const std::string& path, const std::string& how) const;
     FrameWriter::Write write_of(const std::string& pattern) const;
@@ -122,7 +121,7 @@ private:
         Location location;
     };
     std::vector<NodePattern> of_nodes_;
-    std::set<std::string> unasked_;  // columns that are there for another reason than the scene: -o FILE:NAME, keep_all
+    std::map<std::string, std::set<std::string>> unasked_;  // by output: Plan::unasked_columns
     std::shared_ptr<const PictureOptions> picture_;
     std::unique_ptr<SceneOfPlan> scene_;
 

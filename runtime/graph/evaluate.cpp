@@ -190,7 +190,10 @@ public:
     {
         if (evaluator.write_ && left == 0)
             write_ = [&](const std::string& pattern, const PointSet& points) {
-                evaluator.write_(pattern, points, now_, simulation_.fps);
+                PointSet written = points;
+                const auto node = static_cast<std::size_t>(&planned - evaluator.plan_.nodes.data());
+                for (const std::string& name : evaluator.plan_.unasked_columns(node)) written.remove(name);
+                evaluator.write_(pattern, written, now_, simulation_.fps);
             };
         // A simulation that begins at the end of this frame, or later, is counted once.
         const bool at_start = step_ <= simulation_.start;

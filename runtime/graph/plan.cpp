@@ -329,6 +329,14 @@ std::set<std::string> Plan::names_of_scene() const
     return names;
 }
 
+std::set<std::string> Plan::unasked_columns(std::size_t node) const
+{
+    std::set<std::string> names;
+    for (const PlannedAttribute& attribute : simulations[nodes[node].simulation].attributes)
+        if (attribute.kept && !attribute.group && !attribute.is_of_scene()) names.insert(attribute.name);
+    return names;
+}
+
 std::size_t Plan::last_together(std::size_t first) const
 {
     const PointEdit* edit = nodes[first].op->as_point_edit();

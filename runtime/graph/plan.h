@@ -107,8 +107,12 @@ public:
     // single node.
     std::vector<std::vector<std::size_t>> passes() const;
 
-    // The names that an output has unless it asks for some, of all simulations; groups without the prefix.
+    // The names of all points of the scene, whether they are kept or not; groups without the prefix.
     std::set<std::string> names_of_scene() const;
+
+    // The columns of a node's result that are there for another reason than its points: another output asks for them by
+    // name, other points have them, or nothing is left out.
+    std::set<std::string> unasked_columns(std::size_t node) const;
 
     // The earliest first frame of the simulations.
     std::int64_t first_frame() const;

@@ -87,6 +87,14 @@ describe("what is left out", function()
     end)
   end
 
+  it("brings no attribute of one output into the file of another", function()
+    local folder = scene("local other = rapid.create { points = rapid.points.from { P = {{0, 5, 0}} } } :solve {}\n" ..
+      "return { main = rapid.create {}" .. emit .. "life = 0.2, attributes = { pscale = 0.1 } } :contact {} :solve {}" ..
+      " :merge(other), other = other }")
+    same_files(folder, "scene.lua", "-f 1-4", { "{output}.####.csv" })
+    assert.equal("id,Px,Py,Pz,vx,vy,vz", folder:read "pruned/other.0004.csv":match "^[^\n]*")
+  end)
+
   it("is nothing of points that no solve moves", function()
     local folder = scene('return rapid.create { points = rapid.points.from { P = {{0, 5, 0}}, spare = {1} } }' .. emit ..
       "} :attribute { heat = 2 }")

@@ -409,6 +409,9 @@ TEST_CASE("what the result of a merge has, all points that come into it keep", "
         CHECK(attribute(plan, name, 1).kept);
         CHECK(attribute(plan, name, 1).kept_for_merge);
     }
+    // The points of the other output itself have no mass in their files.
+    CHECK(plan.unasked_columns(plan.outputs.at("both")).empty());
+    CHECK(plan.unasked_columns(plan.outputs.at("other")) == NameSet{"mass"});
     // Merged into points that do not have it, an attribute is left behind.
     const Plan back(scene.returning(scene.node("both", {other, heavy})), asking_for({}));
     CHECK_FALSE(attribute(back, "mass", back.nodes[back.outputs.at("main")].simulation).kept_for_merge);

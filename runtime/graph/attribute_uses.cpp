@@ -240,7 +240,26 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
 
 }  // namespace
 
-void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
+namespace {
+
+// Error: no node makes the attribute, or only nodes after this one do.
+void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std::vector<PlannedNode>& nodes,
+                     std::size_t node, const std::string& name)
+{
+    // Points of other simulations, which come through a merge, bring names of their own.
+    if (nodes[node].carries.size() == 1) made.check_attribute(name);
+    if (flow.has(node, name) || is_own_column(name) || known_attribute(name)) return;
+    if (const auto later = made.attributes.find(name); later != made.attributes.end())
+        throw Error(
+            fmt::format("no attribute \"{}\" here; node \"{}\" at line {} makes it, which comes later: move "
+                        "it before this one",
+                        name, later->second.node->name, later->second.node->location.line));
+    throw Error(no_attribute(name, flow.names_at(node)));
+}
+
+}  // namespace
+
+void check_names(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow, std::size_t simulation)
 {
     MadeNames made;
     for (const PlannedNode& planned : nodes)
@@ -248,21 +267,47 @@ void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation)
             name_errors(planned.node->name, planned.node->location, [&] { made.add(uses_of(planned), *planned.node); });
     check_names_of_sources(nodes, simulation, made);
 
-    for (const PlannedNode& planned : nodes) {
-        // Points of other simulations, which come through a merge, bring names of their own.
-        if (planned.simulation != simulation || planned.carries.size() > 1) continue;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const PlannedNode& planned = nodes[i];
+        if (planned.simulation != simulation) continue;
         name_errors(planned.node->name, planned.node->location, [&] {
             const Uses uses = uses_of(planned);
             for (const auto* list : {&uses.reads, &uses.writes})
                 for (const std::string& name : *list)
-                    at_mention(*planned.node, name, [&] { made.check_attribute(name); });
+                    at_mention(*planned.node, name, [&] { check_attribute(made, flow, nodes, i, name); });
+            if (planned.carries.size() > 1) return;
             for (const std::string& name : uses.reads_groups) made.check_group(name);
         });
     }
 }
 
-std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
-                                              const PlanOptions& options)
+namespace {
+
+// Whether the node fails without this attribute.
+bool requires_attribute(const Uses& uses, const std::string& name)
+{
+    const auto names = [&](const std::vector<std::string>& list) {
+        return std::find(list.begin(), list.end(), name) != list.end();
+    };
+    return names(uses.reads) || names(uses.writes);
+}
+
+// Whether a node fails unless the points have this attribute, a known one, before the nodes that make it.
+bool is_used_before_made(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow,
+                         const PlannedAttribute& attribute)
+{
+    const auto fails_without = [&](std::size_t user) {
+        return !flow.has(user, attribute.name) && requires_attribute(uses_of(nodes[user]), attribute.name);
+    };
+    return known_attribute(attribute.name) && !attribute.made_by.empty() &&
+           (std::any_of(attribute.read_by.begin(), attribute.read_by.end(), fails_without) ||
+            std::any_of(attribute.written_by.begin(), attribute.written_by.end(), fails_without));
+}
+
+}  // namespace
+
+std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow,
+                                              std::size_t simulation, const PlanOptions& options)
 {
     const std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
     std::vector<PlannedAttribute> attributes;
@@ -272,6 +317,7 @@ std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& no
         attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
         attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
                          attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
+        attribute.used_before_made = is_used_before_made(nodes, flow, attribute);
         attributes.push_back(std::move(attribute));
     }
     return attributes;

@@ -10,17 +10,18 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/attribute_flow.h"
 #include "runtime/graph/plan.h"
 
 namespace rapid {
 
-// Error: two types for one name; an attribute or group that a node uses and nothing makes, with the nearest name. Each
-// names the node.
-void check_names(const std::vector<PlannedNode>& nodes, std::size_t simulation);
+// Error: two types for one name; an attribute or group that a node uses and nothing makes, with the nearest name; an
+// attribute that only later nodes make. Each names the node.
+void check_names(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow, std::size_t simulation);
 
 // All attributes that are known or made, in order of name, with their users.
-std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, std::size_t simulation,
-                                              const PlanOptions& options);
+std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow,
+                                              std::size_t simulation, const PlanOptions& options);
 
 // Keeps an attribute that the result of a merge has in every simulation whose points reach that merge. A column that is
 // pruned there would give these points the value of others.

@@ -97,8 +97,10 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     }
     find_changes();
     warn_of_idle_nodes();
-    for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, s);
-    for (std::size_t s = 0; s < simulations.size(); ++s) simulations[s].attributes = find_attributes(nodes, s, options);
+    const AttributeFlow flow(nodes);
+    for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, flow, s);
+    for (std::size_t s = 0; s < simulations.size(); ++s)
+        simulations[s].attributes = find_attributes(nodes, flow, s, options);
     keep_for_merges(nodes, simulations);
     for (PlannedSimulation& simulation : simulations)
         for (const PlannedAttribute& attribute : simulation.attributes)
@@ -396,9 +398,11 @@ std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
         return std::any_of(attribute.made_by.begin(), attribute.made_by.end(),
                            [&](std::size_t maker) { return nodes[maker].simulation == simulation; });
     };
-    for (const PlannedAttribute& attribute : simulations[simulation].attributes)
-        if (attribute.kept && known_attribute(attribute.name) && !made_here(attribute))
+    for (const PlannedAttribute& attribute : simulations[simulation].attributes) {
+        const bool is_missing = attribute.used_before_made || !made_here(attribute);
+        if (attribute.kept && known_attribute(attribute.name) && is_missing)
             columns.push_back(*known_attribute(attribute.name));
+    }
     std::erase_if(columns,
                   [&](const AttributeSpec& spec) { return simulations[simulation].left_out.count(spec.name) > 0; });
     return columns;

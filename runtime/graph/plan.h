@@ -43,7 +43,8 @@ struct PlannedAttribute {
     bool asked_by_name = false;  // by an output
     bool asked_as_made = false;  // by an output that takes all that the scene makes
     bool kept = false;
-    bool kept_for_merge = false;  // for the set alone into which the points of this simulation are merged
+    bool kept_for_merge = false;    // for the set alone into which the points of this simulation are merged
+    bool used_before_made = false;  // a known one: by a node before those that make it
 
     // Whether an output that names no attributes has it.
     bool is_of_scene() const { return always || !made_by.empty() || !written_by.empty() || !read_by.empty(); }

@@ -34,8 +34,24 @@ struct OpenError {
     std::string text, stack;
 };
 
+// Calls the program's functions when the last callback of a set of offers is gone.
+class OffersEnd {
+public:
+    OffersEnd() = default;
+    OffersEnd(const OffersEnd&) = delete;
+    OffersEnd& operator=(const OffersEnd&) = delete;
+    ~OffersEnd()
+    {
+        for (const auto& [release, user] : calls) release(user);
+    }
+
+    std::vector<std::pair<void (*)(void*), void*>> calls;
+};
+
 struct OpenOffers {
     std::mutex mutex;
+    // Shared with every callback that is offered.
+    std::shared_ptr<OffersEnd> end = std::make_shared<OffersEnd>();
     std::vector<std::pair<std::string, HostObject>> objects;
     std::vector<HostNode> nodes;
     bool guard = false;

@@ -12,7 +12,7 @@ void expect_done(int status)
     if (status != 0) throw std::runtime_error(fmt::format("it returned {}, where 0 says that it is done", status));
 }
 
-HostShape shape_of(const rapid_shape& given)
+HostShape shape_of(const rapid_shape& given, std::shared_ptr<const OffersEnd> end)
 {
     if (!given.distance) refuse("shape->distance is NULL");
     HostShape shape;
@@ -20,8 +20,8 @@ HostShape shape_of(const rapid_shape& given)
     std::copy_n(given.upper, 3, shape.upper.begin());
     shape.slope_bound = given.slope_bound == 0 ? 1 : given.slope_bound;
     shape.smallest_feature = given.smallest_feature;
-    shape.distance = [call = given.distance, user = given.user](std::size_t n, const double* P, double* phi,
-                                                                double* gradient) {
+    shape.distance = [call = given.distance, user = given.user, end = std::move(end)](std::size_t n, const double* P,
+                                                                                      double* phi, double* gradient) {
         expect_done(call(user, n, P, phi, gradient));
     };
     return shape;
@@ -84,7 +84,7 @@ std::vector<std::pair<std::string, ColumnType>> columns_of(const rapid_node_colu
     return columns;
 }
 
-HostNode node_of(const rapid_node_type& given)
+HostNode node_of(const rapid_node_type& given, std::shared_ptr<const OffersEnd> end)
 {
     if (!given.call) refuse("type->call is NULL");
     HostNode node;
@@ -98,7 +98,7 @@ HostNode node_of(const rapid_node_type& given)
         node.parameters.push_back(parameter_of(given.parameters[i]));
     node.reads = columns_of(given.reads, given.read_count);
     node.writes = columns_of(given.writes, given.write_count);
-    node.call = [call = given.call, user = given.user](const HostCall& now) {
+    node.call = [call = given.call, user = given.user, end = std::move(end)](const HostCall& now) {
         const rapid_call in_c{now.count,        now.frame, now.time,   now.dt,   now.parameters, now.P,   now.v,
                               now.acceleration, now.reads, now.writes, now.kill, now.id,         now.rods};
         expect_done(call(user, &in_c));
@@ -111,7 +111,7 @@ int add(rapid_offers* offers, const char* name, rapid_error** error, const auto&
     return guarded(error, [&] {
         const auto open = open_offers(offers);
         const std::string wanted = &not_null(name, "name");
-        HostObject object = make();
+        HostObject object = make(*open);
         const std::lock_guard lock(open->mutex);
         open->objects.emplace_back(wanted, std::move(object));
     });
@@ -141,10 +141,20 @@ int rapid_offers_guard(rapid_offers* offers, int guard, rapid_error** error)
     });
 }
 
+int rapid_offers_on_release(rapid_offers* offers, void (*release)(void* user), void* user, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_offers(offers);
+        if (!release) refuse("release is NULL");
+        const std::lock_guard lock(open->mutex);
+        open->end->calls.emplace_back(release, user);
+    });
+}
+
 int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* positions, size_t count,
                       const int32_t* triangles, size_t triangle_count, rapid_error** error)
 {
-    return add(offers, name, error, [&] {
+    return add(offers, name, error, [&](const OpenOffers&) {
         check_count(count, "count");
         check_count(triangle_count, "triangle_count");
         HostMesh mesh;
@@ -181,14 +191,15 @@ int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, co
 
 int rapid_offers_shape(rapid_offers* offers, const char* name, const rapid_shape* shape, rapid_error** error)
 {
-    return add(offers, name, error, [&] { return shape_of(known_part(shape, "shape")); });
+    return add(offers, name, error,
+               [&](const OpenOffers& open) { return shape_of(known_part(shape, "shape"), open.end); });
 }
 
 int rapid_offers_node(rapid_offers* offers, const rapid_node_type* type, rapid_error** error)
 {
     return guarded(error, [&] {
         const auto open = open_offers(offers);
-        HostNode node = node_of(known_part(type, "type"));
+        HostNode node = node_of(known_part(type, "type"), open->end);
         const std::lock_guard lock(open->mutex);
         open->nodes.push_back(std::move(node));
     });

@@ -13,6 +13,7 @@
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/shape.h"
 
 namespace rapid {
 namespace {
@@ -55,8 +56,11 @@ std::size_t weight_of(const Object& object)
     if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
         return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
     if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
-    const bool grid = dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object);
-    return grid ? bytes_of_upper_nodes + bytes_of_leaves : 0;
+    if (dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object))
+        return bytes_of_upper_nodes + bytes_of_leaves;
+    // A shape that a program offers holds memory of the program's, which is not known here.
+    constexpr std::size_t bytes_of_shape = std::size_t{64} << 10;
+    return dynamic_cast<const Shape*>(&object) ? bytes_of_shape : 0;
 }
 
 }  // namespace

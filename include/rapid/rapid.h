@@ -251,6 +251,8 @@ int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, cons
 int rapid_offers_new(rapid_offers** offers, rapid_error** error);
 /* 1: callbacks that write past the ends of their arrays are found. Before anything is offered. */
 int rapid_offers_guard(rapid_offers* offers, int guard, rapid_error** error);
+/* Calls release(user) once, from any thread, when the offers are released and no scene uses their callbacks any more. */
+int rapid_offers_on_release(rapid_offers* offers, void (*release)(void* user), void* user, rapid_error** error);
 /* positions: shape [count][3], m; triangles: shape [triangle_count][3], counter-clockwise seen from outside. */
 int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* positions, size_t count,
                       const int32_t* triangles, size_t triangle_count, rapid_error** error);

@@ -215,6 +215,7 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     auto type = sized<rapid_node_type>();
     refused("offers is NULL", [&](rapid_error** e) { return rapid_offers_new(nullptr, e); });
     refused("the offers is NULL", [&](rapid_error** e) { return rapid_offers_guard(nullptr, 1, e); });
+    refused("release is NULL", [&](rapid_error** e) { return rapid_offers_on_release(offers, nullptr, nullptr, e); });
     refused("name is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, nullptr, &shape, e); });
     refused("shape is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, "a", nullptr, e); });
     refused("shape->distance", [&](rapid_error** e) { return rapid_offers_shape(offers, "a", &shape, e); });
@@ -228,6 +229,51 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     refused("type->kind = 9", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
     CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
     refused("no open offers", [&](rapid_error** e) { return rapid_offers_release(offers, e); });
+}
+
+TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
+{
+    const auto count = [](void* counter) { ++*static_cast<int*>(counter); };
+    int first = 0, second = 0, unused = 0;
+    const auto offer_plane = [&](int& released) {
+        rapid_offers* offers = nullptr;
+        REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+        auto shape = sized<rapid_shape>();
+        std::fill_n(shape.lower, 3, -HUGE_VAL);
+        std::fill_n(shape.upper, 3, HUGE_VAL);
+        shape.distance = [](void*, std::size_t n, const double* P, double* phi, double* gradient) {
+            for (std::size_t i = 0; i < n; ++i) phi[i] = P[3 * i + 1] + 5;
+            for (std::size_t i = 0; gradient && i < 3 * n; ++i) gradient[i] = i % 3 == 1;
+            return 0;
+        };
+        REQUIRE(rapid_offers_shape(offers, "ground", &shape, nullptr) == RAPID_OK);
+        REQUIRE(rapid_offers_on_release(offers, count, &released, nullptr) == RAPID_OK);
+        return offers;
+    };
+
+    rapid_offers* offers = offer_plane(unused);
+    CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
+    CHECK(unused == 1);
+
+    auto options = sized<rapid_options>();
+    options.offers = offer_plane(first);
+    rapid_scene* scene = nullptr;
+    REQUIRE(rapid_scene_open_text("ground.lua",
+                                  "local rapid = require 'rapid'\n"
+                                  "return rapid.create {} :collide { shape = rapid.host 'ground' } :solve {}",
+                                  &options, &scene, nullptr) == RAPID_OK);
+    CHECK(rapid_offers_release(options.offers, nullptr) == RAPID_OK);
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance_to(scene, 3, &frame, nullptr) == RAPID_OK);
+    CHECK(first == 0);
+    rapid_offers* replacing = offer_plane(second);
+    REQUIRE(rapid_scene_offer(scene, replacing, nullptr) == RAPID_OK);
+    CHECK(rapid_offers_release(replacing, nullptr) == RAPID_OK);
+    rapid_frame_release(frame, nullptr);
+    rapid_scene_close(scene, nullptr);
+    CHECK(first == 1);
+    CHECK(second == 1);
+    CHECK(unused == 1);
 }
 
 TEST_CASE("an error in C has message, file, line and node", "[c]")

@@ -209,6 +209,11 @@ const std::vector<Function>& functions()
          }},
         {"rapid_offers_guard", "o",
          [](const Handles& h, rapid_error** e) { return rapid_offers_guard(h.offers, 1, e); }},
+        {"rapid_offers_on_release", "o",
+         [](const Handles& h, rapid_error** e) {
+             return rapid_offers_on_release(
+                 h.offers, [](void*) {}, nullptr, e);
+         }},
         {"rapid_offers_mesh", "o",
          [](const Handles& h, rapid_error** e) {
              return rapid_offers_mesh(h.offers, "corner", corners, 3, triangle, 1, e);

@@ -6,6 +6,10 @@ import gc
 import math
 import os
 import pathlib
+import shutil
+import signal
+import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -363,6 +367,21 @@ class Scenes(unittest.TestCase):
         scene.restart()
         self.assertEqual(scene.advance().number, 1)
 
+    def test_an_import_without_the_library_says_how_to_build_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            checkout = pathlib.Path(folder).resolve()
+            (checkout / "CMakePresets.json").write_text("{}")
+            shutil.copytree(pathlib.Path(rapid.__file__).parent, checkout / "bindings/python/rapid",
+                            ignore=shutil.ignore_patterns("__pycache__"))
+            environment = {name: value for name, value in os.environ.items() if name != "RAPID_LIBRARY"}
+            environment["PYTHONPATH"] = str(checkout / "bindings/python")
+            told = subprocess.run([sys.executable, "-B", "-c",
+                                   "import ctypes.util\nctypes.util.find_library = lambda name: None\nimport rapid"],
+                                  env=environment, cwd=folder, capture_output=True, text=True)
+        self.assertNotEqual(told.returncode, 0)
+        self.assertIn(f"librapid_host.so is not built; type\n    {checkout}/rapid --version && "
+                      f"cmake --build {checkout}/build/release --target rapid_host_library", told.stderr)
+
     def test_scenes_on_threads_give_the_same_bits(self):
         def bits(into, place):
             scene = rapid.Scene(str(root / "graphs/first.lua"), rate=2000)
@@ -384,6 +403,127 @@ class Scenes(unittest.TestCase):
         with self.assertRaisesRegex(rapid.Error, "closed"):
             scene.advance()
         scene.close()
+
+
+class Interrupts(unittest.TestCase):
+    def press(self, *_):
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def test_ctrl_c_between_frames_ends_the_call(self):
+        scene = fall(progress=lambda frame, last: frame != 3 or self.press() or True)
+        with self.assertRaises(KeyboardInterrupt):
+            scene.advance_to(10**6)
+        scene.restart()
+        self.assertEqual(scene.advance_to(2).number, 2)
+
+    def test_ctrl_c_ends_a_frame_that_would_not_end(self):
+        text = """local rapid = require "rapid"
+return rapid.create {} :detail("endless", function() print "go" while true do end end) :solve {}"""
+        for _ in range(5):
+            scene = rapid.Scene("endless.lua", text=text, script_seconds=600, log=self.press)
+            with self.assertRaises(KeyboardInterrupt):
+                scene.advance_to(2)
+
+    def test_a_handler_of_the_program_runs_and_the_call_goes_on(self):
+        pressed = []
+        before = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+        try:
+            frame = fall(progress=lambda frame, last: frame != 3 or self.press() or True).advance_to(6)
+        finally:
+            signal.signal(signal.SIGINT, before)
+        self.assertEqual((frame.number, pressed), (6, [signal.SIGINT]))
+
+    def test_what_a_handler_raises_rises_after_the_call(self):
+        def stop(number, frame):
+            raise ZeroDivisionError("stopped")
+        before = signal.signal(signal.SIGINT, stop)
+        try:
+            with self.assertRaisesRegex(ZeroDivisionError, "stopped"):
+                fall(progress=lambda frame, last: frame != 3 or self.press() or True).advance_to(10**6)
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def test_the_handler_and_the_descriptor_are_the_programs_again(self):
+        ours, theirs = socket.socketpair()
+        theirs.setblocking(False)
+        handler = signal.getsignal(signal.SIGINT)
+        before = signal.set_wakeup_fd(theirs.fileno())
+        try:
+            fall().advance_to(3)
+            self.assertEqual(signal.getsignal(signal.SIGINT), handler)
+            with self.assertRaises(KeyboardInterrupt):
+                fall(progress=lambda frame, last: frame != 3 or self.press() or True).advance_to(10**6)
+            self.assertEqual(ours.recv(1), bytes([signal.SIGINT]))
+        finally:
+            self.assertEqual(signal.set_wakeup_fd(before), theirs.fileno())
+            ours.close()
+            theirs.close()
+
+
+class KeptArrays(unittest.TestCase):
+    def test_arrays_of_an_edit_that_are_kept_are_read_only_copies(self):
+        kept = []
+        edit = rapid.Edit("cut", lambda now: kept.append(now["v"]), doc="x", writes=["v"])
+        cloud = rapid.from_numpy(numpy.random.default_rng(1).random((300, 3)))
+        text = 'local rapid = require "rapid" return rapid.create { points = rapid.host "cloud" } :cut {} :gravity {} :solve {}'
+        scene = rapid.Scene("cut.lua", text=text, nodes=[edit], objects={"cloud": cloud})
+        frame = scene.advance_to(5)
+        before = frame["v"].copy()
+        self.assertGreater(len(kept), 0)
+        for array in kept:
+            with self.assertRaises(ValueError):
+                array[:] = 12345
+            array.sum()
+        numpy.testing.assert_array_equal(frame["v"], before)
+        scene.close()
+        kept[-1].sum()
+
+    def test_arrays_of_a_force_and_of_a_shape_outlive_the_scene(self):
+        kept = []
+
+        def pull(now):
+            kept.extend([now.P, now.v, now["heat"], now.acceleration])
+            return numpy.zeros((now.count, 3))
+
+        def ground(P, gradient):
+            kept.append(P)
+            if gradient is not None:
+                kept.append(gradient)
+                gradient[:] = (0, 1, 0)
+            return P[:, 1] + 1
+        text = """local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.25 } } :attribute { heat = 2 }
+  :pull {} :gravity {} :collide { shape = rapid.host "ground" } :solve {}"""
+        force = rapid.Force("pull", pull, doc="x", reads=["heat"])
+        scene = rapid.Scene("kept.lua", text=text, nodes=[force], objects={"ground": rapid.Shape(ground)})
+        scene.advance_to(24).release()
+        scene.close()
+        del scene
+        gc.collect()
+        self.assertGreater(len(kept), 8)
+        for array in kept:
+            self.assertFalse(array.flags.writeable)
+            self.assertTrue(numpy.isfinite(array).all())
+
+    def test_shapes_that_are_replaced_are_released(self):
+        held = len(rapid._offers._used_callbacks)
+        text = """local rapid = require "rapid"
+return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.25 } } :gravity {}
+  :collide { shape = function() return rapid.host "ground" end } :solve {}"""
+
+        def ground(P, gradient):
+            if gradient is not None:
+                gradient[:] = (0, 1, 0)
+            return P[:, 1] + 5
+        scene = rapid.Scene("floor.lua", text=text, objects={"ground": rapid.Shape(ground)})
+        for _ in range(600):
+            scene.offer("ground", rapid.Shape(ground))
+            scene.advance().release()
+        self.assertLessEqual(len(rapid._offers._used_callbacks) - held, 300)
+        scene.close()
+        del scene
+        gc.collect()
+        self.assertEqual(len(rapid._offers._used_callbacks), held)
 
 
 if __name__ == "__main__":

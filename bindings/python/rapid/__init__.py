@@ -17,8 +17,8 @@ import numpy
 
 from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Parameter, Progress, Value, call, from_value,
                        get, library, sized, to_settings)
-
-from ._offers import Constraint, Edit, Force, Held, Mesh, Points, Shape, from_numpy, make_offers
+from ._interrupt import interruptible
+from ._offers import Constraint, Edit, Force, Mesh, Points, Shape, from_numpy, make_offers
 
 __all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy",
            "load_plugin", "read"]
@@ -243,7 +243,8 @@ class Scene:
     def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=0, script_memory=0,
                  memory=0, errors=True, keep_all=False, log=None, progress=None, module=None, find_file=None,
                  objects=None, nodes=(), guard_callbacks=False, **parameters):
-        self._raised = None  # by a callback: raised where the call ends
+        self._raised = None  # by a callback: raised when the call ends
+        self._handle = None
         self._held = {}      # texts that callbacks have returned
         options = sized(Options)
         settings = to_settings({**(set or {}), **parameters})
@@ -261,9 +262,8 @@ class Scene:
             options.find_module = Find(self._guard(lambda _, name: self._hold("module", module(name.decode())), None))
         if find_file:
             options.find_file = Find(self._guard(lambda _, path: self._hold("file", find_file(path.decode())), None))
-        self._held_callbacks = Held(self._guard)
         self._guard_callbacks = guard_callbacks
-        options.offers = make_offers(objects or {}, nodes, guard_callbacks, self._held_callbacks)
+        options.offers = make_offers(objects or {}, nodes, guard_callbacks, self._guard)
         self._options = options  # the callbacks live as long as the scene
         handle = c_void_p()
         try:
@@ -316,7 +316,7 @@ class Scene:
     def offer(self, name, thing):
         """Replaces or adds an object: functions of the frame that say rapid.host "NAME" get it from the next frame on, all
         else when the scene is set()."""
-        offers = make_offers({name: thing}, (), self._guard_callbacks, self._held_callbacks)
+        offers = make_offers({name: thing}, (), self._guard_callbacks, self._guard)
         try:
             self._call("scene_offer", self._handle.value, offers)
         finally:
@@ -331,16 +331,12 @@ class Scene:
         return get("scene_next_frame", self._handle.value, c_int64()).value
 
     def advance(self):
-        """Computes the next frame."""
-        handle = c_void_p()
-        self._call("scene_advance", self._handle.value, byref(handle))
-        return Frame(handle, self)
+        """Computes the next frame. Ctrl-C cancels it; the scene then has to be restarted."""
+        return self._frame("scene_advance")
 
     def advance_to(self, frame):
         """Computes frames up to this one, and returns it."""
-        handle = c_void_p()
-        self._call("scene_advance_to", self._handle.value, frame, byref(handle))
-        return Frame(handle, self)
+        return self._frame("scene_advance_to", frame)
 
     def run(self, first, last):
         """The frames from first to last, one by one; those before are computed too."""
@@ -372,9 +368,7 @@ class Scene:
     def points_behind(self, node, frame):
         """The points as they leave a node in a frame, as a Frame with the output of the node's name. The scene is then at
         its start."""
-        handle = c_void_p()
-        self._call("scene_points_behind", self._handle.value, node.encode(), frame, byref(handle))
-        return Frame(handle, self)
+        return self._frame("scene_points_behind", node.encode(), frame)
 
     def graph(self, form="svg"):
         """The scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with their
@@ -398,6 +392,21 @@ class Scene:
         """Ends the advance that is running in another thread, or else the next one."""
         call("scene_cancel", self._handle.value)
 
+    def _frame(self, name, *arguments):
+        """The frame that a function of the scene computes."""
+        handle = c_void_p()
+        try:
+            self._call(name, self._handle.value, *arguments, byref(handle))
+        except BaseException:
+            if handle:  # a handler of Ctrl-C raised after the frame was complete
+                call("frame_release", handle)
+            raise
+        return Frame(handle, self)
+
+    def _cancel_if_open(self):
+        if self._handle:
+            self.cancel()
+
     def close(self):
         """Gives its memory back before Python does. Frames and snapshots stay."""
         self._handle.close()
@@ -411,7 +420,8 @@ class Scene:
     def _call(self, name, *arguments):
         self._raised = None
         try:
-            call(name, *arguments)
+            with interruptible(self._cancel_if_open):
+                call(name, *arguments)
         except Error as error:
             if self._raised:
                 raise self._raised from error

@@ -53,6 +53,7 @@ class FrameInfo(ctypes.Structure):
 
 
 Distance = CFUNCTYPE(c_int, c_void_p, c_size_t, POINTER(c_double), POINTER(c_double), POINTER(c_double))
+Release = CFUNCTYPE(None, c_void_p)
 
 
 class Shape(ctypes.Structure):
@@ -94,6 +95,7 @@ def _load():
     if named:
         return ctypes.CDLL(named)
     here = pathlib.Path(__file__).resolve()
+    checkout = None
     for folder in here.parents:
         for found in [folder / name] + sorted(folder.glob(f"*-linux-gnu/{name}")):
             if found.exists():
@@ -101,9 +103,14 @@ def _load():
         builds = [path for path in folder.glob(f"build/*/lib/{name}")]
         if builds:
             return ctypes.CDLL(str(max(builds, key=lambda path: path.stat().st_mtime)))
+        if (folder / "CMakePresets.json").exists():
+            checkout = folder
     system = ctypes.util.find_library("rapid_host")
     if system:
         return ctypes.CDLL(system)
+    if checkout:
+        raise ImportError(f"{name} is not built; type\n    {checkout}/rapid --version && "
+                          f"cmake --build {checkout}/build/release --target rapid_host_library")
     raise ImportError(f"{name} is neither beside the module nor known to the system; set RAPID_LIBRARY to its path")
 
 
@@ -161,6 +168,7 @@ for _name, _types in {
         "frame_compare": [c_void_p, c_void_p, c_double, POINTER(c_int), _text],
         "offers_new": [_handle],
         "offers_guard": [c_void_p, c_int],
+        "offers_on_release": [c_void_p, Release, c_void_p],
         "offers_mesh": [c_void_p, c_char_p, c_void_p, c_size_t, c_void_p, c_size_t],
         "offers_points": [c_void_p, c_char_p, c_size_t, POINTER(Column), c_size_t],
         "offers_shape": [c_void_p, c_char_p, POINTER(Shape)],

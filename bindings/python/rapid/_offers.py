@@ -1,11 +1,12 @@
 """What Python offers to scenes: arrays as meshes and points, functions of arrays as shapes, forces and edits."""
 import ctypes
+import itertools
 from ctypes import byref, c_void_p
 
 import numpy
 
-from ._library import (Column, Distance, NodeCall, NodeColumn, NodeParameter, NodeType, Shape as ShapeStruct, call, get, sized,
-                       to_value)
+from ._library import (Column, Distance, NodeCall, NodeColumn, NodeParameter, NodeType, Release, Shape as ShapeStruct, call,
+                       get, sized, to_value)
 
 _types = {numpy.dtype(numpy.float32): {1: 0, 3: 1, 4: 4}, numpy.dtype(numpy.int32): {1: 2},
           numpy.dtype(numpy.int64): {1: 3}}
@@ -21,9 +22,26 @@ def _tokens(array):
     return numpy.array(tokens, numpy.uint32)[places]
 
 
-def _array(pointer, shape):
-    """An array of the memory at a pointer of ctypes."""
-    return numpy.ctypeslib.as_array(pointer, shape=shape)
+class _Arrays:
+    """The arrays of one callback. They are copies: the library's memory ends with the call, and a program may keep them.
+    give_back() stores those that are outputs and makes all of them read-only, so that a late write raises ValueError."""
+
+    def __init__(self):
+        self._all, self._outputs = [], []
+
+    def add(self, pointer, shape, output=False):
+        memory = numpy.ctypeslib.as_array(pointer, shape=shape)
+        array = memory.copy()
+        self._all.append(array)
+        if output:
+            self._outputs.append((memory, array))
+        return array
+
+    def give_back(self):
+        for memory, array in self._outputs:
+            memory[:] = array
+        for array in self._all:
+            array.flags.writeable = False
 
 
 class Points:
@@ -48,7 +66,7 @@ class Points:
                                 f"({self._count},) of str")
             self._arrays[name] = (numpy.ascontiguousarray(array), _types[array.dtype][width])
 
-    def offer(self, offers, name, _held):
+    def offer(self, offers, name, _callbacks):
         columns = (Column * len(self._arrays))()
         for place, (attribute, (array, type_)) in enumerate(self._arrays.items()):
             columns[place].name, columns[place].type, columns[place].data = attribute.encode(), type_, array.ctypes.data
@@ -71,7 +89,7 @@ class Mesh:
             if array.ndim != 2 or array.shape[1] != 3:
                 raise TypeError(f"{what} are of shape {array.shape}; it must be (n, 3)")
 
-    def offer(self, offers, name, _held):
+    def offer(self, offers, name, _callbacks):
         call("offers_mesh", offers, name.encode(), self._positions.ctypes.data, len(self._positions),
              self._triangles.ctypes.data, len(self._triangles))
 
@@ -84,16 +102,19 @@ class Shape:
         self._distance, self._lower, self._upper = distance, lower, upper
         self._slope_bound, self._smallest_feature = slope_bound, smallest_feature
 
-    def offer(self, offers, name, held):
+    def offer(self, offers, name, callbacks):
         shape = sized(ShapeStruct)
         shape.lower[:], shape.upper[:] = self._lower, self._upper
         shape.slope_bound, shape.smallest_feature = self._slope_bound, self._smallest_feature
 
         def distance(_, n, P, phi, gradient):
-            _array(phi, (n,))[:] = self._distance(_array(P, (n, 3)), _array(gradient, (n, 3)) if gradient else None)
+            arrays = _Arrays()
+            slope = arrays.add(gradient, (n, 3), output=True) if gradient else None
+            numpy.ctypeslib.as_array(phi, shape=(n,))[:] = self._distance(arrays.add(P, (n, 3)), slope)
+            arrays.give_back()
             return 0
-        shape.distance = Distance(held.guard(distance, 1))
-        held.append(shape.distance)
+        shape.distance = Distance(callbacks.guard(distance, 1))
+        callbacks.append(shape.distance)
         call("offers_shape", offers, name.encode(), byref(shape))
 
 
@@ -108,7 +129,7 @@ class _Node:
         widths = names if isinstance(names, dict) else {n: 3 if n in ("P", "v", "N", "Cd") else 1 for n in names}
         return list(widths.items())
 
-    def offer_node(self, offers, held):
+    def offer_node(self, offers, callbacks):
         node = sized(NodeType)
         node.name, node.doc, node.kind = self._name.encode(), self._doc.encode(), self._kind
         parameters = (NodeParameter * len(self._parameters))()
@@ -122,8 +143,8 @@ class _Node:
                 array[place].name, array[place].type = name.encode(), 1 if width == 3 else 0
             setattr(node, what + "s", array)
             setattr(node, what + "_count", len(columns))
-        node.call = NodeCall(held.guard(lambda _, now: self._run(now.contents), 1))
-        held.append(node.call)
+        node.call = NodeCall(callbacks.guard(lambda _, now: self._run(now.contents), 1))
+        callbacks.append(node.call)
         call("offers_node", offers, byref(node))
 
     def _run(self, now):
@@ -132,28 +153,31 @@ class _Node:
             wide = to_value(value, name).type == 3
             numbers[name] = numpy.array(now.parameters[at:at + 3]) if wide else now.parameters[at]
             at += 3 if wide else 1
-        self._call(Now(now, self), numbers)
+        arrays = _Arrays()
+        self._call(Now(now, self, arrays), numbers)
+        arrays.give_back()
         return 0
 
 
 class Now:
-    """What a node's function works on: count, frame, time, dt; now["heat"] is a column that it reads or writes; of a force P
-    and v, of an edit kill."""
+    """The points that a node's function works on: count, frame, time, dt; now["heat"] is a column that it reads or writes. A
+    force has P and v, an edit kill, a constraint P and id. The arrays are for the call: kept longer, they are read-only
+    copies."""
 
-    def __init__(self, now, node):
+    def __init__(self, now, node, arrays):
         self.count, self.frame, self.time, self.dt = now.count, now.frame, now.time, now.dt
         self._now, self._columns = now, {}
-        for pointers, columns in ((now.reads, node._reads), (now.writes, node._writes)):
+        one, three = (now.count,), (now.count, 3)
+        for pointers, columns, output in ((now.reads, node._reads, False), (now.writes, node._writes, True)):
             for place, (name, width) in enumerate(columns):
-                shape = (now.count,) if width == 1 else (now.count, 3)
-                self._columns[name] = _array(pointers[place], shape)
+                self._columns[name] = arrays.add(pointers[place], one if width == 1 else three, output)
         if now.id:
-            self.P, self.id = _array(now.P, (now.count, 3)), _array(now.id, (now.count,))
+            self.P, self.id = arrays.add(now.P, three), arrays.add(now.id, one)
         elif now.P:
-            self.P, self.v = _array(now.P, (now.count, 3)), _array(now.v, (now.count, 3))
-            self.acceleration = _array(now.acceleration, (now.count, 3))
+            self.P, self.v = arrays.add(now.P, three), arrays.add(now.v, three)
+            self.acceleration = arrays.add(now.acceleration, three, output=True)
         if now.kill:
-            self.kill = _array(now.kill, (now.count,))
+            self.kill = arrays.add(now.kill, one, output=True)
 
     def __getitem__(self, name):
         return self._columns[name]
@@ -186,27 +210,35 @@ class Constraint(_Node):
             call("call_add_rod", byref(now._now), int(a), int(b), length, compliance)
 
 
-class Held(list):
-    """Callbacks, as long as the scene that calls them lives; guard() keeps what they raise."""
+class Callbacks(list):
+    """The callbacks of a set of offers; guard(function, otherwise) wraps a function so that what it raises is kept."""
 
     def __init__(self, guard):
         super().__init__()
         self.guard = guard
 
 
-def make_offers(objects, nodes, guard_callbacks, held):
-    """A handle of all that is offered."""
+_used_callbacks = {}  # by number: those that the library may call
+_numbers = itertools.count(1)
+_forget = Release(lambda number: _used_callbacks.pop(number, None))
+
+
+def make_offers(objects, nodes, guard_callbacks, guard):
+    """A handle of all that is offered; guard: see Callbacks."""
     offers = c_void_p()
     call("offers_new", byref(offers))
     try:
+        number = next(_numbers)
+        callbacks = _used_callbacks[number] = Callbacks(guard)
+        call("offers_on_release", offers, _forget, number)
         call("offers_guard", offers, int(guard_callbacks))
         for name, thing in objects.items():
             if not hasattr(thing, "offer"):
                 raise TypeError(f"{name} is a {type(thing).__name__}; it must be of rapid.from_numpy, rapid.Mesh or "
                                 "rapid.Shape")
-            thing.offer(offers, name, held)
+            thing.offer(offers, name, callbacks)
         for node in nodes:
-            node.offer_node(offers, held)
+            node.offer_node(offers, callbacks)
     except BaseException:
         call("offers_release", offers)
         raise

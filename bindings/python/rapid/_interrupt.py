@@ -1,0 +1,91 @@
+"""Ctrl-C during a call of the library."""
+import contextlib
+import os
+import signal
+import socket
+import threading
+
+
+class _Watcher:
+    """Cancels the call that runs when SIGINT arrives.
+
+    Python runs its signal handlers between the bytecodes of the main thread, so none runs while that thread is inside
+    the library. The interpreter writes the signal's number to its wake-up descriptor at once, where a thread waits.
+    """
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._cancel = None
+        self._before = -1
+        self._read, self._write = socket.socketpair()
+        self._write.setblocking(False)
+        threading.Thread(target=self._wait, daemon=True, name="rapid Ctrl-C").start()
+
+    def _wait(self):
+        while True:
+            numbers = self._read.recv(256)
+            with self._lock:
+                if self._before != -1:
+                    os.write(self._before, numbers)
+                if signal.SIGINT in numbers and self._cancel:
+                    self._cancel()
+
+    @contextlib.contextmanager
+    def cancelling(self, cancel):
+        with self._lock:
+            self._cancel = cancel
+            self._before = signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            with self._lock:
+                signal.set_wakeup_fd(self._before)
+                self._cancel, self._before = None, -1
+
+
+_watcher = None
+
+
+def _watcher_of_process():
+    global _watcher
+    if _watcher is None:
+        _watcher = _Watcher()
+        os.register_at_fork(after_in_child=_forget_watcher)
+    return _watcher
+
+
+def _forget_watcher():
+    global _watcher
+    _watcher = None
+
+
+@contextlib.contextmanager
+def interruptible(cancel):
+    """Around a call of the library: Ctrl-C cancels it and raises KeyboardInterrupt after it has returned.
+
+    A handler of the program's own runs when Python has the main thread again, and what it raises is raised after the
+    call: an exception inside a callback would be lost on its way through C. Python handles signals in the main thread
+    alone, so in other threads this does nothing.
+    """
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if not callable(handler):
+        yield
+        return
+    raised = []
+
+    def keep(number, frame):
+        try:
+            handler(number, frame)
+        except BaseException as error:
+            raised.append(error)
+            cancel()
+
+    signal.signal(signal.SIGINT, keep)
+    watching = _watcher_of_process().cancelling(cancel) if handler is signal.default_int_handler else None
+    try:
+        with watching or contextlib.nullcontext():
+            yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if raised:
+            raise raised[0]

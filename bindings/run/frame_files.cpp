@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/files/content_hash.h"
+#include "runtime/io/format.h"
 #include "runtime/io/text_table.h"
 #include "runtime/memory_budget.h"
 #include "runtime/operators/rasterize.h"
@@ -88,15 +90,18 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
     return merges;
 }
 
-// A part that was complete is none while it is written again.
-void FrameFiles::begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info)
+// Notes a frame of a part. A part that was complete has no record while it is written again.
+void FrameFiles::note_frame(const std::string& pattern, const std::string& output, const FrameInfo& info,
+                            std::uint64_t points)
 {
     const std::filesystem::path file = part_record_file(pattern, output);
-    if (!begun_.insert(file).second) return;
-    std::error_code none;
-    std::filesystem::remove(file, none);
-    const auto start = static_cast<std::int64_t>(info.number - std::llround(info.time * info.fps));
-    of_part_.emplace(file, Sequence{info.fps, start});  // of a `:write` node
+    if (begun_.insert(file).second) {
+        std::error_code none;
+        std::filesystem::remove(file, none);
+        const auto start = static_cast<std::int64_t>(info.number - std::llround(info.time * info.fps));
+        of_part_.emplace(file, Sequence{pattern, output, info.fps, start});  // of a `:write` node
+    }
+    of_part_.at(file).points[info.number] = points;
 }
 
 void FrameFiles::write_part_records() const
@@ -105,6 +110,19 @@ void FrameFiles::write_part_records() const
         PartRecord record = *part_;
         record.fps = sequence.fps;
         record.start = sequence.start;
+        const FramePattern pattern(sequence.pattern);
+        for (std::int64_t frame = record.frames.first; frame <= record.frames.last; frame += record.frames.step) {
+            const std::string path = pattern.expand(frame_number(frame), sequence.output);
+            std::error_code none;
+            if (!std::filesystem::exists(path, none)) continue;  // `rapid merge` says that it is missing
+            // A run that continues from a cache has not computed the frames before.
+            const auto computed = sequence.points.find(frame);
+            const bool is_read = computed == sequence.points.end() && format_of(path).read;
+            record.files[frame] = {is_read                             ? read_points(path).size()
+                                   : computed == sequence.points.end() ? 0
+                                                                       : computed->second,
+                                   hash_text(file_hash(path))};
+        }
         record.write(file);
     }
 }
@@ -183,7 +201,9 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             resolve(target, plan);
             for (const std::string& output : target.outputs) {
                 const PlannedSimulation& of = plan.simulations[plan.nodes[plan.outputs.at(output)].simulation];
-                if (part_) of_part_.emplace(part_record_file(target.to.pattern, output), Sequence{of.fps, of.start});
+                if (part_)
+                    of_part_.emplace(part_record_file(target.to.pattern, output),
+                                     Sequence{target.to.pattern, output, of.fps, of.start});
             }
         } catch (const Error& error) {
             throw Error(fmt::format("-o {}: {}", target.text, error.message()));
@@ -300,7 +320,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     if (const std::int64_t last = info.number - selection_.step; pattern.has_frame() && last >= selection_.first)
         if (const auto* file = whole_file(last, pattern.expand(frame_number(last), output), how)) before = file->fit;
     if (named_.insert(key + '\n' + output).second) first_names_.push_back(path);
-    if (part_) begin_sequence(to.pattern, output, info);
+    if (part_) note_frame(to.pattern, output, info, points.size());
     warn_of_texts(to, points);
     FrameWriter* writer = nullptr;
     {

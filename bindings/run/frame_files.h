@@ -104,7 +104,7 @@ private:
     void warn_of_texts(const OutputTarget& to, const PointSet& points);
     std::string name_in_part(const std::string& pattern) const;
     void check_part(const std::string& pattern) const;
-    void begin_sequence(const std::string& pattern, const std::string& output, const FrameInfo& info);
+    void note_frame(const std::string& pattern, const std::string& output, const FrameInfo& info, std::uint64_t points);
     void write_part_records() const;
     void require_picture_memory(std::size_t patterns) const;
     void check_film(const Format& format, const std::string& pattern) const;
@@ -127,8 +127,10 @@ private:
 
     std::shared_ptr<const PartRecord> part_;  // null where all points are simulated
     struct Sequence {
+        std::string pattern, output;
         double fps;
         std::int64_t start;
+        std::map<std::int64_t, std::uint64_t> points = {};  // numbers of points, by frame
     };
     std::map<std::filesystem::path, Sequence> of_part_;  // by the file of the record
     std::set<std::filesystem::path> begun_;              // likewise: those of which a frame was written

@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-constexpr int record_version = 1;
+constexpr int record_version = 2;
 
 }  // namespace
 
@@ -45,6 +45,9 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
         record.fps = json.at("fps");
         if (!(record.fps > 0)) throw Error("has no frames a second");
         record.start = json.at("start");
+        for (const CheckedJson& written : json.at("files"))
+            record.files[written.at("frame").get<std::int64_t>()] = {written.at("points").get<std::uint64_t>(),
+                                                                     written.at("hash").get<std::string>()};
         record.identity = json.at("identity").get<std::map<std::string, std::string>>();
         return record;
     } catch (Error& error) {
@@ -58,6 +61,9 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
 
 void PartRecord::write(const std::filesystem::path& file) const
 {
+    CheckedJson written = CheckedJson::array();
+    for (const auto& [frame, of_frame] : files)
+        written.push_back({{"frame", frame}, {"points", of_frame.points}, {"hash", of_frame.hash}});
     const CheckedJson json = {{"rapid_part", record_version},
                               {"part", part.number},
                               {"parts", part.count},
@@ -65,6 +71,7 @@ void PartRecord::write(const std::filesystem::path& file) const
                               {"frames", {{"first", frames.first}, {"last", frames.last}, {"step", frames.step}}},
                               {"fps", fps},
                               {"start", start},
+                              {"files", written},
                               {"identity", identity}};
     write_whole(file, json.dump(2, ' ', false, CheckedJson::error_handler_t::replace) + '\n');
 }

@@ -23,6 +23,12 @@ struct PartRecord {
     FrameSelection frames;
     double fps = 24;         // of the output's simulation
     std::int64_t start = 1;  // likewise: its first frame
+    // A file that the part has written: the number of its points, and the hash of its bytes.
+    struct File {
+        std::uint64_t points;
+        std::string hash;
+    };
+    std::map<std::int64_t, File> files;  // by frame
     // What decides the bits of a run, by names that a user knows: "rate", "--seed", "content of fog.vdb" (a hash).
     std::map<std::string, std::string> identity;
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/first_error.h"
 #include "runtime/frame.h"
@@ -69,8 +70,22 @@ std::vector<std::string> found_parts(const std::string& pattern)
     return found;
 }
 
-// One or several at the same time: .vdb is read by processes of one thread (read_apart.h).
-std::vector<PointSet> read_parts(const std::vector<std::string>& files, bool into_files)
+// Reads the file of a part. Throws Error if its bytes are not those that the part has written: it may be of another run
+// or frame, or lack its last points.
+PointSet read_part(const std::string& file, const PartRecord::File& written)
+{
+    PointSet points = read_points(file);
+    if (hash_text(file_hash(file)) != written.hash)
+        throw Error(fmt::format("is not the file that the part has written, which had {} points; this one has {}. "
+                                "Run the part again",
+                                written.points, points.size()))
+            .at({file, 0});
+    return points;
+}
+
+// Reads the files of a frame, several at the same time: .vdb is read by processes of one thread (read_apart.h).
+std::vector<PointSet> read_parts(const std::vector<std::string>& files, const std::vector<PartRecord::File>& written,
+                                 bool into_files)
 {
     std::vector<PointSet> parts(files.size());
     std::error_code none;
@@ -79,8 +94,8 @@ std::vector<PointSet> read_parts(const std::vector<std::string>& files, bool int
         while (end < files.size() && (bytes += fs::file_size(files[end], none)) <= most_read_at_once) ++end;
         FirstError error;
         std::optional<ColumnFiles::Pause> pause(std::in_place);
-        tbb::parallel_for(first, end,
-                          [&](std::size_t k) { error.guard(0, k, [&] { parts[k] = read_points(files[k]); }); });
+        tbb::parallel_for(
+            first, end, [&](std::size_t k) { error.guard(0, k, [&] { parts[k] = read_part(files[k], written[k]); }); });
         error.rethrow();
         pause.reset();
         if (into_files)
@@ -148,7 +163,7 @@ void RunParts::find_frames(PartFiles& part, std::vector<std::string>& problems)
     for (std::int64_t frame = wanted.first; frame <= wanted.last; frame += wanted.step) {
         const int number = static_cast<int>(frame);
         const fs::path path = pattern.expand(number);
-        if (fs::exists(path, none))
+        if (fs::exists(path, none) && part.record.files.contains(frame))
             part.frames.emplace(number, path);
         else
             missing.push_back(number);
@@ -199,8 +214,12 @@ std::uint64_t RunParts::write_frame(int frame, const std::string& output) const
     if (bytes > most_in_memory) columns.emplace(folder_above(path), resident);
 
     std::vector<std::string> names;
-    for (const PartFiles& part : parts_) names.push_back(part.frames.at(frame).string());
-    std::vector<PointSet> read = read_parts(names, columns.has_value());
+    std::vector<PartRecord::File> written;
+    for (const PartFiles& part : parts_) {
+        names.push_back(part.frames.at(frame).string());
+        written.push_back(part.record.files.at(frame));
+    }
+    std::vector<PointSet> read = read_parts(names, written, columns.has_value());
     const PointSet whole = merge_parts(read, names);
     read.clear();
     const PartRecord& record = parts_.front().record;

@@ -20,8 +20,9 @@ local function ended(folder, line, environment)
 end
 
 local function record(changes)
-  local fields = { rapid_part = "1", part = "1", parts = "1", sample = "null",
-    frames = '{"first": 1, "last": 1, "step": 1}', fps = "24", start = "1", identity = "{}" }
+  local fields = { rapid_part = "2", part = "1", parts = "1", sample = "null",
+    frames = '{"first": 1, "last": 1, "step": 1}', fps = "24", start = "1", identity = "{}",
+    files = '[{"frame": 1, "points": 1, "hash": "4706843b3f6f2b3c"}]' }
   for name, value in pairs(changes) do fields[name] = value end
   local list = {}
   for name, value in pairs(fields) do list[#list + 1] = ('"%s": %s'):format(name, value) end
@@ -32,7 +33,7 @@ end
 local nonsense = {
   "", "{", "null", "[]", '"' .. ("x"):rep(1000000), ("x"):rep(1000000), ("["):rep(1000000), "\27[2J",
   '{"rapid_part": ' .. ("["):rep(200000) .. ("]"):rep(200000) .. "}",
-  '{"rapid_farm": ' .. ("["):rep(200000) .. ("]"):rep(200000) .. "}", '{"rapid_part": 1, "rapid_farm": 1}',
+  '{"rapid_farm": ' .. ("["):rep(200000) .. ("]"):rep(200000) .. "}", '{"rapid_part": 2, "rapid_farm": 1}',
 }
 
 describe("the record of a part", function()
@@ -68,7 +69,9 @@ describe("the record of a part", function()
       { frames = '{"first": -2147483648, "last": 2147483647, "step": 1}' },
       { frames = '{"first": 1, "last": 2147483647, "step": 2}' }, { frames = '{"first": 1, "last": 0, "step": 1}' },
       { frames = '{"first": 1, "last": 3, "step": 0}' }, { fps = "0" }, { fps = "-1" }, { fps = "1e999" },
-      { sample = '"all"' }, { identity = '{"a": {}}' }, { start = "{}" },
+      { sample = '"all"' }, { files = "{}" }, { files = "[1]" }, { files = "[{}]" },
+      { files = '[{"frame": 1, "points": -1, "hash": ""}]' }, { files = '[{"frame": 1e300, "points": 1, "hash": ""}]' },
+      { identity = '{"a": {}}' }, { start = "{}" },
     } do
       local text = record(changes)
       local result = merge(text)
@@ -79,7 +82,8 @@ describe("the record of a part", function()
 
   it("is one of points with any ids", function()
     local least, most = "-9223372036854775808", "9223372036854775807"
-    local result = merge(record {}, ("id,Px,Py,Pz\n%s,1,2,3\n%s,4,5,6\n"):format(least, most))
+    local files = '[{"frame": 1, "points": 2, "hash": "a11992f57f2ee215"}]'
+    local result = merge(record { files = files }, ("id,Px,Py,Pz\n%s,1,2,3\n%s,4,5,6\n"):format(least, most))
     assert.equal("", result.stderr)
     assert.equal(("id,Px,Py,Pz,vx,vy,vz\n%s,1,2,3,0,0,0\n%s,4,5,6,0,0,0\n"):format(least, most), result.whole)
   end)

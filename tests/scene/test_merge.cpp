@@ -1,8 +1,11 @@
 // Parts of a run as one: the points of all in the order of their ids, and parts that are no whole.
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "include/rapid/merge.h"
+#include "runtime/files/content_hash.h"
+#include "runtime/files/input_file.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"
@@ -11,6 +14,7 @@ namespace rapid {
 namespace {
 
 using Catch::Contains;
+using namespace std::string_literals;
 using test::good;
 
 constexpr int points = 100;
@@ -31,12 +35,25 @@ struct Parts {
     Parts()
     {
         for (int part = 1; part <= 2; ++part) {
-            folder.write("x_part" + std::to_string(part) + "of2.csv.json",
-                         R"({"rapid_part": 1, "part": )" + std::to_string(part) +
-                             R"(, "parts": 2, "sample": null, "frames": {"first": 1, "last": 3, "step": 1},
-                                 "fps": 24, "start": 1, "identity": {"rate": "100"}})");
             for (int frame = 1; frame <= 3; ++frame) write_frame(part, part, frame);
+            write_record(part);
         }
+    }
+    std::string file_of(int part, int frame) const
+    {
+        return folder / ("x_part" + std::to_string(part) + "of2.000" + std::to_string(frame) + ".csv");
+    }
+    void write_record(int part) const
+    {
+        std::string files;
+        for (int frame = 1; frame <= 3; ++frame)
+            files += (frame > 1 ? ", " : "") + R"({"frame": )"s + std::to_string(frame) +
+                     R"(, "points": 50, "hash": ")" + hash_text(file_hash(file_of(part, frame))) + "\"}";
+        folder.write("x_part" + std::to_string(part) + "of2.csv.json",
+                     R"({"rapid_part": 2, "part": )" + std::to_string(part) +
+                         R"(, "parts": 2, "sample": null, "frames": {"first": 1, "last": 3, "step": 1},
+                             "fps": 24, "start": 1, "identity": {"rate": "100"}, "files": [)" +
+                         files + "]}");
     }
     void write_frame(int part, int of, int frame) const
     {
@@ -44,7 +61,7 @@ struct Parts {
         for (int id = 0; id < points; ++id)
             if (part_of(id) == of)
                 rows += std::to_string(id) + ',' + std::to_string(id) + ',' + std::to_string(frame) + ",0,0,0,0\n";
-        folder.write("x_part" + std::to_string(part) + "of2.000" + std::to_string(frame) + ".csv", rows);
+        folder.write(std::filesystem::path(file_of(part, frame)).filename().string(), rows);
     }
     std::string all() const { return folder / "x_part{part}.####.csv"; }
 };
@@ -119,12 +136,53 @@ TEST_CASE("a point of another part ends a merge in its frame", "[merge]")
 {
     const Parts parts;
     parts.write_frame(2, 1, 2);
+    parts.write_record(2);
     const Result<MergedFiles> merged = merge_files({parts.all()}, parts.folder / "whole.####.csv");
     REQUIRE_FALSE(merged);
     CHECK(merged.error().kind == SceneError::FailedFrame);
     CHECK_THAT(merged.error().text(), Contains("is not of part 2 of 2, but of part 1"));
     CHECK(std::filesystem::exists(parts.folder / "whole.0001.csv"));
     CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0002.csv"));
+}
+
+TEST_CASE("a merge refuses files that are not those that their part has written", "[merge]")
+{
+    struct Fault {
+        const char* name;
+        std::function<std::string(const Parts&, const std::string& file)> change;  // gives the file's new bytes
+    };
+    const auto bytes_of = [](const std::string& file) { return std::string(InputFile(file).text()); };
+    const Fault faults[] = {
+        {"another frame", [&](const Parts& parts, const std::string&) { return bytes_of(parts.file_of(2, 1)); }},
+        {"the last point is missing",
+         [&](const Parts&, const std::string& file) {
+             const std::string bytes = bytes_of(file);
+             return bytes.substr(0, bytes.rfind('\n', bytes.size() - 2) + 1);
+         }},
+        {"a point too many",
+         [&](const Parts&, const std::string& file) {
+             std::string bytes = bytes_of(file);
+             const std::size_t last = bytes.rfind('\n', bytes.size() - 2) + 1;
+             return bytes + "1000" + bytes.substr(bytes.find(',', last));
+         }},
+        {"the values of another seed",
+         [&](const Parts&, const std::string& file) {
+             std::string bytes = bytes_of(file);
+             return bytes.replace(bytes.rfind(",0,"), 3, ",1,");
+         }},
+    };
+    for (const Fault& fault : faults) {
+        CAPTURE(fault.name);
+        const Parts parts;
+        const std::string file = parts.file_of(2, 2);
+        parts.folder.write(std::filesystem::path(file).filename().string(), fault.change(parts, file));
+        const Result<MergedFiles> merged = merge_files({parts.all()}, parts.folder / "whole.####.csv");
+        REQUIRE_FALSE(merged);
+        CHECK(merged.error().kind == SceneError::FailedFrame);
+        CHECK_THAT(merged.error().text(),
+                   Contains("x_part2of2.0002.csv") && Contains("is not the file that the part has written"));
+        CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0002.csv"));
+    }
 }
 
 }  // namespace rapid

@@ -45,6 +45,9 @@ Doubles by_registers_of_both(const Doubles& x, const Doubles& y, const F& f)
     return std::bit_cast<Doubles>(a);
 }
 
+// C's pow(x, 0.5) differs from sqrt(x) at -0 and -infinity.
+double power_of_half(double x) { return x == -infinity ? infinity : std::sqrt(x) + 0.0; }
+
 // Replaces the marked lanes of `value` by f(lane).
 template <class F>
 void replace_lanes(Doubles& value, const Flags& marked, const F& f)
@@ -77,6 +80,8 @@ double logarithm(double x, double base)
 double power(double x, double y)
 {
     if (y == 2) return x * x;
+    if (y == 0.5) return power_of_half(x);
+    if (y == -1) return 1 / x;
     if (y == 1) return x;
     if (y == 0 || x == 1) return 1;
     if (std::isnan(x) || std::isnan(y)) return no_number;
@@ -103,11 +108,15 @@ Doubles logarithm(const Doubles& x)
 
 Doubles power(const Doubles& x, const Doubles& y)
 {
+    const auto all_are = [&](double exponent) { return !any(y != exponent); };
+    if (all_are(0.5)) return x == -infinity ? Doubles{} + infinity : sqrt(x) + 0.0;
+    if (all_are(-1)) return 1 / x;
     Doubles value = by_registers_of_both(
         x, y, [](const Register& base, const Register& exponent) __attribute__((always_inline)) {
             return elementary::power(elementary::parts_of_logarithm(base), exponent);
         });
-    const Flags is_usual = (x >= least_normal) & (x <= largest) & (magnitude(y) <= 1e300) & (y != 1) & (y != 2);
+    const Flags is_usual =
+        (x >= least_normal) & (x <= largest) & (magnitude(y) <= 1e300) & (y != 1) & (y != 2) & (y != 0.5) & (y != -1);
     replace_lanes(value, ~is_usual, [&](std::uint32_t l) { return power(x[l], y[l]); });
     return value;
 }

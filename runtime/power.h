@@ -88,7 +88,7 @@ double logarithm(double x);
 double logarithm10(double x);
 double logarithm(double x, double base);
 
-// x^y with the special cases of C's pow. power(x, 2) is x * x.
+// x^y with the special cases of C's pow. x^2 is x * x, x^0.5 a square root and x^-1 a quotient, each rounded once.
 double power(double x, double y);
 
 // x 2^n, where n is the exponent rounded toward 0.

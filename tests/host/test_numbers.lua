@@ -295,6 +295,16 @@ return rapid.create { seed = 5, points = rapid.points.grid { size = {9999, 0, 0}
 end)
 
 describe("functions of the whole set and the body of a scene", function()
+  it("have the squares of constants, and of text given to load", function()
+    local points = scene.run([[
+local x = 825.6962440394036 -- whose square the C library's pow rounds up
+local found = { 825.6962440394036 ^ 2, x ^ 2, load("return 825.6962440394036 ^ 2")(), math.pow(x, 2) }
+local v = 0
+for k = 1, #found do if found[k] ~= x * x then v = k end end
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, v = {{v, 0, 0}} } }]], { frames = {1, 1} })[1]
+    assert.equal(0, points[1].v.x)
+  end)
+
   it("compute as each other", function()
     local points = scene.run([[
 local values = { 825.6962440394036, -0.7, 3, 1e-3, -0.0, 12.75, 0 / 0 }

@@ -106,6 +106,8 @@ TEST_CASE("a power that is a double is exact, and so is a logarithm that is a wh
     for (int k = 0; k < values; ++k) {
         const double x = between(-1e3, 1e3);
         REQUIRE(same_bits(power(x, 2), x * x));
+        REQUIRE(same_bits(power(x, -1), 1 / x));
+        REQUIRE(same_bits(power(x * x, 0.5), std::sqrt(x * x)));
     }
 }
 
@@ -202,10 +204,12 @@ TEST_CASE("eight at a time logarithms and powers have the bits of one", "[elemen
             x[l] = k % 3 == 0 ? special[engine() % std::size(special)] : between(0, 9);
             y[l] = k % 2 == 0 ? special[engine() % std::size(special)] : between(-9, 9);
         }
-        const Doubles powers = power(x, y), logarithms = logarithm(x);
+        const double exponent = special[engine() % std::size(special)];
+        const Doubles powers = power(x, y), of_one_exponent = power(x, Doubles{} + exponent), logarithms = logarithm(x);
         for (std::uint32_t l = 0; l < lanes; ++l) {
             INFO(x[l] << " " << y[l]);
             REQUIRE(same_bits(powers[l], power(x[l], y[l])));
+            REQUIRE(same_bits(of_one_exponent[l], power(x[l], exponent)));
             REQUIRE(same_bits(logarithms[l], logarithm(x[l])));
         }
     }

@@ -27,18 +27,18 @@ end
 describe("the operator ^", function()
   it("is a call of its operands", function()
     for text, expected in pairs {
-      ["return a^b"] = "return P(a,(b))",
-      ["return a ^ b ^ c"] = "return P(a ,( P(b ,( c))))",
-      ["return -a^2"] = "return -P(a,(2))",
-      ["return 2^-a^-b"] = "return P(2,(-P(a,(-b))))",
-      ["return (a^b)^c"] = "return P((P(a,(b))),(c))",
-      ["return a.b[c^d]:e(f)^#g.h + 1"] = "return P(a.b[P(c,(d))]:e(f),(#g.h)) + 1",
-      ["return f\"^\"^2, f{1}^2, f[[^]]^2"] = "return P(f\"^\",(2)), P(f{1},(2)), P(f[[^]],(2))",
-      ["return 2^f\"1\", 2^f{1}(2).x, 2^a:b'c'"] = "return P(2,(f\"1\")), P(2,(f{1}(2).x)), P(2,(a:b'c'))",
-      ["return '2'^'3', ...^2"] = "return P('2',('3')), P(...,(2))",
-      ["return 0x1p-2^1e-3^.5"] = "return P(0x1p-2,(P(1e-3,(.5))))",
-      ["return a --[[ ^ ]]^ --^\n b"] = "return P(a --[[ ^ ]],( --^\n b))",
-      ["return not a^b, '\\'^'"] = "return not P(a,(b)), '\\'^'",
+      ["return a^b"] = "return (P(a,(b)))",
+      ["return a ^ b ^ c"] = "return (P(a ,( (P(b ,( c))))))",
+      ["return -a^2"] = "return -(P(a,(2)))",
+      ["return 2^-a^-b"] = "return (P(2,(-(P(a,(-b))))))",
+      ["return (a^b)^c"] = "return (P(((P(a,(b)))),(c)))",
+      ["return a.b[c^d]:e(f)^#g.h + 1"] = "return (P(a.b[(P(c,(d)))]:e(f),(#g.h))) + 1",
+      ["return f\"^\"^2, f{1}^2, f[[^]]^2"] = "return (P(f\"^\",(2))), (P(f{1},(2))), (P(f[[^]],(2)))",
+      ["return 2^f\"1\", 2^f{1}(2).x, 2^a:b'c'"] = "return (P(2,(f\"1\"))), (P(2,(f{1}(2).x))), (P(2,(a:b'c')))",
+      ["return '2'^'3', ...^2"] = "return (P('2',('3'))), (P(...,(2)))",
+      ["return 0x1p-2^1e-3^.5"] = "return (P(0x1p-2,((P(1e-3,(.5))))))",
+      ["return a --[[ ^ ]]^ --^\n b"] = "return (P(a --[[ ^ ]],( --^\n b)))",
+      ["return not a^b, '\\'^'"] = "return not (P(a,(b))), '\\'^'",
     } do
       assert.equal(expected, rewritten(text))
     end
@@ -58,7 +58,7 @@ describe("the operator ^", function()
     do
       assert.equal(nil, power_operator.rewrite(text))
     end
-    assert.equal("return function() return P(a,(2)) end ^ 2", rewritten "return function() return a^2 end ^ 2")
+    assert.equal("return function() return (P(a,(2))) end ^ 2", rewritten "return function() return a^2 end ^ 2")
   end)
 
   it("takes one value of a call", function()

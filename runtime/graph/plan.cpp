@@ -398,8 +398,19 @@ std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
         return std::any_of(attribute.made_by.begin(), attribute.made_by.end(),
                            [&](std::size_t maker) { return nodes[maker].simulation == simulation; });
     };
+    // A node after a merge may be the first to give these points a value.
+    const auto given_later = [&](const PlannedAttribute& attribute) {
+        const auto is_own = [&](std::size_t writer) { return nodes[writer].simulation == simulation; };
+        if (std::any_of(attribute.written_by.begin(), attribute.written_by.end(), is_own)) return false;
+        return std::any_of(attribute.made_by.begin(), attribute.made_by.end(), [&](std::size_t maker) {
+            const std::vector<AttributeSpec> given = uses_of(nodes[maker]).defaults;
+            return nodes[maker].carries.count(simulation) &&
+                   std::any_of(given.begin(), given.end(),
+                               [&](const AttributeSpec& spec) { return spec.name == attribute.name; });
+        });
+    };
     for (const PlannedAttribute& attribute : simulations[simulation].attributes) {
-        const bool is_missing = attribute.used_before_made || !made_here(attribute);
+        const bool is_missing = attribute.used_before_made || !(made_here(attribute) || given_later(attribute));
         if (attribute.kept && known_attribute(attribute.name) && is_missing)
             columns.push_back(*known_attribute(attribute.name));
     }

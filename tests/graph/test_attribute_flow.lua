@@ -44,3 +44,27 @@ describe("an attribute", function()
       refused(create .. ":merge(" .. other .. ") " .. read:gsub("heat", "haet") .. ":solve {}"), 1, true)
   end)
 end)
+
+describe("an attribute that a node gives behind a merge", function()
+  it("is given to all points that have none, known or not", function()
+    local given = ":attribute { pscale = 0.5, heat = 3 } "
+    for _, chain in ipairs {
+      create .. ":solve {} :merge(rapid.create { points = two } :solve {}) " .. given,
+      create .. ":merge(rapid.create { points = two }) " .. given .. ":contact {} :solve {}",
+    } do
+      local points = scene.run("return " .. chain)[2]
+      assert.equal(4, #points)
+      for i = 1, 4 do
+        assert.near(0.5, points[i].pscale, 0)
+        assert.equal(3, points[i].heat)
+      end
+    end
+  end)
+
+  it("does not replace what a node of their own chain has asked for", function()
+    local points = scene.run("return " .. create .. ":merge(rapid.create { points = two } " ..
+      ':points("read", function(p) p.v = vec3(p.mass, 0, 0) end)) :attribute { mass = 7 } :gravity {} :solve {}')[2]
+    assert.equal(7, points[1].mass)
+    assert.equal(1, points[3].mass)
+  end)
+end)

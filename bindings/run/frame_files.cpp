@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/at_node.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
 #include "runtime/io/text_table.h"
@@ -188,7 +189,9 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
             if (!pattern) continue;
             check(name_in_part(*pattern));
             of_nodes_.push_back({name_in_part(*pattern), planned.node->name, planned.node->location});
-            if (is_volume) volumes_[*pattern] = static_cast<const Rasterize*>(planned.op->fields());
+            if (is_volume)
+                volumes_[*pattern] = {static_cast<const Rasterize*>(planned.op->fields()), planned.node->name,
+                                      planned.node->location};
         } catch (const Error& error) {
             throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
                 .in_node(planned.node->name)
@@ -356,8 +359,9 @@ FrameWriter::Write FrameFiles::write_of(const std::string& pattern) const
 {
     const auto volume = volumes_.find(pattern);
     if (volume == volumes_.end()) return {};
-    return [node = *volume->second](const std::filesystem::path& path, const PointSet& points) {
-        node.write_volumes(path, points);
+    const auto& [of, node, location] = volume->second;
+    return [rasterize = *of, node, location](const std::filesystem::path& path, const PointSet& points) {
+        name_errors(node, location, [&] { rasterize.write_volumes(path, points); });
     };
 }
 

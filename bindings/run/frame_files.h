@@ -115,7 +115,12 @@ private:
     void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output, bool of_node);
 
     std::vector<Target> targets_;
-    std::map<std::string, const Rasterize*> volumes_;  // by pattern; of the plan
+    struct Volume {
+        const Rasterize* of;  // of the plan
+        std::string node;
+        Location location;
+    };
+    std::map<std::string, Volume> volumes_;  // by pattern
     struct NodePattern {
         std::string pattern, node;
         Location location;

@@ -46,6 +46,9 @@ void Rasterize::check() const
             fmt::format("file = \"{}\": volumes are written as .vdb; give a pattern such as "
                         "\"smoke.####.vdb\"",
                         file));
+    if (radius && radius->attribute.empty() && radius->constant / voxel < 1)
+        throw Error(fmt::format("radius = {:g} is smaller than voxel = {:g}; it must be at least that",
+                                radius->constant, voxel));
     for (const std::string& name : attributes)
         if (name == "density") throw Error("attributes: \"density\" is the grid of the points themselves");
 }

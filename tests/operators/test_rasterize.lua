@@ -121,6 +121,10 @@ found = { sum }]], 1)[1]
     says('"density" is the grid of the points themselves', { add = ", attributes = { 'density' }" })
     says("point 0 has the radius 0.25 m; it must be at least a voxel", { add = "} :rasterize { file = 'b.####.vdb'," ..
       " voxel = 0.3, radius = rapid.attr 'pscale'" })
+    says('scene.lua:3: node "rasterize2": point 0 has the radius 0.25 m', { add = "} :rasterize { " ..
+      "file = 'b.####.vdb', voxel = 0.3, radius = rapid.attr 'pscale'" })
+    says("radius = 0.2 is smaller than voxel = 0.3; it must be at least that", { add = "} :rasterize { " ..
+      "file = 'b.####.vdb', voxel = 0.3, radius = 0.2" })
     assert.matches("writes nothing", scene.command("check", [[
 local a = rapid.create { points = two }
 local b = a:rasterize { file = "x.####.vdb" } return a:solve {}]]).stderr, 1, true)

@@ -1,5 +1,5 @@
--- Omissions change no bit of the outputs: each run is compared with one that omits nothing, and with one in which another
--- file asks for more.
+-- Omissions change no bit of the outputs: each run is compared with one that omits nothing, and with one in which
+-- another file asks for more.
 local command = require "testing.command"
 local csv_rows = require "tests.csv_rows"
 
@@ -63,7 +63,8 @@ describe("what is left out", function()
   local read = ':points("read", function(p) p.v = vec3(p.heat, 0, 0) end) '
   local both = {
     ["merged after solve"] = { sheet .. ":contact {} :solve {} :merge(other:solve {})", "pscale", 0 },
-    ["merged into points without it"] = { ":contact {} :solve {} :merge(other" .. sheet .. ":solve {})", "pscale", 0.03 },
+    ["merged into points without it"] =
+      { ":contact {} :solve {} :merge(other" .. sheet .. ":solve {})", "pscale", 0.03 },
     ["adopted before solve"] = { sheet .. ":contact {} :merge(other) :solve {}", "mass", 1 },
     ["made in both chains"] =
       { ":attribute { heat = 4 } " .. read .. ":merge(other:attribute { heat = 2 }) :solve {}", "vx", 2 },
@@ -89,15 +90,15 @@ describe("what is left out", function()
 
   it("brings no attribute of one output into the file of another", function()
     local folder = scene("local other = rapid.create { points = rapid.points.from { P = {{0, 5, 0}} } } :solve {}\n" ..
-      "return { main = rapid.create {}" .. emit .. "life = 0.2, attributes = { pscale = 0.1 } } :contact {} :solve {}" ..
-      " :merge(other), other = other }")
+      "return { main = rapid.create {}" .. emit .. "life = 0.2, attributes = { pscale = 0.1 } } :contact {} " ..
+      ":solve {} :merge(other), other = other }")
     same_files(folder, "scene.lua", "-f 1-4", { "{output}.####.csv" })
     assert.equal("id,Px,Py,Pz,vx,vy,vz", folder:read "pruned/other.0004.csv":match "^[^\n]*")
   end)
 
   it("is nothing of points that no solve moves", function()
-    local folder = scene('return rapid.create { points = rapid.points.from { P = {{0, 5, 0}}, spare = {1} } }' .. emit ..
-      "} :attribute { heat = 2 }")
+    local folder = scene('return rapid.create { points = rapid.points.from { P = {{0, 5, 0}}, spare = {1} } }' ..
+      emit .. "} :attribute { heat = 2 }")
     same_files(folder, "scene.lua", "-f 1-4", { "everything.####.csv" })
     assert.matches("\n0,0,5,0,", folder:read "pruned/everything.0004.csv")
   end)

@@ -81,8 +81,8 @@ end
 describe(":trail where no Solve comes after it", function()
   local emit = [[:emit { source = rapid.shape.sphere { radius = 1 }, rate = 200, velocity = {1, 2, 0}, spread = 60,
     life = {0.1, 0.6} } ]]
-  local function run(text)
-    return rapid.run(scene.folder:write("after.lua", 'local rapid = require "rapid"\n' .. text), { frames = {1, 20} })
+  local function run(graph)
+    return rapid.run(scene.folder:write("after.lua", 'local rapid = require "rapid"\n' .. graph), { frames = {1, 20} })
   end
 
   it("keeps the positions of the frames before, through births and deaths", function()

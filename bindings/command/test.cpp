@@ -6,11 +6,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <thread>
 
 #include "bindings/command/child.h"
 #include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
 #include "bindings/command/test_file.h"
 #include "bindings/command/test_report.h"
 #include "bindings/command/untrusted.h"

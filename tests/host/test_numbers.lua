@@ -4,10 +4,11 @@
 -- Three kernels compute each expression: a program of lanes, if there is one; one that makes a table, which LuaJIT
 -- compiles; and one that makes a function, which it interprets. MATH_VALUES is the number of random pairs; 1,024
 -- special ones come before them.
+local amount = require "tests.amount"
 local command = require "testing.command"
 local scene = require "testing.scene"
 
-local random_pairs = tonumber(os.getenv "MATH_VALUES") or 2000
+local random_pairs = amount.of("MATH_VALUES", 2000)
 
 local special = {
   "0", "-0", "1", "-1", "0.5", "-0.5", "1.5", "-1.5", "2.5", "-0.7", "-0.3", "2", "-2", "3", "10", "0.1",

@@ -4,12 +4,13 @@
 -- The suite runs a few. RANDOM_KERNELS=13000 RANDOM_KERNELS_SEED=7 rapid test tests/host/test_random_kernels.lua runs
 -- more, and others. A scene that fails is shown with its seed and number. Statements that its fault does not need are
 -- removed first.
+local amount = require "tests.amount"
 local command = require "testing.command"
 local kernel_modes = require "tests.host.kernel_modes"
 local random_kernels = require "tests.host.random_kernels"
 local shrink = require "tests.host.shrink"
 
-local kernels = tonumber(os.getenv "RANDOM_KERNELS") or 130
+local kernels = amount.of("RANDOM_KERNELS", 130)
 local seed = tonumber(os.getenv "RANDOM_KERNELS_SEED") or 1
 local batch = 50 -- scenes for each process that interprets
 

@@ -1,7 +1,6 @@
 // Compares logarithms, powers, arc and hyperbolic functions with long double, special values with the C library, and
 // eight numbers at a time with one. MATH_VALUES sets the number of random numbers.
 #include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <random>
@@ -9,6 +8,7 @@
 #include "runtime/arc_functions.h"
 #include "runtime/hyperbolic.h"
 #include "runtime/power.h"
+#include "tests/amount.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -18,7 +18,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity(),
                  no_number = std::numeric_limits<double>::quiet_NaN();
 
-const int values = std::getenv("MATH_VALUES") ? std::atoi(std::getenv("MATH_VALUES")) : 10000;
+const int values = amount("MATH_VALUES", 10000);
 
 // In units in the last place of the value.
 double error_of(double value, long double truth)
@@ -66,7 +66,8 @@ using Function2 = double (*)(double, double);
 }  // namespace
 
 // Long double has 11 bits more than double, so its own error is below 0.001 units.
-TEST_CASE("natural logarithms are within 0.9 units in the last place, others and powers within 0.53", "[elementary]")
+TEST_CASE("natural logarithms are within 0.9 units in the last place, others and powers within 0.53",
+          "[elementary][random]")
 {
     const auto any_size = [] { return std::exp2(between(-1074, 1023)); };
     const auto near_one = [] { return between(0.5, 2); };
@@ -89,7 +90,7 @@ TEST_CASE("natural logarithms are within 0.9 units in the last place, others and
     }
 }
 
-TEST_CASE("a power that is a double is exact, and so is a logarithm that is a whole number", "[elementary]")
+TEST_CASE("a power that is a double is exact, and so is a logarithm that is a whole number", "[elementary][random]")
 {
     for (int base = 2; base <= 40; ++base) {
         double exact = base;
@@ -111,7 +112,7 @@ TEST_CASE("a power that is a double is exact, and so is a logarithm that is a wh
     }
 }
 
-TEST_CASE("tangents are within a unit in the last place, also of large angles", "[elementary]")
+TEST_CASE("tangents are within a unit in the last place, also of large angles", "[elementary][random]")
 {
     const auto true_tangent = [](long double x) { return std::tan(x); };
     for (const double most : {1.57, 100.0, 1e6}) {
@@ -127,7 +128,7 @@ TEST_CASE("tangents are within a unit in the last place, also of large angles", 
         }
 }
 
-TEST_CASE("arc functions are within 0.8 units in the last place", "[elementary]")
+TEST_CASE("arc functions are within 0.8 units in the last place", "[elementary][random]")
 {
     const auto arc = [](double x) { return arc_tangent(x); };
     CHECK(worst(
@@ -169,7 +170,7 @@ TEST_CASE("hyperbolic functions are within 0.7 units in the last place", "[eleme
     CHECK(std::isfinite(hyperbolic_cosine(710.4)));
 }
 
-TEST_CASE("at special values they are as C has them", "[elementary]")
+TEST_CASE("at special values they are as C has them", "[elementary][random]")
 {
     const std::pair<Function1, Function1> ones[] = {{sine, std::sin},
                                                     {cosine, std::cos},
@@ -196,7 +197,7 @@ TEST_CASE("at special values they are as C has them", "[elementary]")
     }
 }
 
-TEST_CASE("eight at a time logarithms and powers have the bits of one", "[elementary]")
+TEST_CASE("eight at a time logarithms and powers have the bits of one", "[elementary][random]")
 {
     for (int k = 0; k < values; k += 8) {
         Doubles x, y;

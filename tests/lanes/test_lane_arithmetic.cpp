@@ -1,13 +1,13 @@
 // Compares operators and functions of lanes with C++, at special values and at random ones. MATH_VALUES sets the number
 // of the latter.
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <random>
 
 #include "runtime/elementary.h"
 #include "runtime/lanes/lane_program.h"
 #include "runtime/power.h"
+#include "tests/amount.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -104,11 +104,10 @@ TEST_CASE("lanes compute as C++ at special values", "[lanes]")
     check(x, y);
 }
 
-TEST_CASE("lanes compute as C++ at random numbers", "[lanes]")
+TEST_CASE("lanes compute as C++ at random numbers", "[lanes][random]")
 {
-    const char* const asked = std::getenv("MATH_VALUES");
     std::mt19937_64 engine(5);
-    std::vector<double> x(asked ? static_cast<std::size_t>(std::atol(asked)) : 10000), y(x.size());
+    std::vector<double> x(static_cast<std::size_t>(amount("MATH_VALUES", 10000))), y(x.size());
     std::uniform_real_distribution<double> mild(-20, 20);
     for (std::size_t i = 0; i < x.size(); ++i)
         for (double* value : {&x[i], &y[i]}) *value = i % 2 == 0 ? mild(engine) : std::bit_cast<double>(engine());

@@ -3,12 +3,13 @@
 -- For the scenes of graphs and of its nodes, and for random graphs behind them, the files of a run with one output are
 -- those of a run with several, and those of a run that leaves nothing out. In the suite a few scenes are run;
 -- OUTPUT_SCENES=150 OUTPUT_SEED=7 rapid test tests/stability/test_outputs.lua runs more.
+local amount = require "tests.amount"
 local command = require "testing.command"
 local compared_runs = require "tests.stability.compared_runs"
 local lehmer = require "tests.lehmer"
 local random_chains = require "tests.stability.random_chains"
 
-local count = tonumber(os.getenv "OUTPUT_SCENES") or 2
+local count = amount.of("OUTPUT_SCENES", 2)
 local seed = tonumber(os.getenv "OUTPUT_SEED") or 1
 
 local graphs = {}

@@ -4,12 +4,13 @@
 -- `rapid check` and a run agree: both refuse a node, in the same words, or the run goes to its end, with the same files
 -- on one thread and on seven, and with nothing left out. In the suite some placements are tried; PLACEMENTS=1300 rapid
 -- test tests/stability/test_placements.lua tries all, PLACEMENT_SEED=7 others.
+local amount = require "tests.amount"
 local compared_runs = require "tests.stability.compared_runs"
 local legal_nodes = require "tests.stability.legal_nodes"
 local lehmer = require "tests.lehmer"
 local placements = require "tests.stability.placements"
 
-local count = math.min(tonumber(os.getenv "PLACEMENTS") or 14, placements.count)
+local count = math.min(amount.of("PLACEMENTS", 14), placements.count)
 local seed = tonumber(os.getenv "PLACEMENT_SEED") or 1
 
 local run = "rapid run $SCENE -f 1-4 -o {output}.####.csv --quiet "

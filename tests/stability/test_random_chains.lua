@@ -4,10 +4,11 @@
 -- files ask for, in two parts that are merged, and after a snapshot; or ends with the same error, which names its node.
 -- In the suite some are run; CHAINS=3000 CHAINS_SEED=7 rapid test tests/stability/test_random_chains.lua runs more, and
 -- others. A graph that fails is shown whole, with its number and seed.
+local amount = require "tests.amount"
 local compared_runs = require "tests.stability.compared_runs"
 local random_chains = require "tests.stability.random_chains"
 
-local count = tonumber(os.getenv "CHAINS") or 30
+local count = amount.of("CHAINS", 30)
 local seed = tonumber(os.getenv "CHAINS_SEED") or 1
 local first = tonumber(os.getenv "CHAINS_FIRST") or 1
 

@@ -10,7 +10,6 @@ namespace {
 
 using Parts = DoubleDouble<double>;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr Parts pi = {0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53},
                 quarter_turn = {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 constexpr double negligible = 0x1p-60;
@@ -62,7 +61,7 @@ double arc_tangent(double y, double x)
     if (std::isnan(x) || std::isnan(y)) return x + y;
     const bool is_behind = std::signbit(x);
     double opposite = std::abs(y), adjacent = std::abs(x);
-    if (opposite == infinity && adjacent == infinity) opposite = adjacent = 1;
+    if (opposite == HUGE_VAL && adjacent == HUGE_VAL) opposite = adjacent = 1;
     if (opposite <= negligible * adjacent || opposite == 0)
         return is_behind ? std::copysign(pi.high, y) : adjacent == 0 ? y : std::copysign(opposite / adjacent, y);
     if (adjacent <= negligible * opposite) return std::copysign(quarter_turn.high, y);

@@ -7,11 +7,10 @@
 namespace rapid {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity(),
-                 no_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double least_normal = std::numeric_limits<double>::min(), largest = std::numeric_limits<double>::max();
 
-bool has_logarithm(double x) { return x > 0 && x < infinity; }
+bool has_logarithm(double x) { return x > 0 && x < HUGE_VAL; }
 
 DoubleDouble<double> parts_of_logarithm(double x)
 {
@@ -19,7 +18,7 @@ DoubleDouble<double> parts_of_logarithm(double x)
 }
 
 // The logarithm of 0, infinity, NaN and negative numbers.
-double beyond_logarithms(double x) { return x == 0 ? -infinity : x > 0 ? x : no_number; }
+double beyond_logarithms(double x) { return x == 0 ? -HUGE_VAL : x > 0 ? x : no_number; }
 
 bool is_whole(double y) { return std::floor(y) == y; }
 bool is_odd(double y) { return is_whole(y) && !is_whole(y * 0.5); }
@@ -28,7 +27,7 @@ double power_of_positive(double x, double y)
 {
     if (x == 1) return 1;
     const bool grows = (x > 1) == (y > 0);
-    if (x == 0 || x == infinity || std::abs(y) > 1e300) return grows ? infinity : 0;
+    if (x == 0 || x == HUGE_VAL || std::abs(y) > 1e300) return grows ? HUGE_VAL : 0;
     return elementary::power(parts_of_logarithm(x), y);
 }
 
@@ -46,7 +45,7 @@ Doubles by_registers_of_both(const Doubles& x, const Doubles& y, const F& f)
 }
 
 // C's pow(x, 0.5) differs from sqrt(x) at -0 and -infinity.
-double power_of_half(double x) { return x == -infinity ? infinity : std::sqrt(x) + 0.0; }
+double power_of_half(double x) { return x == -HUGE_VAL ? HUGE_VAL : std::sqrt(x) + 0.0; }
 
 // Replaces the marked lanes of `value` by f(lane).
 template <class F>
@@ -86,7 +85,7 @@ double power(double x, double y)
     if (y == 0 || x == 1) return 1;
     if (std::isnan(x) || std::isnan(y)) return no_number;
     if (!std::signbit(x)) return power_of_positive(x, y);
-    if (x < 0 && x > -infinity && !is_whole(y)) return no_number;
+    if (x < 0 && x > -HUGE_VAL && !is_whole(y)) return no_number;
     const double size = power_of_positive(-x, y);
     return is_odd(y) ? -size : size;
 }
@@ -109,7 +108,7 @@ Doubles logarithm(const Doubles& x)
 Doubles power(const Doubles& x, const Doubles& y)
 {
     const auto all_are = [&](double exponent) { return !any(y != exponent); };
-    if (all_are(0.5)) return x == -infinity ? Doubles{} + infinity : sqrt(x) + 0.0;
+    if (all_are(0.5)) return x == -HUGE_VAL ? Doubles{} + HUGE_VAL : sqrt(x) + 0.0;
     if (all_are(-1)) return 1 / x;
     Doubles value = by_registers_of_both(
         x, y, [](const Register& base, const Register& exponent) __attribute__((always_inline)) {

@@ -14,9 +14,9 @@ namespace rapid {
 namespace {
 
 // A graph on one thread, frame by frame.
-class Run {
+class KeptRun {
 public:
-    explicit Run(const std::string& text)
+    explicit KeptRun(const std::string& text)
         : session_(folder_.write("scene.lua", "local rapid = require 'rapid'\n" + text), {}),
           plan_(session_.graph(), PlanOptions{}),
           evaluator_(plan_, [](auto&&...) {})
@@ -65,7 +65,7 @@ struct Alive {
 
     Alive(const std::string& text, int frames)
     {
-        const Run run(text);
+        const KeptRun run(text);
         std::vector<std::weak_ptr<const Object>> made;
         for (int frame = 1; frame <= frames; ++frame) {
             const std::size_t before = bytes_in_use(), alive = made.size();
@@ -107,7 +107,7 @@ TEST_CASE("of level sets that are another one in each frame a few are alive, not
 
 TEST_CASE("100,000 frames of a small scene leave no more in use than 20,000", "[kept][long]")
 {
-    Run run(R"(
+    KeptRun run(R"(
 return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } }
   :points("slow", function(p) p.v = p.v * 0.5 end)
   :detail("read", function(points, frame) local heights = {} for i = 1, #points do heights[i] = frame.time end end)

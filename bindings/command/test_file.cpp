@@ -179,6 +179,7 @@ void TestFile::take_results(const std::function<void(const TestResult&)>& add)
         std::fwrite(next.out.data(), 1, next.out.size(), stdout);
         std::fwrite(next.err.data(), 1, next.err.size(), stderr);
         if (next.result) add(*next.result);
+        std::fflush(stdout);  // a run of minutes shows its failures as they come
     }
 }
 

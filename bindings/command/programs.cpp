@@ -30,7 +30,8 @@ const Program& program(std::string_view name)
 fs::path command_file()
 {
     const fs::path file = this_file();
-    const bool is_program = file.parent_path().filename() == "rapid";  // libexec/rapid/NAME
+    const bool is_program = std::any_of(std::begin(program_list), std::end(program_list),
+                                        [&](const Program& one) { return file.filename() == one.name; });
     return is_program ? (file.parent_path() / command_folder / "rapid").lexically_normal() : file;
 }
 

@@ -429,12 +429,13 @@ describe("rapid merge", function()
     refused("'m_part{part}.####.csv'", "missing is part 2of2")
   end)
 
-  it("refuses points that are of another part, with status 1, while it merges", function()
+  it("refuses a file that its part has not written, with status 1, while it merges", function()
     parts(2)
     command.shell("cp m_part1of2.0003.csv m_part2of2.0003.csv", { cwd = folder.path })
     local result = rapid "merge -o 'out.####.csv' 'm_part{part}.####.csv'"
     assert.equal(1, result.status)
-    assert.matches("m_part2of2.0003.csv: point %d+ is not of part 2 of 2, but of part 1", result.stderr)
+    assert.matches("m_part2of2.0003.csv: is not the file that the part has written, which had %d+ points; this one " ..
+      "has %d+. Run the part again", result.stderr)
     assert.is_nil(folder:read "out.0003.csv")
     assert.truthy(folder:read "out.0002.csv")
   end)

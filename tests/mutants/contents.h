@@ -1,4 +1,4 @@
-// All that a reader makes of a file, as bytes.
+// Everything that a reader makes of a file, as bytes.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Takes the place of glibc's malloc in the program that it is linked into, and in the libraries which that loads.
+// Replaces glibc's malloc in the program that it is linked into and in the libraries that it loads.
 #include "tests/mutants/filled_memory.h"
 
 #include <malloc.h>

@@ -1,10 +1,10 @@
-// Memory that nobody has written yet, with a pattern in it: what a program reads from there shows when it runs again
-// with another pattern.
+// Fills memory that nobody has written yet. A program that reads from there behaves differently when it runs again with
+// another byte.
 #pragma once
 
 namespace rapid::test {
 
-// From here on new memory of this process and of its copies is filled with the byte.
+// Fills new memory of this process and of its copies with the byte from here on.
 void fill_new_memory(unsigned char byte);
 
 // Fills the stack below the caller's frame.

@@ -104,7 +104,7 @@ constexpr const char* vtp =
 constexpr const char* stl =
     "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet "
     "normal 0 1 "
-    "0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 1 0 0\nendloop\nendfacet\nendsolid t\n";
+    "0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 1 0 0\nendloop\nendfacet\nendsolid\n";
 
 std::string little(std::uint32_t word)
 {
@@ -165,6 +165,7 @@ std::vector<WholeFile> registered_formats()
             files.push_back({"points " + format.extension + what, name,
                              written(name, [&](const Path& path) { write_points(path, points); }), content_of_points});
             files.back().may_end_at_any_line = without_count.contains(format.extension);
+            files.back().has_points = !points.empty();
         };
         add("", random_points({.size = 40, .wide = false}));
         add(", trails", points_with_trails(8));
@@ -187,7 +188,7 @@ std::vector<WholeFile> whole_files()
     add("points .vtp, text and base64", "a.vtp", vtp, content_of_points);
     add("mesh .ply", "a.ply", ply, content_of_mesh);
     add("mesh .obj", "a.obj", obj, content_of_mesh);
-    files.back().may_end_at_any_line = true;
+    files.back().may_end_anywhere = true;
     add("mesh .stl, ascii", "a.stl", stl, content_of_mesh);
     add("mesh .stl, binary", "a.stl", binary_stl(), content_of_mesh);
     add("mesh .gltf", "a.gltf", gltf(), content_of_mesh);

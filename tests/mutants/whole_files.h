@@ -1,5 +1,5 @@
-// A whole file for each reader, of which mutants are made: of each format of points that can be read, as it is
-// registered, and of meshes, grids and states.
+// Whole files, of which mutants are made: one for each reader. Every registered format of points that can be read has
+// some; those of meshes, grids and states are listed.
 #pragma once
 
 #include <string>
@@ -14,10 +14,12 @@ struct WholeFile {
     std::string name;    // "a.csv"
     std::string bytes;
     ContentOf content;
-    // Puts right in a mutant what would be wrong after any change: a checksum. Null if there is none.
+    // Corrects the checksum of a mutant. Null if the file has none.
     void (*seal)(std::string& mutant) = nullptr;
-    // Text that does not say how much of it there is: cut after a line, it is another whole file.
+    // The file is text that does not say how long it is: cut after a line, it is another whole file.
     bool may_end_at_any_line = false;
+    bool may_end_anywhere = false;  // likewise, without a newline at its end, too
+    bool has_points = true;         // without any, nothing can be missing
 };
 
 std::vector<WholeFile> whole_files();

@@ -46,7 +46,7 @@ protected:
     }
 };
 
-// Calls f, in which the stream throws where the file ends.
+// Calls f, in which the stream throws at the end of the file.
 template <class F>
 auto read_checked(const F& f)
 {
@@ -99,7 +99,7 @@ private:
         metadata.readMeta(stream_);
     }
 
-    // The next grid: its descriptor and, without offsets, all of it.
+    // Reads the descriptor of the next grid, and all of the grid if the file has no offsets.
     void add_grid()
     {
         GridDescriptor descriptor;
@@ -167,7 +167,7 @@ private:
         return *found;
     }
 
-    // Returns where the tree that begins here ends.
+    // Checks the tree that begins here and returns its end.
     std::size_t check_tree(const GridBase& grid)
     {
         VdbCursor cursor(file_.bytes(), position());

@@ -1,8 +1,8 @@
 // Reads .vdb files with OpenVDB, from memory.
 //
-// OpenVDB ignores the state of the stream that it reads from: the values that a cut file lacks would be those of memory
-// that was never written. The stream therefore throws, and sizes are checked before OpenVDB relies on them
-// (vdb_layout.h).
+// OpenVDB ignores the state of the stream that it reads from. It would take the values that a cut file lacks from
+// memory that was never written. The stream therefore throws at its end, and sizes are checked before OpenVDB relies on
+// them (vdb_layout.h).
 #pragma once
 
 #include <filesystem>

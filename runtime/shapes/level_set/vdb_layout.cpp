@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// Voxels and children along an edge, as powers of two: of a leaf, and of the nodes above it (Tree_..._5_4_3).
+// The width of a leaf in voxels and of the topmost nodes in children, as powers of two (Tree_..._5_4_3).
 constexpr std::size_t leaf_log2 = 3, top_log2 = 5;
 constexpr std::size_t values_in(std::size_t log2) { return std::size_t{1} << 3 * log2; }
 constexpr std::size_t mask_bytes(std::size_t log2) { return values_in(log2) / 8; }
@@ -24,7 +24,7 @@ std::size_t bits_in(std::span<const unsigned char> mask)
     return count;
 }
 
-// Values that are packed together, or not packed.
+// Checks values that are packed together, or not packed.
 void check_data(VdbCursor& cursor, const VdbValues& values, std::size_t count)
 {
     const bool is_half = values.stored_bytes < values.bytes;
@@ -38,10 +38,11 @@ void check_data(VdbCursor& cursor, const VdbValues& values, std::size_t count)
         return cursor.skip(unpacked);
     }
     const auto chunk = cursor.bytes(static_cast<std::uint64_t>(packed));
-    if (has_blosc) check_packed(chunk, unpacked, Padding::None);  // zlib is told the sizes, and OpenVDB compares them
+    if (has_blosc) check_packed(chunk, unpacked, Padding::None);  // zlib knows both sizes
 }
 
-// The values of a node, without the inactive ones if these are one or two (openvdb::io::readCompressedValues).
+// Checks the values of a node. Inactive ones are left out if they have at most two different values
+// (openvdb::io::readCompressedValues).
 void check_values(VdbCursor& cursor, const VdbValues& values, std::size_t log2, std::size_t active)
 {
     using namespace openvdb::io;
@@ -54,7 +55,7 @@ void check_values(VdbCursor& cursor, const VdbValues& values, std::size_t log2, 
     check_data(cursor, values, has_all ? values_in(log2) : active);
 }
 
-// A node and the leaves below it.
+// Checks a node and the leaves below it.
 void check_node(VdbCursor& cursor, const VdbValues& values, std::size_t log2, std::vector<std::uint16_t>& active)
 {
     if (log2 == leaf_log2) {
@@ -67,8 +68,8 @@ void check_node(VdbCursor& cursor, const VdbValues& values, std::size_t log2, st
     for (std::size_t child = 0; child < children; ++child) check_node(cursor, values, log2 - 1, active);
 }
 
-// openvdb::io::DelayedLoadMetadata: for each leaf a byte, and the size of its packed values if values are packed. Each
-// array comes after its packed size, which is 0 if it is not packed.
+// Checks openvdb::io::DelayedLoadMetadata, which has a byte for each leaf and, if values are packed, the size of the
+// leaf's. Each array comes after its packed size, which is 0 if it is not packed.
 void check_delayed_load(VdbCursor& cursor, std::uint32_t size)
 {
     if (size == 0) return;
@@ -100,7 +101,7 @@ void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, 
 void check_metadata(VdbCursor& cursor)
 {
     for (auto left = cursor.take<std::uint32_t>(); left > 0; --left) {
-        cursor.text();  // the name
+        cursor.text();  // its name
         const std::string type = cursor.text();
         const auto size = cursor.take<std::uint32_t>();
         if (type == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
@@ -118,7 +119,7 @@ void check_metadata(VdbCursor& cursor)
 std::vector<std::uint16_t> check_topology(VdbCursor& cursor, const VdbValues& values)
 {
     using Origin = std::array<std::int32_t, 3>;
-    cursor.skip(sizeof(std::int32_t));  // of a time when a tree could have several buffers
+    cursor.skip(sizeof(std::int32_t));  // the number of buffers, which no longer matters
     cursor.skip(values.bytes);          // the background
     const auto tiles = cursor.take<std::uint32_t>(), children = cursor.take<std::uint32_t>();
     for (std::uint32_t tile = 0; tile < tiles; ++tile) {

@@ -1,11 +1,11 @@
-// Checks the sizes in a .vdb file that OpenVDB takes for granted.
+// Checks the sizes in a .vdb file on which OpenVDB relies.
 //
-// OpenVDB passes compressed data to Blosc, which reads as far as the data's own header says, and fills arrays as far as
-// the file says. A damaged size would therefore yield values from memory that was never written. These functions walk
-// over a grid without unpacking it and compare every size with the data it describes.
+// OpenVDB passes compressed data to Blosc, which reads as far as the header of the data says, and fills arrays as far
+// as the file says. A damaged size would therefore yield values from memory that was never written. These functions
+// walk over a grid without unpacking it and compare every size with the data that it describes.
 //
-// Format versions 223 and 224. Older files know neither Blosc nor points; a checked stream (vdb_file.h) is enough for
-// them.
+// They know the format versions 223 and 224. Older files have neither Blosc nor points; a stream that throws
+// (vdb_file.h) is enough for them.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 
 namespace rapid {
 
-// The file ends too early or contradicts itself.
+// The error of a file that ends too early or contradicts itself.
 inline Error damaged_vdb() { return Error("can't be read: it is cut or damaged"); }
 
 // A position in the file. Every function throws Error if the file ends before.
@@ -61,20 +61,21 @@ struct VdbValues {
     std::uint32_t compression = 0;  // OpenVDB's flags (openvdb/io/Compression.h)
 };
 
-// A chunk packed by Blosc, of the unpacked size. Point grids pad what is shorter than 128 bytes.
+// Checks a chunk that Blosc has packed against its size when unpacked. Grids of points pad shorter data to 128 bytes.
 enum class Padding { None, To128 };
 void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, Padding padding);
 
-// A list of metadata, up to its end.
+// Checks a list of metadata and moves the cursor to its end.
 void check_metadata(VdbCursor& cursor);
 
-// The nodes of a tree, up to their end. Returns the number of active voxels of each leaf, in OpenVDB's order.
+// Checks the nodes of a tree and moves the cursor to their end. Returns the number of active voxels of each leaf, in
+// OpenVDB's order.
 std::vector<std::uint16_t> check_topology(VdbCursor& cursor, const VdbValues& values);
 
-// The voxels of the leaves of a grid that is not one of points, up to their end.
+// Checks the voxels of the leaves of a grid of numbers or vectors and moves the cursor to their end.
 void check_voxels(VdbCursor& cursor, const VdbValues& values, std::span<const std::uint16_t> active);
 
-// The voxels and attributes of a grid of points, up to their end.
+// Checks the voxels and attributes of a grid of points and moves the cursor to their end.
 void check_points(VdbCursor& cursor, std::size_t leaves);
 
 }  // namespace rapid

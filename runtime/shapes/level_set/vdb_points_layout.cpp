@@ -1,4 +1,4 @@
-// The attributes of a grid of points (openvdb::points::PointDataLeafNode::readBuffers).
+// Checks the attributes of a grid of points (openvdb::points::PointDataLeafNode::readBuffers).
 //
 // They are stored in passes over the leaves: sizes, descriptors and arrays' metadata, the headers of each attribute's
 // pages, voxels, then the pages. A page holds the arrays of one attribute of several leaves.
@@ -23,7 +23,7 @@ struct StoredArray {
     bool is_paged = false, is_uniform = false;
 };
 
-// One list of attributes is usually shared by all leaves. Holds the bytes of a stored value of each.
+// The attributes of a leaf, by the bytes that a stored value of each takes. All leaves usually share one list.
 using Descriptor = std::vector<std::size_t>;
 
 Descriptor take_descriptor(VdbCursor& cursor)
@@ -115,7 +115,7 @@ private:
             if (attribute < arrays.size()) f(arrays[attribute]);
     }
 
-    // The headers of an attribute's pages, which end where arrays do.
+    // Returns the headers of an attribute's pages. Pages end where arrays do.
     std::vector<Page> take_pages(std::size_t attribute)
     {
         std::vector<Page> pages;
@@ -137,7 +137,7 @@ private:
         return pages;
     }
 
-    // The index of the last point in each voxel, of each leaf.
+    // Checks the voxels of each leaf, which hold the index after their last point.
     void check_voxels()
     {
         constexpr std::uint16_t not_packed = 0xffff;
@@ -169,7 +169,7 @@ private:
         });
     }
 
-    // An array that is in no page.
+    // Checks an array that is in no page.
     void check_single(const StoredArray& array)
     {
         const bool is_packed = !array.is_uniform && cursor_.take<std::uint8_t>() == 1;

@@ -51,19 +51,12 @@ void check_text_end(const std::filesystem::path& path)
     std::string extension = path.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (extension != ".stl" && extension != ".obj") return;
+    if (extension != ".stl") return;
     std::ifstream file(path, std::ios::binary);
     constexpr std::size_t most = 4096;
     const std::string end = read_at(file, size - std::min(size, most), std::min(size, most));
-    if (extension == ".obj") {
-        const bool is_whole = end.empty() || end.ends_with('\n') || end.ends_with('\r');
-        if (!is_whole && !last_line(end).starts_with('#'))
-            throw Error(
-                "there is no newline at its end, so that its last number may be cut short; if the file is whole, "
-                "append a newline (echo >> FILE)");
-    } else if (is_text_stl(file, size) && !last_line(end).starts_with("endsolid")) {
+    if (is_text_stl(file, size) && !last_line(end).starts_with("endsolid"))
         throw Error("the file ends early: its last line is not \"endsolid\"");
-    }
 }
 
 }  // namespace rapid

@@ -5,7 +5,7 @@
 
 namespace rapid {
 
-// Throws Error if an .stl that is text does not end with "endsolid", or an .obj within a line. Other files pass.
+// Throws Error if an .stl that is text does not end with "endsolid". Other files pass.
 void check_text_end(const std::filesystem::path& path);
 
 }  // namespace rapid

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <exception>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include "runtime/files/deflate.h"
@@ -140,6 +141,18 @@ namespace {
 
 Error damaged() { return Error("not a whole zip file: its directory is missing or damaged"); }
 
+// Whether the file has all of the record that ends it, "PK\5\6", and of the comment after the record. minizip does not
+// read the record's last bytes if there is one for 64 bits.
+bool has_whole_end(std::span<const unsigned char> bytes)
+{
+    constexpr std::size_t record = 22;
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::size_t begin = text.rfind("PK\5\6");
+    if (begin == std::string_view::npos || text.size() - begin < record) return false;
+    const std::size_t comment = bytes[begin + record - 2] + std::size_t{256} * bytes[begin + record - 1];
+    return text.size() - begin - record >= comment;
+}
+
 }  // namespace
 
 ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archive{bytes})
@@ -154,7 +167,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
     functions.zerror_file = [](void*, void*) { return 0; };
     functions.opaque = archive_.get();
     archive_->zip = ::unzOpen2_64("", &functions);
-    if (!archive_->zip) throw damaged();
+    if (!archive_->zip || !has_whole_end(bytes)) throw damaged();
 
     // What members say that they hold is no more than the file can, all together: they do not share bytes.
     std::uint64_t held = 0;

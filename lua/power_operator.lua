@@ -148,9 +148,7 @@ local function last_of_right(tokens, other, place)
   return place
 end
 
--- Returns the program with its operators ^ replaced by calls, or nil if it has none. Line numbers do not change.
-local function rewrite(text)
-  if not text:find("^", 1, true) then return nil end
+local function with_calls(text)
   local tokens = tokens_of(text)
   local other = pairs_of_brackets(tokens)
   -- By places of tokens: operators that become calls; how many calls begin and end there.
@@ -176,5 +174,17 @@ local function rewrite(text)
   parts[#parts + 1] = text:sub(behind)
   return table.concat(parts)
 end
+
+-- Returns the program with its operators ^ replaced by calls, or nil if it has none. Line numbers do not change. The
+-- loops run once for a file, so they are interpreted and do not count as hot.
+local function rewrite(text)
+  if not text:find("^", 1, true) then return nil end
+  local is_on = jit.status()
+  jit.off()
+  local rewritten = with_calls(text)
+  if is_on then jit.on() end
+  return rewritten
+end
+jit.off(rewrite)
 
 return { name = name, rewrite = rewrite }

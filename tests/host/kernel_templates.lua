@@ -24,10 +24,6 @@ local word, which = "a", "f"
 local shared = { x = 2.5, y = -1, list = { 7, 8, 9 }, inner = { x = -0.75, v = vec3(1, 2, 3), f = mixed }, word = "b" }
 ]]
 
--- Patterns of templates that are left out: the results of these operations differ between the interpreter, traces and
--- lanes.
-local excluded = { "math%.min", "math%.max", "math%.ceil", "clamp", "%^", "%(%-%$I" }
-
 -- Expressions without others in them, by kind. Those in `pointwise` are beyond programs of lanes.
 local atoms = {
   N = { "0", "1", "2", "0.5", "3", "(-1)", "(-0.3)", "1e-3", "7.25", "limit", "tiny", "zero", "minus_zero", "large",
@@ -128,30 +124,26 @@ templates.observations = {
   F = "p.f = sound(%s(p.f))",
 }
 
-local function without_excluded(list, further)
-  local kept = {}
+local function joined(list, further)
+  local all = {}
   for _, each in ipairs { list, further } do
-    for _, template in ipairs(each) do
-      local is_kept = true
-      for _, pattern in ipairs(excluded) do is_kept = is_kept and not template:find(pattern) end
-      if is_kept then kept[#kept + 1] = template end
-    end
+    for _, template in ipairs(each) do all[#all + 1] = template end
   end
-  return kept
+  return all
 end
 
 -- Returns a function that takes only_lanes and returns the lists by kind.
 local function by_kind(lists)
   local found = { [true] = {}, [false] = {} }
   for kind in pairs(templates.plain) do
-    found[true][kind] = without_excluded(lists[kind], {})
-    found[false][kind] = without_excluded(lists[kind], lists.pointwise[kind] or {})
+    found[true][kind] = lists[kind]
+    found[false][kind] = joined(lists[kind], lists.pointwise[kind] or {})
   end
   return function(only_lanes) return found[only_lanes] end
 end
 templates.atoms, templates.composed = by_kind(atoms), by_kind(composed)
 
-local all_stores = { [true] = without_excluded(stores, {}), [false] = without_excluded(stores, stores.pointwise) }
+local all_stores = { [true] = stores, [false] = joined(stores, stores.pointwise) }
 function templates.stores(only_lanes) return all_stores[only_lanes] end
 
 -- Special and other values of all types, for the points of a scene.

@@ -89,15 +89,14 @@ void load(StateReader& from, PointSet& points)
     };
     // A set without a value of its own for any point says how large it is, and nothing bears it out.
     StateReader::expect(size <= most_alike || std::any_of(columns.begin(), columns.end(), has_values));
-    loaded.append(size);
-    for (auto& [name, any] : columns) {
-        if (std::visit([](const auto& column) { return column.size(); }, any) != size) StateReader::fail();
-        loaded.set(name, std::move(any));
-    }
-    for (auto& [name, members] : groups) {
+    for (const auto& [name, any] : columns)
+        StateReader::expect(std::visit([](const auto& column) { return column.size(); }, any) == size);
+    for (const auto& [name, members] : groups)
         StateReader::expect(members.size() == size && are_memberships(members));
-        loaded.group(name) = std::move(members);
-    }
+    // Every size is checked by now: to append points takes time in proportion to their number.
+    loaded.append(size);
+    for (auto& [name, any] : columns) loaded.set(name, std::move(any));
+    for (auto& [name, members] : groups) loaded.group(name) = std::move(members);
     points = std::move(loaded);
 }
 

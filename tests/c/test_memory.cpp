@@ -86,7 +86,7 @@ TEST_CASE("memory that is refused in any call is an error of that call, and the 
     std::string list;
     for (long k = 0; k < faults; ++k) list += "alloc:" + std::to_string(1 + k * requests / faults) + ":12\n";
     folder.write("list", list);
-    REQUIRE(runs(folder.path(), "RAPID_FAULT_LIST=list", 2));
+    REQUIRE(runs(folder.path(), "RAPID_FAULT_LIST=list", 3));
     std::ifstream statuses(folder / "said");
     long count = 0;
     for (int k = 0, status = 0; statuses >> k >> status; ++count) {

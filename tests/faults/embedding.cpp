@@ -1,6 +1,5 @@
-// A program that embeds Rapid and does a bit of everything, for tests/c/test_memory.cpp: a call that fails does so for
-// want of memory, or because the one before it did; and behind all that a scene opens and runs. Exit status 0: so it
-// was.
+// A program that embeds Rapid and calls each of its functions, for tests/c/test_memory.cpp. A call fails only if memory
+// is refused, or because an earlier call failed; the run after one that failed passes. It exits with 0 if that holds.
 #include <cstdio>
 #include <cstdlib>
 
@@ -140,14 +139,18 @@ void run(rapid_offers* offers)
 
 int main(int count, char** arguments)
 {
-    const int times = count > 1 ? std::atoi(arguments[1]) : 2;  // by the second time all is well
-    for (int time = 0; time < times; ++time) {
+    // The request that is refused may fall into the second run, if the first makes fewer than the one that was counted.
+    const int most = count > 1 ? std::atoi(arguments[1]) : 3;
+    bool failed_before = false;
+    for (int run_number = 0; run_number < most; ++run_number) {
         has_failed = false;
         rapid_offers* offers = nullptr;
         if (done("offers_new", rapid_offers_new(&offers, &error))) offer(offers);
         run(offers);
         if (offers) rapid_offers_release(offers, nullptr);
+        if (failed_before && !has_failed) break;
+        failed_before = has_failed;
     }
-    if (has_failed) std::printf("a scene does not run behind the one that failed\n");
+    if (has_failed) std::printf("a scene does not run after the one that failed\n");
     return is_right && !has_failed ? 0 : 1;
 }

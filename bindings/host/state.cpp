@@ -49,6 +49,35 @@ void leave_out_current_folder(lua_State* L)
     lua_pop(L, 1);
 }
 
+// LuaJIT's description of its bytecode, in one of the folders of package.path; empty if it is in none of them.
+std::filesystem::path bytecode_description(lua_State* L)
+{
+    lua_getglobal(L, "package");
+    lua_getfield(L, -1, "path");
+    const std::string all = text_at(L, -1);
+    lua_pop(L, 2);
+    for (std::size_t begin = 0; begin < all.size();) {
+        const std::size_t end = std::min(all.find(';', begin), all.size());
+        std::string file = all.substr(begin, end - begin);
+        if (const std::size_t mark = file.find('?'); mark != file.npos) file.replace(mark, 1, "jit/vmdef");
+        if (std::filesystem::exists(file)) return file;
+        begin = end + 1;
+    }
+    return {};
+}
+
+// Lets require(name) run the file.
+void preload(lua_State* L, const std::string& name, const std::filesystem::path& file)
+{
+    lua_getglobal(L, "package");
+    lua_getfield(L, -1, "preload");
+    const std::string text = read_text(file);
+    if (luaL_loadbuffer(L, text.data(), text.size(), fmt::format("=[rapid {}]", name).c_str()) != 0)
+        throw Error(lua_tostring(L, -1));
+    lua_setfield(L, -2, name.c_str());
+    lua_pop(L, 2);
+}
+
 }  // namespace
 
 State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host.interruption)
@@ -159,15 +188,10 @@ void State::open_libraries()
     for (const char* name :
          {"elementary", "describe", "engine_errors", "vec3",    "bytecode", "lane_program", "lane_calls",
           "lanes",      "kernel",   "detail",        "numeric", "shape",    "ramp",         "power_operator",
-          "protected",  "sandbox",  "shared_state",  "study",   "text",     "rapid"}) {
-        lua_getglobal(L_, "package");
-        lua_getfield(L_, -1, "preload");
-        const std::string text = read_text(folder / (std::string(name) + ".lua"));
-        if (luaL_loadbuffer(L_, text.data(), text.size(), fmt::format("=[rapid {}]", name).c_str()) != 0)
-            throw Error(lua_tostring(L_, -1));
-        lua_setfield(L_, -2, name);
-        lua_pop(L_, 2);
-    }
+          "protected",  "sandbox",  "shared_state",  "study",   "text",     "rapid"})
+        preload(L_, name, folder / (std::string(name) + ".lua"));
+    // Its own loader takes a file that memory is refused for as one that is not there.
+    if (const auto file = bytecode_description(L_); !file.empty()) preload(L_, "jit.vmdef", file);
 }
 
 void State::run_host_file()

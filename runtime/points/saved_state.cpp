@@ -91,8 +91,7 @@ void load(StateReader& from, PointSet& points)
     StateReader::expect(size <= most_alike || std::any_of(columns.begin(), columns.end(), has_values));
     for (const auto& [name, any] : columns)
         StateReader::expect(std::visit([](const auto& column) { return column.size(); }, any) == size);
-    for (const auto& [name, members] : groups)
-        StateReader::expect(members.size() == size && are_memberships(members));
+    for (const auto& [name, members] : groups) StateReader::expect(members.size() == size && are_memberships(members));
     // Every size is checked by now: to append points takes time in proportion to their number.
     loaded.append(size);
     for (auto& [name, any] : columns) loaded.set(name, std::move(any));

@@ -23,7 +23,7 @@ PointSet some_points(std::size_t size)
     return points;
 }
 
-PointSet part_of(const PointSet& points, std::size_t begin, std::size_t end)
+PointSet slice_of(const PointSet& points, std::size_t begin, std::size_t end)
 {
     std::vector<std::uint32_t> places(end - begin);
     std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
@@ -32,9 +32,9 @@ PointSet part_of(const PointSet& points, std::size_t begin, std::size_t end)
 
 void write_in_pieces(const std::filesystem::path& path, const PointSet& points, const std::vector<std::size_t>& ends)
 {
-    PointFile file(path, part_of(points, 0, 0));
+    PointFile file(path, slice_of(points, 0, 0));
     std::size_t begin = 0;
-    for (const std::size_t end : ends) file.append(part_of(points, std::exchange(begin, end), end));
+    for (const std::size_t end : ends) file.append(slice_of(points, std::exchange(begin, end), end));
     CHECK_FALSE(std::filesystem::exists(path));
     file.finish();
 }
@@ -60,9 +60,9 @@ TEST_CASE("pieces stay in the order in which they come", "[io][pieces]")
     const TemporaryFolder folder;
     const PointSet points = some_points(6);
     for (const std::string name : {"a.csv", "a.bgeo"}) {
-        PointFile file(folder / name, part_of(points, 0, 0));
-        file.append(part_of(points, 3, 6));
-        file.append(part_of(points, 0, 3));
+        PointFile file(folder / name, slice_of(points, 0, 0));
+        file.append(slice_of(points, 3, 6));
+        file.append(slice_of(points, 0, 3));
         file.finish();
         const PointSet read = read_points(folder / name);
         CHECK(std::vector<std::int64_t>(read.id().read().data, read.id().read().data + 6) ==

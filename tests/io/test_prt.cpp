@@ -22,7 +22,7 @@ T number_at(const std::string& text, std::size_t at)
 }
 
 template <class T>
-std::string bytes_of(T value)
+std::string value_bytes(T value)
 {
     return {reinterpret_cast<const char*>(&value), sizeof value};
 }
@@ -44,13 +44,13 @@ struct OtherFile {
 
     std::string text() const
     {
-        std::string text = magic + bytes_of(static_cast<std::int32_t>(56 + more_header.size())) +
-                           padded("Extensible Particle Format", 32) + bytes_of(version) + bytes_of(points) +
-                           more_header + bytes_of(std::int32_t{4}) +
-                           bytes_of(static_cast<std::int32_t>(channels.size())) + bytes_of(std::int32_t{44});
+        std::string text = magic + value_bytes(static_cast<std::int32_t>(56 + more_header.size())) +
+                           padded("Extensible Particle Format", 32) + value_bytes(version) + value_bytes(points) +
+                           more_header + value_bytes(std::int32_t{4}) +
+                           value_bytes(static_cast<std::int32_t>(channels.size())) + value_bytes(std::int32_t{44});
         for (const Channel& c : channels) {
             text += padded(c.name, 32);
-            for (const std::int32_t number : {c.type, c.numbers, c.offset}) text += bytes_of(number);
+            for (const std::int32_t number : {c.type, c.numbers, c.offset}) text += value_bytes(number);
         }
         std::string packed(::compressBound(records.size()), '\0');
         uLongf size = packed.size();
@@ -141,11 +141,11 @@ TEST_CASE("a .prt of another program is read: halves, doubles, a longer header, 
                      {"Serial", 8, 1, 44},  {"Short", 0, 1, 6}, {"Matrix", 4, 17, 52}};
     for (int i = 0; i < 2; ++i) {
         // Half a and 1: 0x3800, 0x3c00; the largest half, 65504: 0x7bff.
-        file.records += bytes_of<std::uint16_t>(0x3800) + bytes_of<std::uint16_t>(0x3c00) +
-                        bytes_of<std::uint16_t>(0x7bff) + bytes_of<std::int16_t>(-5);
-        for (const double x : {1.0, 2.0, 3.0 + i}) file.records += bytes_of(x);
-        for (const float x : {0.25f, 0.75f, 0.5f}) file.records += bytes_of(x);
-        file.records += bytes_of(std::uint64_t{1} << 40) + std::string(17 * 4, 'x');
+        file.records += value_bytes<std::uint16_t>(0x3800) + value_bytes<std::uint16_t>(0x3c00) +
+                        value_bytes<std::uint16_t>(0x7bff) + value_bytes<std::int16_t>(-5);
+        for (const double x : {1.0, 2.0, 3.0 + i}) file.records += value_bytes(x);
+        for (const float x : {0.25f, 0.75f, 0.5f}) file.records += value_bytes(x);
+        file.records += value_bytes(std::uint64_t{1} << 40) + std::string(17 * 4, 'x');
     }
     folder.write("a.prt", file.text());
 

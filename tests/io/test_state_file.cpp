@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-PointSet some_points()
+PointSet kept_points()
 {
     test::Points points({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}});
     points.set<float>("heat", {1, 2, 3}).set<std::int32_t>("bin", {-1, 0, 7}).group("hot", {0, 2});
@@ -32,7 +32,7 @@ fs::path written(const test::TemporaryFolder& folder, const SavedState& state)
 TEST_CASE("a state that is read from its file is the one that was written", "[state]")
 {
     const test::TemporaryFolder folder;
-    for (const SavedState& state : {state_of(some_points()), SavedState(), state_of(PointSet())}) {
+    for (const SavedState& state : {state_of(kept_points()), SavedState(), state_of(PointSet())}) {
         const StateFile file(written(folder, state));
         CHECK(file.state() == state);
         CHECK(file.header().at("frame") == 12);
@@ -45,7 +45,7 @@ TEST_CASE("a state that is read from its file is the one that was written", "[st
 TEST_CASE("the header of a state's file can be read as text", "[state]")
 {
     const test::TemporaryFolder folder;
-    const std::string text = test::file_text(written(folder, state_of(some_points())));
+    const std::string text = test::file_text(written(folder, state_of(kept_points())));
     CHECK(text.substr(0, 8) == "\x89RAPID\r\n");
     CHECK(text.find("\"frame\": 12") != std::string::npos);
     CHECK(text.find("\"type\": \"vec3\"") != std::string::npos);
@@ -81,7 +81,7 @@ TEST_CASE("columns of several pieces are kept, those that compress and those tha
 TEST_CASE("a file with any bit flipped, or torn anywhere, is refused", "[state]")
 {
     const test::TemporaryFolder folder;
-    const std::string text = test::file_text(written(folder, state_of(some_points())));
+    const std::string text = test::file_text(written(folder, state_of(kept_points())));
     const auto refused = [&](const std::string& other) {
         const fs::path path = folder.write("damaged", other);
         return !test::error_of([&] { StateFile(path).state(); }).empty();

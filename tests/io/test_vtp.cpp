@@ -11,7 +11,7 @@ using namespace rapid::test;
 namespace {
 
 template <class T>
-std::string bytes_of(std::initializer_list<T> values)
+std::string raw_bytes(std::initializer_list<T> values)
 {
     return {reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(T)};
 }
@@ -91,10 +91,10 @@ TEST_CASE("a .vtp has the XML and the appended arrays of VTK's PolyData, and a c
         CHECK(text.find(part) != std::string::npos);
     }
     const std::string data =
-        bytes_of<std::uint64_t>({24}) + bytes_of<float>({4, 5, 6, 4, 5, 6}) + bytes_of<std::uint64_t>({16}) +
-        bytes_of<std::int64_t>({7, -1}) + bytes_of<std::uint64_t>({2}) + std::string("\0\1", 2) +
-        bytes_of<std::uint64_t>({24}) + bytes_of<float>({0, 0, 0, 1, 2, 3}) + bytes_of<std::uint64_t>({16}) +
-        bytes_of<std::int64_t>({0, 1}) + bytes_of<std::uint64_t>({8}) + bytes_of<std::int64_t>({2});
+        raw_bytes<std::uint64_t>({24}) + raw_bytes<float>({4, 5, 6, 4, 5, 6}) + raw_bytes<std::uint64_t>({16}) +
+        raw_bytes<std::int64_t>({7, -1}) + raw_bytes<std::uint64_t>({2}) + std::string("\0\1", 2) +
+        raw_bytes<std::uint64_t>({24}) + raw_bytes<float>({0, 0, 0, 1, 2, 3}) + raw_bytes<std::uint64_t>({16}) +
+        raw_bytes<std::int64_t>({0, 1}) + raw_bytes<std::uint64_t>({8}) + raw_bytes<std::int64_t>({2});
     const std::string begin = "<AppendedData encoding=\"raw\">_";
     const std::size_t at = text.find(begin);
     REQUIRE(at != std::string::npos);
@@ -113,7 +113,7 @@ TEST_CASE("a .vtp of another program is read: text, base64, compressed, big-endi
         return points;
     };
     const std::string three = "type=\"Float64\" NumberOfComponents=\"3\" format=\"binary\">\n";
-    const std::string data = bytes_of<double>({0, 1, 2, 3, 4, 0.5});
+    const std::string data = raw_bytes<double>({0, 1, 2, 3, 4, 0.5});
 
     const PointSet text =
         read(file_of("", ascii_points,
@@ -127,12 +127,12 @@ TEST_CASE("a .vtp of another program is read: text, base64, compressed, big-endi
     CHECK(text.column_names() == std::vector<std::string>{"P", "id", "serial", "uv0", "uv1", "v"});
     CHECK(text.id()[1] == 1);
 
-    read(file_of("", three + base64(bytes_of<std::uint32_t>({48}) + data)));
-    read(file_of("header_type=\"UInt64\"", three + base64(bytes_of<std::uint64_t>({48}) + data)));
+    read(file_of("", three + base64(raw_bytes<std::uint32_t>({48}) + data)));
+    read(file_of("header_type=\"UInt64\"", three + base64(raw_bytes<std::uint64_t>({48}) + data)));
 
     // Two blocks of 40 and 8 bytes.
     const std::string first = zlib(data.substr(0, 40)), second = zlib(data.substr(40));
-    const std::string header = bytes_of<std::uint32_t>(
+    const std::string header = raw_bytes<std::uint32_t>(
         {2, 40, 8, static_cast<std::uint32_t>(first.size()), static_cast<std::uint32_t>(second.size())});
     const std::string compressor = "compressor=\"vtkZLibDataCompressor\"";
     read(file_of(compressor, three + base64(header) + base64(first + second)));
@@ -143,7 +143,7 @@ TEST_CASE("a .vtp of another program is read: text, base64, compressed, big-endi
         compressor, appended, "",
         "<AppendedData encoding=\"base64\">\n _abc" + base64(header) + base64(first + second) + "</AppendedData>"));
 
-    std::string swapped = bytes_of<std::uint32_t>({48}) + data;
+    std::string swapped = raw_bytes<std::uint32_t>({48}) + data;
     std::reverse(swapped.begin(), swapped.begin() + 4);
     for (int i = 0; i < 6; ++i) std::reverse(swapped.begin() + 4 + 8 * i, swapped.begin() + 12 + 8 * i);
     read(file_of("byte_order=\"BigEndian\"", three + base64(swapped)));
@@ -168,9 +168,9 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
                Catch::EndsWith("the array \"\" of 2 rows: the array ends early"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 five")),
                Catch::EndsWith("the array has no number of its type where it should have its 5"));
-    CHECK_THAT(error(file_of("", three + base64(bytes_of<std::uint32_t>({20}) + std::string(20, '\0')))),
+    CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({20}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
-    CHECK_THAT(error(file_of("", three + base64(bytes_of<std::uint32_t>({24}) + std::string(20, '\0')))),
+    CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({24}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("", three + std::string(40, '*'))), Catch::EndsWith("the array is no base64"));
     CHECK_THAT(error(file_of("", "type=\"Int32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 5")),
@@ -178,7 +178,7 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\">")),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("compressor=\"vtkZLibDataCompressor\"",
-                             three + base64(bytes_of<std::uint32_t>({0xffffffff, 1, 1})))),
+                             three + base64(raw_bytes<std::uint32_t>({0xffffffff, 1, 1})))),
                Catch::EndsWith("the array ends early"));
     // One byte that promises a gigabyte.
     std::string promising = file_of("", ascii_points);

@@ -30,7 +30,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
     return text;
 }
 
-std::string bytes_of(const std::string& name, const PointSet& points)
+std::string written_bytes(const std::string& name, const PointSet& points)
 {
     const TemporaryFolder folder;
     write_points(folder / name, points);
@@ -73,7 +73,7 @@ TEST_CASE("an id that is no whole number is an error, in every format that can h
     points.add({"jd", id});
     const auto renamed = [&](const std::string& file, const std::string& ids, const std::string& others,
                              const std::string& made, const std::string& becomes) {
-        return error_in(file, replaced(replaced(bytes_of(file, points), ids, others), made, becomes));
+        return error_in(file, replaced(replaced(written_bytes(file, points), ids, others), made, becomes));
     };
     CAPTURE(id);
     using Catch::Contains;
@@ -139,23 +139,23 @@ TEST_CASE("a count that is more than the file holds is an error, where the produ
     const auto number = std::stoull(count);
     const std::string little(reinterpret_cast<const char*>(&number), sizeof number);
 
-    const std::string one = bytes_of("a.ply", points);
+    const std::string one = written_bytes("a.ply", points);
     for (const std::string& text : {ply("uchar", "kind", "1"), one}) {
         std::string promising = text;
         promising.replace(promising.find("vertex 1\n"), 8, "vertex " + count);
         CHECK_THAT(error_in("a.ply", promising), Contains("the file ends early: its header promises " + count));
     }
-    std::string array = bytes_of("a.npz", points);
+    std::string array = written_bytes("a.npz", points);
     array = replaced(array, "(1, 3), }" + std::string(count.size() - 1, ' '), "(" + count + ", 3), }");
     CHECK_THAT(error_in("a.npz", array), Contains("P.npy"));
-    std::string krakatoa = bytes_of("a.prt", points);
+    std::string krakatoa = written_bytes("a.prt", points);
     krakatoa.replace(8 + 4 + 32 + 4, 8, little);
     CHECK_THAT(error_in("a.prt", krakatoa), Contains(number >> 63 ? "never completed" : "the file ends early"));
     CHECK_THAT(error_in("a.vtp", vtp("UInt8", "1", count)), Contains("the array ends early"));
-    std::string raw = bytes_of("a.vtp", points);
+    std::string raw = written_bytes("a.vtp", points);
     raw.replace(raw.find("NumberOfPoints=\"1\""), 18, "NumberOfPoints=\"" + count + "\"");
     CHECK_THAT(error_in("a.vtp", raw), Contains("the array ends early"));
-    std::string houdini = bytes_of("a.bgeo", points);
+    std::string houdini = written_bytes("a.bgeo", points);
     houdini.replace(9, 4, "\xff\xff\xff\xff");
     CHECK_THAT(error_in("a.bgeo", houdini), Contains("its header promises 4294967295 points, it holds 1"));
 }
@@ -167,7 +167,7 @@ TEST_CASE("a mark of the byte order loses nothing, in every format of text", "[i
     for (const char* name : {"a.csv", "a.ply", "a.usda", "a.vtp", "a.obj"}) {
         CAPTURE(name);
         const TemporaryFolder folder;
-        folder.write(name, mark + bytes_of(name, points));
+        folder.write(name, mark + written_bytes(name, points));
         const PointSet marked = read_points(folder / name);
         write_points(folder / name, points);
         CHECK(differing_columns(marked, read_points(folder / name)) == "");
@@ -179,7 +179,7 @@ TEST_CASE("a file that is cut within its last number is an error, in every forma
     const PointSet points = Points({{0, 0, 0.5f}, {1, 2, 3.25f}});
     for (const char* name : {"a.csv", "a.usda", "a.vtp"}) {
         CAPTURE(name);
-        const std::string whole = bytes_of(name, points);
+        const std::string whole = written_bytes(name, points);
         const std::size_t end = whole.find_last_of("0123456789");
         CHECK(error_in(name, whole) == "");
         CHECK(error_in(name, whole.substr(0, end)) != "");
@@ -216,8 +216,8 @@ TEST_CASE("two attributes of one name are an error, in every format that can hol
     const std::string message = "two columns would be called \"heat\"";
     for (const char* name : {"a.csv", "a.bgeo", "a.npz", "a.ply", "a.prt", "a.vtp"}) {
         CAPTURE(name);
-        CHECK_THAT(error_in(name, replaced(bytes_of(name, points), "cold", "heat")), Catch::Contains(message));
+        CHECK_THAT(error_in(name, replaced(written_bytes(name, points), "cold", "heat")), Catch::Contains(message));
     }
-    CHECK_THAT(error_in("a.usda", replaced(bytes_of("a.usda", points), "cold", "heat")),
+    CHECK_THAT(error_in("a.usda", replaced(written_bytes("a.usda", points), "cold", "heat")),
                Catch::Contains("primvars:heat.timeSamples is there twice"));
 }

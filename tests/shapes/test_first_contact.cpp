@@ -19,7 +19,7 @@ Contact meet(const ShapePtr& shape, const Path& path)
     return contact;
 }
 
-double distance(const ShapePtr& shape, const Vec3d& P)
+double distance_to(const ShapePtr& shape, const Vec3d& P)
 {
     double phi;
     shape->distance({&P, 1}, {&phi, 1}, {});
@@ -110,11 +110,11 @@ void require_first(const ShapePtr& shape, const Path& path, const Contact& conta
 {
     const double until = std::min(contact.time, path.duration);
     double lowest = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < 2000; ++k) lowest = std::min(lowest, distance(shape, on_path(path, until * k / 2000)));
+    for (int k = 0; k < 2000; ++k) lowest = std::min(lowest, distance_to(shape, on_path(path, until * k / 2000)));
     REQUIRE(lowest >= path.radius - tolerance);
     if (contact.time == Contact::none) return;
     REQUIRE(contact.time <= path.duration);
-    REQUIRE(distance(shape, on_path(path, contact.time)) == Approx(path.radius).margin(tolerance));
+    REQUIRE(distance_to(shape, on_path(path, contact.time)) == Approx(path.radius).margin(tolerance));
     REQUIRE(contact.n.norm() == Approx(1));
 }
 
@@ -128,7 +128,7 @@ TEST_CASE("parabolas meet spheres and boxes where they first touch them", "[firs
     for (int i = 0; i < 300; ++i) {
         const double radius = i % 3 ? random.in(0, 0.3) : 0;
         const Path path = path_to({0.1, 0.2, 0.3}, random, radius);
-        if (distance(shape, path.P) < radius) continue;
+        if (distance_to(shape, path.P) < radius) continue;
         CAPTURE(i);
         const Contact contact = meet(shape, path);
         require_first(shape, path, contact, 1e-9);
@@ -145,7 +145,7 @@ TEST_CASE("a point flush with a surface is outside it", "[first_contact]")
     const double off = GENERATE(-1e-7, 0.0, 1e-7);  // the rounding of a position to single precision
     CAPTURE(shape->kind(), off);
     Vec3d P(0, 1, 0);
-    P.y() += off - distance(shape, P);  // on the field's own surface, where that is not exactly at 1
+    P.y() += off - distance_to(shape, P);  // on the field's own surface, where that is not exactly at 1
     const Vec3d pull(0, -9.81, 0), none(0, 0, 0);
 
     CHECK(meet(shape, {P, {0, 1, 0}, none, 1, 0}).time == Contact::none);    // leaves
@@ -202,7 +202,7 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
     for (int i = 0; i < 200; ++i) {
         const double radius = i % 3 ? random.in(0, 0.1) : 0;
         const Path path = path_to({0.1, 0.2, 0.3}, random, radius);
-        if (distance(shape, path.P) < radius) continue;
+        if (distance_to(shape, path.P) < radius) continue;
         CAPTURE(i);
         const Contact contact = meet(shape, path);
         met += contact.time != Contact::none;
@@ -210,7 +210,7 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
         // half as deep as it is long at an edge.
         require_first(shape, path, contact, 7e-3);
         if (contact.time != Contact::none)
-            REQUIRE(distance(shape, on_path(path, contact.time)) == Approx(radius).margin(1e-6));
+            REQUIRE(distance_to(shape, on_path(path, contact.time)) == Approx(radius).margin(1e-6));
     }
     CHECK(met > 40);
 }

@@ -12,6 +12,9 @@
 
 namespace rapid::test {
 
+constexpr double g = 9.81;      // m/s^2
+constexpr double h = 1.0 / 24;  // s, of a frame
+
 // An acceleration by place, velocity and time: asked at the middle of every sub-step.
 template <class F>
 class LocalForce : public Force {

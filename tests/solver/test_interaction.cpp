@@ -6,13 +6,14 @@
 #include <random>
 
 #include "tests/solver/motion/uniform_force.h"
+#include "tests/solver/scene.h"
 #include "tests/test.h"
 
 using namespace rapid;
 
 namespace {
 
-constexpr double h = 1.0 / 24;
+using test::h;
 
 Dynamics among(double radius, float separation, float cohesion, float alignment, float drag)
 {
@@ -40,7 +41,7 @@ void advance(PointSet& points, const Dynamics& interaction, double frame = h)
     interact(points, interaction, options);
 }
 
-PointSet cloud(std::size_t n, float size, float speed)
+PointSet moving_cloud(std::size_t n, float size, float speed)
 {
     std::mt19937 random(5);
     std::uniform_real_distribution<float> u(-1, 1);
@@ -137,7 +138,7 @@ TEST_CASE("two points that attract each other oscillate about their centre, seco
 
 TEST_CASE("interactions of unequal masses and ages conserve momentum", "[interaction]")
 {
-    PointSet points = cloud(500, 1, 2);
+    PointSet points = moving_cloud(500, 1, 2);
     points.set("dt", Column<float>(points.size(), float(h)));
     const auto dt = points.column<float>("dt").write();
     for (std::size_t i = 0; i < points.size(); i += 3) dt[i] = static_cast<float>(h * 0.001 * double(i));
@@ -153,7 +154,7 @@ TEST_CASE("interactions of unequal masses and ages conserve momentum", "[interac
 TEST_CASE("alignment and drag never add energy, at any rate", "[interaction]")
 {
     const float rate = GENERATE(1e-3f, 1.0f, 100.0f, 1e9f);
-    PointSet points = cloud(300, 0.5f, 2);
+    PointSet points = moving_cloud(300, 0.5f, 2);
     const Dynamics interaction = among(0.6, 0, 0, rate, rate);
     SolveOptions options;
     options.h = h;
@@ -168,7 +169,7 @@ TEST_CASE("no strength blows up: a crowd that separates moves no faster than the
           "[interaction][extreme]")
 {
     const float strength = GENERATE(1.0f, 1e4f, 1e12f);
-    PointSet points = cloud(200, 0.2f, 0);
+    PointSet points = moving_cloud(200, 0.2f, 0);
     const Dynamics interaction = among(0.5, strength, strength, 0, 0);
     for (int frame = 0; frame < 200; ++frame) advance(points, interaction);
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -190,7 +191,7 @@ TEST_CASE("an interaction has the same bits on any number of threads", "[interac
     std::vector<PointSet> results;
     for (const std::size_t threads : {1, 2, 7}) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        PointSet points = cloud(20000, 2, 1);
+        PointSet points = moving_cloud(20000, 2, 1);
         advance(points, among(0.15, 5, 3, 2, 1));
         results.push_back(points);
     }

@@ -20,11 +20,11 @@ using test::points;
 using test::same_bits;
 using test::Scene;
 
-constexpr double g = 9.81;
+using test::g;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-std::string error_of(Scene& scene)
+std::string solve_error(Scene& scene)
 {
     try {
         scene.run(1);
@@ -185,7 +185,7 @@ TEST_CASE("a point that is not finite stops the step, and is named", "[solve]")
     if (with_collider) scene.floor();
     scene.options.frame = 30;
 
-    CHECK(error_of(scene) ==
+    CHECK(solve_error(scene) ==
           "point 4500, frame 31: v is {0, " + text +
               ", 1} before the step; a node before this one made it so; it has P = {0, 1, 0}, v = {0, " + text +
               ", 1}");
@@ -205,7 +205,7 @@ TEST_CASE("points at rest on which nothing acts stay, without a write", "[solve]
     {
         positions[4500] = {1, nan, 3};
         scene.points = points(positions);
-        CHECK(error_of(scene) ==
+        CHECK(solve_error(scene) ==
               "point 4500, frame 4: P is {1, nan, 3} before the step; a node before this one made it so; it has P = "
               "{1, nan, 3}, v = {0, 0, 0}");
     }
@@ -223,7 +223,7 @@ TEST_CASE("a velocity that becomes infinite in the step stops it, and is named",
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{0, 0, 0}, {3e38f, 0, 0}}));
     scene.gravity({3e38, 0, 0}).frame_length(1);
-    CHECK(error_of(scene) ==
+    CHECK(solve_error(scene) ==
           "point 1, frame 1: P became {inf, 0, 0} in the step; the frame was not written; it has P = {inf, 0, 0}, v = "
           "{inf, 0, 0}");
 }
@@ -235,7 +235,7 @@ TEST_CASE("a point that becomes infinite in the step is named with the values it
         [](const Chunk& chunk, std::size_t i) { return chunk.P[i].x() > 1 ? Vec3d(0, 1e300, 0) : Vec3d(0, 0, 0); });
     scene.options.substeps = 3;
     CHECK(
-        error_of(scene) ==
+        solve_error(scene) ==
         "point 1, frame 1: P became {5, inf, 0} in the step; the frame was not written; it had P = {5, 0, 0}, v = {0, "
         "2, 0}, heat = 7, in \"hot\"");
 }
@@ -245,7 +245,7 @@ TEST_CASE("a force that is not finite is named, with the point", "[solve]")
     Scene scene(points({{0, 0, 0}, {1, 0, 0}}));
     scene.force([](const Chunk& chunk, std::size_t i) { return Vec3d(1 / (chunk.P[i].x() - 1), 0, 0); });
     CHECK(
-        error_of(scene) ==
+        solve_error(scene) ==
         "node \"push1\": point 1, frame 1: its acceleration became {inf, 0, 0}; the frame was not written; it had P = "
         "{1, 0, 0}, v = {0, 0, 0}");
 }
@@ -253,7 +253,7 @@ TEST_CASE("a force that is not finite is named, with the point", "[solve]")
 TEST_CASE("a force needs a mass above 0", "[solve]")
 {
     Scene scene(points({{0, 0, 0}}).set<Vec3f>("force", {{1, 0, 0}}).set<float>("mass", {0}));
-    CHECK(error_of(scene) ==
+    CHECK(solve_error(scene) ==
           "point 0, frame 1: a force of {1, 0, 0} on a mass of 0; the force must be finite and the mass above 0");
 }
 
@@ -261,7 +261,7 @@ TEST_CASE("a collider whose attribute is missing is named", "[solve]")
 {
     Scene scene(points({{0, 1, 0}}).set<float>("bouncy", {0.5f}));
     scene.collide(make_plane({0, 1, 0}, 0), PerPoint<float>::of("bounzy"));
-    CHECK(error_of(scene) == "node \"collide1\": no attribute \"bounzy\"; did you mean \"bouncy\"?");
+    CHECK(solve_error(scene) == "node \"collide1\": no attribute \"bounzy\"; did you mean \"bouncy\"?");
 }
 
 // Points all over a scene with a floor, a ball and a box, some of them newborn.

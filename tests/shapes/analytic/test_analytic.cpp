@@ -29,7 +29,7 @@ Asked ask(const ShapePtr& shape, const Vec3d& P)
 }
 
 template <class F>
-std::string error_of(const F& f)
+std::string message_of(const F& f)
 {
     try {
         f();
@@ -84,13 +84,13 @@ TEST_CASE("the distance of a box is that of its nearest face, edge or corner", "
 
 TEST_CASE("shapes without a size are refused, with the value given", "[analytic]")
 {
-    CHECK(error_of([] {
+    CHECK(message_of([] {
               make_plane({0, 0, 0}, 1);
           }) == "normal of a plane = {0, 0, 0} has no direction; any length but zero is right");
-    CHECK(error_of([] {
+    CHECK(message_of([] {
               make_sphere_shape(0, {0, 0, 0});
           }) == "radius of a sphere = 0 is out of range; it must be above 0");
-    CHECK(error_of([] {
+    CHECK(message_of([] {
               make_box_shape({1, -2, 1}, {0, 0, 0});
           }) == "size of a box = {1, -2, 1} is out of range; each edge must be above 0");
 }
@@ -145,7 +145,7 @@ TEST_CASE("births fall on the faces of a box in proportion to their areas", "[an
 
 TEST_CASE("births on a plane are refused, with the shapes that allow them", "[analytic]")
 {
-    CHECK_THAT(error_of([] {
+    CHECK_THAT(message_of([] {
                    scatter_on_surface(make_plane({0, 1, 0}, 0));
                }),
                Catch::Contains("a plane has no finite surface"));

@@ -14,8 +14,8 @@ using namespace rapid::test;
 
 namespace {
 
-struct Folder : TemporaryFolder {
-    Folder() { openvdb::initialize(); }
+struct DensityFolder : TemporaryFolder {
+    DensityFolder() { openvdb::initialize(); }
 
     DensityGridPtr read(const openvdb::GridPtrVec& grids, const std::string& name = "") const
     {
@@ -37,7 +37,7 @@ openvdb::FloatGrid::Ptr fog(const char* name = "density")
     return grid;
 }
 
-std::vector<Vec3f> births(const DensityGrid& grid, std::size_t n)
+std::vector<Vec3f> births_in(const DensityGrid& grid, std::size_t n)
 {
     std::vector<Birthplace> out(n);
     grid.scatter()->place(RandomKey(1, "emit1"), 0, out);
@@ -53,7 +53,7 @@ std::vector<Vec3f> births(const DensityGrid& grid, std::size_t n)
 
 TEST_CASE("births in a fog are as many at each voxel as its density says, spread by its hat", "[density_grid]")
 {
-    const Folder folder;
+    const DensityFolder folder;
     const auto grid = fog();
     grid->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
     grid->tree().setValue({0, 0, 0}, 1.0f);
@@ -62,7 +62,7 @@ TEST_CASE("births in a fog are as many at each voxel as its density says, spread
     constexpr std::size_t n = 40'000;
     std::size_t dense = 0;
     Vec3d sum = Vec3d::Zero(), squares = Vec3d::Zero();
-    for (const Vec3f& P : births(*folder.read({grid}), n)) {
+    for (const Vec3f& P : births_in(*folder.read({grid}), n)) {
         const bool at_dense = P.x() > 2.5f;
         dense += at_dense;
         const Vec3d away = P.cast<double>() - (at_dense ? Vec3d(5, 1, -2) : Vec3d(0, 0, 0));
@@ -81,14 +81,14 @@ TEST_CASE("births in a fog are as many at each voxel as its density says, spread
 
 TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
 {
-    const Folder folder;
+    const DensityFolder folder;
     const auto grid = fog();
     grid->tree().addTile(1, {0, 0, 0}, 2.0f, true);  // 8 voxels an edge
     grid->tree().setValue({100, 0, 0}, 1024.0f);     // as dense as all of them
     constexpr std::size_t n = 40'000;
     std::size_t in_tile = 0;
     Vec3d sum = Vec3d::Zero();
-    for (const Vec3f& P : births(*folder.read({grid}), n)) {
+    for (const Vec3f& P : births_in(*folder.read({grid}), n)) {
         if (P.x() > 50) continue;
         ++in_tile;
         sum += P.cast<double>();
@@ -101,7 +101,7 @@ TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
 
 TEST_CASE("what is no fog is an error that says what is, and what is in the file", "[density_grid]")
 {
-    const Folder folder;
+    const DensityFolder folder;
     const auto one = fog("smoke"), other = fog("heat"), negative = fog(), empty = fog();
     for (const auto& grid : {one, other}) grid->tree().setValue({0, 0, 0}, 1.0f);
     negative->tree().setValue({1, 2, 3}, -1.0f);
@@ -109,7 +109,7 @@ TEST_CASE("what is no fog is an error that says what is, and what is in the file
     const auto surface = fog("surface");
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
     CHECK_THAT(folder.error({one, other}), Catch::Contains("there are 2 fogs") && Catch::Contains("name one by grid"));
-    CHECK(births(*folder.read({one, other}, "heat"), 1).size() == 1);
+    CHECK(births_in(*folder.read({one, other}, "heat"), 1).size() == 1);
     CHECK_THAT(folder.error({one}, "smok"), Catch::Contains("did you mean \"smoke\"?"));
     CHECK_THAT(folder.error({surface}), Catch::Contains("there is no fog of floats"));
     CHECK_THAT(folder.error({surface}, "surface"),

@@ -76,16 +76,6 @@ double by_hand(const Cloud& cloud, double voxel, const Vec3d& at, Vec3d* mean)
     return sum / std::pow(voxel, 3);
 }
 
-std::string message_of(const std::function<void()>& act)
-{
-    try {
-        act();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return "nothing was refused";
-}
-
 }  // namespace
 
 TEST_CASE("a density holds the weights of its points, and vectors keep their sum", "[grid_of_points]")
@@ -183,7 +173,7 @@ TEST_CASE("points that make no grid are refused", "[grid_of_points]")
 {
     const std::vector<Vec3f> P = {Vec3f(0, 0, 0), Vec3f(1, 0, 0)}, none;
     const std::vector<float> radius = {0.1f, 0.02f}, all = {0.1f}, weight = {1}, negative = {1, -1}, zero = {0};
-    const auto refused = [](const SpreadPoints& points) { return message_of([&] { density_of_points(points); }); };
+    const auto refused = [](const SpreadPoints& points) { return test::error_of([&] { density_of_points(points); }); };
     CHECK_THAT(refused({none, all, weight, {}, 0.1}), Contains("there are no points"));
     CHECK_THAT(refused({P, radius, weight, {}, 0.05}), Contains("point 1 has the radius 0.02 m; it must be at least a "
                                                                 "voxel, 0.05 m"));

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "runtime/error.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/shapes/mesh/distance_to_all.h"
 #include "tests/test.h"
 
@@ -17,18 +18,7 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-template <class F>
-std::string message_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& e) {
-        return e.what();
-    }
-    return "nothing was thrown";
-}
+using std::numbers::pi;
 
 std::vector<Vec3d> random_points(std::size_t n, const Box3d& box)
 {
@@ -46,7 +36,7 @@ struct Sample {
     Vec3d gradient;
 };
 
-Sample ask(const Shape& shape, const Vec3d& P)
+Sample sample_at(const Shape& shape, const Vec3d& P)
 {
     Sample sample;
     shape.distance({&P, 1}, {&sample.phi, 1}, {&sample.gradient, 1});
@@ -54,7 +44,7 @@ Sample ask(const Shape& shape, const Vec3d& P)
 }
 
 // A mesh whose parts are those of `a` and of `b`.
-MeshPtr both(const MeshPtr& a, const MeshPtr& b)
+MeshPtr joined(const MeshPtr& a, const MeshPtr& b)
 {
     auto mesh = std::make_shared<Mesh>(*a);
     const auto first = static_cast<std::int32_t>(mesh->positions.size());
@@ -89,7 +79,7 @@ TEST_CASE("a level set sphere is off by at most voxel²/(4 radius) within its ba
             const Vec3d from_center = P - center;
             const double exact = from_center.norm() - radius;
             if (std::abs(exact) > 2 * 0.1) continue;
-            const auto [phi, gradient] = ask(*sphere, P);
+            const auto [phi, gradient] = sample_at(*sphere, P);
             worst[k] = std::max(worst[k], std::abs(phi - exact));
             worst_gradient = std::max(worst_gradient, (gradient - from_center.normalized()).norm());
             ++asked;
@@ -104,10 +94,10 @@ TEST_CASE("a level set sphere is off by at most voxel²/(4 radius) within its ba
 TEST_CASE("a level set box is exact to rounding along its faces, and round outside its edges", "[level set]")
 {
     const auto box = level_set_box({2, 1, 0.6}, {0, 5, 0}, {0.02, 4});
-    CHECK(ask(*box, {1.013, 5.2, 0.1}).phi == Approx(0.013).margin(1e-6));
-    CHECK(ask(*box, {0.3, 5.2, -0.27}).phi == Approx(-0.03).margin(1e-6));
-    CHECK_THAT(ask(*box, {0.3, 5.513, 0.1}).gradient, close_to(Vec3d{0, 1, 0}, 1e-5));
-    CHECK(ask(*box, {1.03, 5.54, 0}).phi == Approx(0.05).margin(1e-3));  // 3-4-5
+    CHECK(sample_at(*box, {1.013, 5.2, 0.1}).phi == Approx(0.013).margin(1e-6));
+    CHECK(sample_at(*box, {0.3, 5.2, -0.27}).phi == Approx(-0.03).margin(1e-6));
+    CHECK_THAT(sample_at(*box, {0.3, 5.513, 0.1}).gradient, close_to(Vec3d{0, 1, 0}, 1e-5));
+    CHECK(sample_at(*box, {1.03, 5.54, 0}).phi == Approx(0.05).margin(1e-3));  // 3-4-5
 }
 
 TEST_CASE("a level set torus is the distance to its circle minus its tube", "[level set]")
@@ -117,7 +107,7 @@ TEST_CASE("a level set torus is the distance to its circle minus its tube", "[le
     for (const Vec3d& P : random_points(50'000, cube(0.75))) {
         const double exact = std::hypot(std::hypot(P.x(), P.z()) - 0.5, P.y()) - 0.2;
         if (std::abs(exact) > 0.02) continue;
-        REQUIRE(ask(*torus, P).phi == Approx(exact).margin(0.01 * 0.01 / 4 * (1 / 0.17 + 1 / 0.27)));
+        REQUIRE(sample_at(*torus, P).phi == Approx(exact).margin(0.01 * 0.01 / 4 * (1 / 0.17 + 1 / 0.27)));
         ++asked;
     }
     CHECK(asked > 1000);
@@ -129,15 +119,15 @@ TEST_CASE("beyond the band the distance is a bound of the right sign, without a 
     for (const Vec3d& P : random_points(20'000, cube(20))) {
         const double exact = P.norm() - 1;
         if (std::abs(exact) < 0.3) continue;
-        const auto [phi, gradient] = ask(*sphere, P);
+        const auto [phi, gradient] = sample_at(*sphere, P);
         REQUIRE(phi >= std::copysign(0.15, exact) * 1.000001 - 1e-6);
         REQUIRE((exact > 0 ? phi <= exact : phi == Approx(-0.15)));
         REQUIRE(gradient.isZero());
     }
     // Along an axis the box around the surface is as near as the surface, but for a voxel or two.
-    CHECK(ask(*sphere, {11, 0, 0}).phi == Approx(10).margin(0.1));
-    CHECK(ask(*sphere, Vec3d::Zero()).phi == Approx(-0.15));
-    CHECK(ask(*sphere, {1e30, 0, 0}).phi == Approx(1e30));
+    CHECK(sample_at(*sphere, {11, 0, 0}).phi == Approx(10).margin(0.1));
+    CHECK(sample_at(*sphere, Vec3d::Zero()).phi == Approx(-0.15));
+    CHECK(sample_at(*sphere, {1e30, 0, 0}).phi == Approx(1e30));
 }
 
 TEST_CASE("outside a level set's bounds the distance is above 0, and at least that to the bounds", "[level set]")
@@ -149,8 +139,8 @@ TEST_CASE("outside a level set's bounds the distance is above 0, and at least th
     CHECK(bounds.sizes().minCoeff() < 0.4 + 5 * 0.02);
     for (const Vec3d& P : random_points(50'000, {Vec3d(0, 1, 2), Vec3d(2, 3, 4)})) {
         if (bounds.contains(P)) continue;
-        REQUIRE(ask(*torus, P).phi > 0);
-        REQUIRE(ask(*torus, P).phi >= std::min(0.06, bounds.exteriorDistance(P)) - 1e-6);
+        REQUIRE(sample_at(*torus, P).phi > 0);
+        REQUIRE(sample_at(*torus, P).phi >= std::min(0.06, bounds.exteriorDistance(P)) - 1e-6);
     }
 }
 
@@ -194,7 +184,7 @@ TEST_CASE("a level set from a mesh has the distance to the nearest triangle at e
                 const Vec3d P = voxel * Vec3d(i, j, k);
                 const double exact = test::distance_to_all(*mesh, P);
                 if (exact > 2.5 * voxel) continue;
-                worst = std::max(worst, std::abs(std::abs(ask(*torus, P).phi) - exact));
+                worst = std::max(worst, std::abs(std::abs(sample_at(*torus, P).phi) - exact));
                 ++asked;
             }
     CHECK(asked > 2000);
@@ -213,20 +203,20 @@ TEST_CASE("a level set from a mesh is negative inside, whichever way its faces l
                Equals("mesh \"sphere\" is turned inside out: its volume is -4.172 m³; its faces are taken to "
                       "look outwards"));
     for (const Vec3d& P : random_points(2000, cube(1.3))) {
-        REQUIRE(ask(*right, P).phi == ask(*wrong, P).phi);
-        if (std::abs(P.norm() - 1) > 0.01) REQUIRE((ask(*right, P).phi < 0) == (P.norm() < 1));
+        REQUIRE(sample_at(*right, P).phi == sample_at(*wrong, P).phi);
+        if (std::abs(P.norm() - 1) > 0.01) REQUIRE((sample_at(*right, P).phi < 0) == (P.norm() < 1));
     }
 }
 
 TEST_CASE("a piece turned inwards inside another is a cavity, and one inside that is solid again", "[level set]")
 {
-    const MeshPtr wall = both(make_sphere(1, 64, Vec3d::Zero()), turned(make_sphere(0.7, 64, Vec3d::Zero())));
-    const MeshPtr mesh = GENERATE_COPY(both(wall, make_sphere(0.4, 64, Vec3d::Zero())),
-                                       turned(both(wall, make_sphere(0.4, 64, Vec3d::Zero()))));
+    const MeshPtr wall = joined(make_sphere(1, 64, Vec3d::Zero()), turned(make_sphere(0.7, 64, Vec3d::Zero())));
+    const MeshPtr mesh = GENERATE_COPY(joined(wall, make_sphere(0.4, 64, Vec3d::Zero())),
+                                       turned(joined(wall, make_sphere(0.4, 64, Vec3d::Zero()))));
     std::vector<std::string> warnings;
     const auto shells = level_set_from_mesh(mesh, {0.025, 3}, warnings);
     const double flat = 3e-3;  // how far the meshes are inside their spheres
-    const auto at = [&](double x) { return ask(*shells, {x, 0.01, 0}).phi; };
+    const auto at = [&](double x) { return sample_at(*shells, {x, 0.01, 0}).phi; };
     CHECK(at(1.03) == Approx(0.03).margin(flat));
     CHECK(at(0.97) == Approx(-0.03).margin(flat));
     CHECK(at(0.73) == Approx(-0.03).margin(flat));
@@ -242,15 +232,15 @@ TEST_CASE("a piece turned inwards beside the others is solid, and pieces that ov
 {
     std::vector<std::string> warnings;
     const auto pair = level_set_from_mesh(
-        both(make_sphere(1, 48, Vec3d::Zero()), turned(make_sphere(0.5, 48, {3, 0, 0}))), {0.05, 3}, warnings);
-    CHECK(ask(*pair, {3, 0, 0}).phi < 0);
-    CHECK(ask(*pair, {3.55, 0.01, 0}).phi > 0);
+        joined(make_sphere(1, 48, Vec3d::Zero()), turned(make_sphere(0.5, 48, {3, 0, 0}))), {0.05, 3}, warnings);
+    CHECK(sample_at(*pair, {3, 0, 0}).phi < 0);
+    CHECK(sample_at(*pair, {3.55, 0.01, 0}).phi > 0);
 
-    const auto overlap = level_set_from_mesh(both(make_sphere(1, 48, Vec3d::Zero()), make_sphere(1, 48, {1, 0, 0})),
+    const auto overlap = level_set_from_mesh(joined(make_sphere(1, 48, Vec3d::Zero()), make_sphere(1, 48, {1, 0, 0})),
                                              {0.05, 3}, warnings);
-    for (const double x : {-0.9, 1.9}) CHECK(ask(*overlap, {x, 0, 0}).phi == Approx(-0.1).margin(0.005));
+    for (const double x : {-0.9, 1.9}) CHECK(sample_at(*overlap, {x, 0, 0}).phi == Approx(-0.1).margin(0.005));
     for (const double x : {0.0, 0.03, 0.5, 0.97, 1.0})  // on the faces inside, and near them: far from the surface
-        CHECK(ask(*overlap, {x, 0, 0}).phi == Approx(-0.15));
+        CHECK(sample_at(*overlap, {x, 0, 0}).phi == Approx(-0.15));
 }
 
 TEST_CASE("a hole smaller than a voxel is closed, with a warning", "[level set]")
@@ -259,7 +249,7 @@ TEST_CASE("a hole smaller than a voxel is closed, with a warning", "[level set]"
     holed->triangles.erase(holed->triangles.begin() + 10'000);
     std::vector<std::string> warnings;
     const auto sphere = level_set_from_mesh(holed, {0.1, 3}, warnings);
-    CHECK(ask(*sphere, Vec3d::Zero()).phi < 0);
+    CHECK(sample_at(*sphere, Vec3d::Zero()).phi < 0);
     REQUIRE(warnings.size() == 1);
     CHECK_THAT(warnings[0],
                Equals("mesh \"sphere\" is not closed: 3 edges have one face, and 0 have more than two or two that look "
@@ -270,7 +260,7 @@ TEST_CASE("a hole smaller than a voxel is closed, with a warning", "[level set]"
 TEST_CASE("pieces thinner than a voxel are named in a warning", "[level set]")
 {
     std::vector<std::string> warnings;
-    level_set_from_mesh(both(make_sphere(1, 48, Vec3d::Zero()), make_box({1, 1, 0.01}, {3, 0, 0.02})), {0.1, 3},
+    level_set_from_mesh(joined(make_sphere(1, 48, Vec3d::Zero()), make_box({1, 1, 0.01}, {3, 0, 0.02})), {0.1, 3},
                         warnings);
     REQUIRE(warnings.size() == 1);
     CHECK_THAT(warnings[0],
@@ -283,47 +273,47 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
     const Vec3d o = Vec3d::Zero();
     std::vector<std::string> w;
     const MeshPtr sphere = make_sphere(1, 16, o);
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(sphere, {0, 3}, w);
                }),
                Equals("voxel = 0 m is out of range; it must be above 0"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_sphere(1, o, {0.1, 1});
                }),
                Equals("half_width = 1 voxels is out of range; it must be at least 2"));
-    CHECK_THAT(message_of([&] { level_set_sphere(0, o, {}); }),
+    CHECK_THAT(test::error_of([&] { level_set_sphere(0, o, {}); }),
                Equals("radius of a level set sphere = 0 is out of range; it must be above 0"));
-    CHECK_THAT(message_of([&] { level_set_torus(1, 1, o, {}); }),
+    CHECK_THAT(test::error_of([&] { level_set_torus(1, 1, o, {}); }),
                Equals("tube of a level set torus = 1 is out of range; it must be below its radius, 1"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(make_mesh({{0, 0, 0}}, {}), {}, w);
                }),
                Equals("mesh \"points and faces\" has no faces; a level set needs a closed surface"));
     // 4 π / 1e-10 in a layer, times 6 layers.
     CHECK_THAT(
-        message_of([&] {
+        test::error_of([&] {
             level_set_sphere(1, o, {1e-5, 3});
         }),
         Equals("a level set sphere of radius 1 m with voxel = 1e-05 m would make about 7.54e+11 voxels and an index "
                "of 1.56e+13 blocks, and 2147483648 of each can be held; a voxel of at least 0.000198 m stays below "
                "that"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(sphere, {1e-5, 3}, w);
                }),
                Catch::Matchers::StartsWith("mesh \"sphere\" with voxel = 1e-05 m would make about "));
     CHECK_THAT(
-        message_of([&] {
+        test::error_of([&] {
             level_set_sphere(0.04, o, {0.1, 3});
         }),
         Equals("a level set sphere of radius 0.04 m vanishes with voxel = 0.1 m: it is 0.08 m thick; use a voxel of "
                "at most 0.04 m"));
     CHECK_THAT(
-        message_of([&] {
+        test::error_of([&] {
             level_set_from_mesh(make_box({0.1, 0.1, 0.02}, {0.05, 0.05, 0.05}), {0.3, 3}, w);
         }),
         Equals("mesh \"box\" vanishes with voxel = 0.3 m: its size is 0.1 x 0.1 x 0.02 m; use a voxel of at most "
                "0.00667 m"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(make_grid(2, 2, 4, {0, 0.02, 0}), {0.1, 3}, w);
                }),
                Equals("mesh \"grid\" encloses nothing with voxel = 0.1 m: 16 of its edges have one face, and outside "
@@ -345,11 +335,12 @@ TEST_CASE("a wider band is the same surface with exact distances farther out", "
         CHECK(widened->active_voxels() > 2 * narrow->active_voxels());
         for (const Vec3d& P : random_points(5000, cube(1))) {
             const double exact = P.norm() - radius;
-            if (exact > -0.3 && exact < 0.3) REQUIRE(ask(*widened, P).phi == Approx(exact).margin(0.004));
-            if (std::abs(exact) < voxel) REQUIRE(ask(*widened, P).phi == Approx(ask(*narrow, P).phi).margin(1e-6));
+            if (exact > -0.3 && exact < 0.3) REQUIRE(sample_at(*widened, P).phi == Approx(exact).margin(0.004));
+            if (std::abs(exact) < voxel)
+                REQUIRE(sample_at(*widened, P).phi == Approx(sample_at(*narrow, P).phi).margin(1e-6));
         }
     }
-    CHECK_THAT(message_of([&] { from_formula->with_band(1e6); }),
+    CHECK_THAT(test::error_of([&] { from_formula->with_band(1e6); }),
                Catch::Matchers::Contains("stays below that") || Catch::Matchers::Contains("are free of"));
 }
 
@@ -357,21 +348,21 @@ TEST_CASE("a level set far from the origin is as good as one at it", "[level set
 {
     const Vec3d far(1e5, -1e5, 1e5);
     const auto sphere = level_set_sphere(1, far, {0.05, 3});
-    CHECK(ask(*sphere, far + Vec3d(1.02, 0, 0)).phi == Approx(0.02).margin(1e-3));
-    CHECK(ask(*sphere, far).phi == Approx(-0.15));
+    CHECK(sample_at(*sphere, far + Vec3d(1.02, 0, 0)).phi == Approx(0.02).margin(1e-3));
+    CHECK(sample_at(*sphere, far).phi == Approx(-0.15));
 
     // A mesh's own corners are 7.8 mm apart there.
     std::vector<std::string> warnings;
     const auto box = level_set_from_mesh(make_box({2, 2, 2}, far), {0.05, 3}, warnings);
-    CHECK(ask(*box, far + Vec3d(1.02, 0.3, 0)).phi == Approx(0.02).margin(1e-4));
+    CHECK(sample_at(*box, far + Vec3d(1.02, 0.3, 0)).phi == Approx(0.02).margin(1e-4));
 }
 
 TEST_CASE("level sets of millimetres and of kilometres are alike", "[level set]")
 {
     const double size = GENERATE(1e-3, 1.0, 1e5);
     const auto sphere = level_set_sphere(size, Vec3d::Zero(), {0.05 * size, 3});
-    CHECK(ask(*sphere, {1.1 * size, 0, 0}).phi == Approx(0.1 * size).epsilon(0.01));
-    CHECK_THAT(ask(*sphere, {0, 0, 0.9 * size}).gradient, close_to(Vec3d{0, 0, 1}, 0.03));  // voxel / (2 radius)
+    CHECK(sample_at(*sphere, {1.1 * size, 0, 0}).phi == Approx(0.1 * size).epsilon(0.01));
+    CHECK_THAT(sample_at(*sphere, {0, 0, 0.9 * size}).gradient, close_to(Vec3d{0, 0, 1}, 0.03));  // voxel / (2 radius)
 }
 
 TEST_CASE("the surface of a level set is a closed mesh of its area, looking outwards", "[level set]")

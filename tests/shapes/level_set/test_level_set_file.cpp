@@ -20,7 +20,7 @@ using Catch::Matchers::Equals;
 namespace {
 
 // Messages are compared without its name.
-struct Folder : test::TemporaryFolder {
+struct LevelSetFolder : test::TemporaryFolder {
     template <class F>
     std::string message_of(const F& f) const
     {
@@ -64,7 +64,7 @@ std::vector<double> distances(const Shape& shape)
 
 TEST_CASE("a level set read back from its file is the same to the bit", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     const auto torus = level_set_torus(0.8, 0.3, {0.1, 0.2, 0.3}, {0.05, 3});
     const auto path = folder / "made/on/the/way/torus.vdb";
     torus->write(path, "ring");
@@ -80,7 +80,7 @@ TEST_CASE("a level set read back from its file is the same to the bit", "[level 
 
 TEST_CASE("a file's other grids are left alone, and a grid is found by its name", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     auto fog = openvdb::FloatGrid::create(0);
     fog->setName("density");
     fog->setGridClass(openvdb::GRID_FOG_VOLUME);
@@ -101,7 +101,7 @@ TEST_CASE("a file's other grids are left alone, and a grid is found by its name"
 
 TEST_CASE("level sets that share their values, and files without offsets, are read", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     const auto first = sphere_grid("first"), other = sphere_grid("other");
     const auto second = first->copy();  // of the same tree
     second->setName("second");
@@ -118,7 +118,7 @@ TEST_CASE("level sets that share their values, and files without offsets, are re
 
 TEST_CASE("a level set that is cut is an error that says so", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     folder.write_grids("whole.vdb", {sphere_grid("surface")});
     const std::string whole = test::file_text(folder / "whole.vdb");
     folder.write("cut.vdb", whole.substr(0, whole.size() - 100));
@@ -131,7 +131,7 @@ TEST_CASE("a level set that is cut is an error that says so", "[level set][file]
 
 TEST_CASE("files without a level set are refused by name", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     const auto refusal = [&](const char* name, const char* grid) {
         return folder.message_of([&] { read_level_set(folder / name, grid); });
     };
@@ -178,7 +178,7 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
 
 TEST_CASE("a level set from a file is widened without moving its surface", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     folder.write_grids("sphere.vdb", {sphere_grid("surface")});
     const auto narrow = read_level_set(folder / "sphere.vdb", "");
     const auto wide = narrow->with_band(0.8);
@@ -210,7 +210,7 @@ TEST_CASE("a level set that a full disk has no room for is an error, and nothing
 
 TEST_CASE("a level set that can't be written says where, and leaves nothing behind", "[level set][file]")
 {
-    const Folder folder;
+    const LevelSetFolder folder;
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.2, 3});
     std::ofstream(folder / "file") << "in the way";
     const auto below_a_file = folder / "file/sphere.vdb";

@@ -13,7 +13,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 std::vector<std::string> no_warnings;
 
 LevelSetPtr ball(double radius, const Vec3d& center, double voxel = 0.04)
@@ -34,17 +34,6 @@ double distance(const Shape& shape, const Vec3d& P)
 
 // Of two balls of radius r with centres d apart.
 double lens_volume(double r, double d) { return pi / 12 * (4 * r + d) * (2 * r - d) * (2 * r - d); }
-
-template <class F>
-std::string message_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& e) {
-        return e.what();
-    }
-    return "nothing was thrown";
-}
 
 }  // namespace
 
@@ -189,29 +178,29 @@ TEST_CASE("a moved level set is written and read at its new position", "[level_s
 TEST_CASE("an operation that leaves nothing, or can't be built, is refused with the numbers", "[level_set][extreme]")
 {
     const LevelSetPtr a = ball(1, {0, 0, 0});
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    combine_level_sets(a, ball(1, {5, 0, 0}), Combine::Intersect, no_warnings);
                }),
                Contains("nothing is left of the intersection; the two do not overlap"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    combine_level_sets(a, ball(2, {0, 0, 0}), Combine::Subtract, no_warnings);
                }),
                Contains("nothing is left of the difference; the second covers the first"));
-    CHECK_THAT(message_of([&] { offset_level_set(a, -1.2); }),
+    CHECK_THAT(test::error_of([&] { offset_level_set(a, -1.2); }),
                Contains("nothing is left of the level set 1.2 m inwards"));
-    CHECK_THAT(message_of([&] { offset_level_set(a, -1e30); }), Contains("nothing is left"));
-    CHECK_THAT(message_of([&] { offset_level_set(a, 1e6); }), Contains("voxel"));
-    CHECK_THAT(message_of([&] { offset_level_set(a, NAN); }), Contains("must be finite"));
-    CHECK_THAT(message_of([&] { resample_level_set(a, 1e-6); }), Contains("a voxel of at least"));
-    CHECK_THAT(message_of([&] { resample_level_set(a, 10); }), Contains("vanishes with voxel = 10 m"));
-    CHECK_THAT(message_of([&] { resample_level_set(a, 0); }), Contains("voxel = 0 m is out of range"));
+    CHECK_THAT(test::error_of([&] { offset_level_set(a, -1e30); }), Contains("nothing is left"));
+    CHECK_THAT(test::error_of([&] { offset_level_set(a, 1e6); }), Contains("voxel"));
+    CHECK_THAT(test::error_of([&] { offset_level_set(a, NAN); }), Contains("must be finite"));
+    CHECK_THAT(test::error_of([&] { resample_level_set(a, 1e-6); }), Contains("a voxel of at least"));
+    CHECK_THAT(test::error_of([&] { resample_level_set(a, 10); }), Contains("vanishes with voxel = 10 m"));
+    CHECK_THAT(test::error_of([&] { resample_level_set(a, 0); }), Contains("voxel = 0 m is out of range"));
     const std::vector<Vec3f> P{{0, 0, 0}, {1e9f, 0, 0}};
-    CHECK_THAT(message_of([&] { level_set_from_points({}, {}, {}); }), Contains("there are no points"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] { level_set_from_points({}, {}, {}); }), Contains("there are no points"));
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_points(P, std::vector<float>{0.1f}, {0.1, 3});
                }),
                Contains("point 0 has the radius 0.1 m, and with voxel = 0.1 m it must be at least 1.5 voxels"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    level_set_from_points(P, std::vector<float>{1.0f}, {0.1, 3});
                }),
                Contains("a voxel of at least"));

@@ -14,8 +14,8 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-struct Folder : test::TemporaryFolder {
-    Folder() { openvdb::initialize(); }
+struct VectorFolder : test::TemporaryFolder {
+    VectorFolder() { openvdb::initialize(); }
 
     std::filesystem::path write_grids(const openvdb::GridPtrVec& grids) const
     {
@@ -56,22 +56,12 @@ openvdb::Vec3SGrid::Ptr linear_grid(const char* name, const openvdb::math::Trans
     return grid;
 }
 
-std::string message_of(const std::function<void()>& act)
-{
-    try {
-        act();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return "nothing was refused";
-}
-
 }  // namespace
 
 TEST_CASE("a field that is linear is read exactly between voxels, staggered or not, under any affine map",
           "[vector_grid]")
 {
-    const Folder folder;
+    const VectorFolder folder;
     const bool staggered = GENERATE(false, true);
     const bool turned = GENERATE(false, true);
     CAPTURE(staggered, turned);
@@ -86,7 +76,7 @@ TEST_CASE("a field that is linear is read exactly between voxels, staggered or n
 
 TEST_CASE("where a grid has no values it is its background, however far", "[vector_grid]")
 {
-    const Folder folder;
+    const VectorFolder folder;
     auto grid = openvdb::Vec3SGrid::create({1, 2, 3});
     grid->setName("v");
     const VectorGridPtr read = read_vector_grid(folder.write_grids({grid}), "v");
@@ -107,19 +97,19 @@ TEST_CASE("a lattice has the values of its nodes, and its background is zero", "
 
 TEST_CASE("a file without the requested grid is refused with the grids that it has", "[vector_grid]")
 {
-    const Folder folder;
+    const VectorFolder folder;
     auto density = openvdb::FloatGrid::create();
     density->setName("density");
     auto vel = openvdb::Vec3SGrid::create(), rest = openvdb::Vec3SGrid::create();
     vel->setName("vel");
     rest->setName("rest");
     const auto path = folder.write_grids({density, vel, rest});
-    const auto refused = [&](const char* name) { return message_of([&] { read_vector_grid(path, name); }); };
+    const auto refused = [&](const char* name) { return test::error_of([&] { read_vector_grid(path, name); }); };
     CHECK_THAT(refused(""), Contains("there are 2 grids of vectors") && Contains("name one by grid"));
     CHECK_THAT(refused("vle"), Contains("there is no grid \"vle\"") && Contains("did you mean \"vel\"?"));
     CHECK_THAT(refused("density"), Contains("is float; it must be of vectors (vec3s)"));
     const auto only = folder.write_grids({density});
-    CHECK_THAT(message_of([&] { read_vector_grid(only, ""); }),
+    CHECK_THAT(test::error_of([&] { read_vector_grid(only, ""); }),
                Contains("there is no grid of vectors (vec3s) in") && Contains("\"density\" (float)"));
-    CHECK_THAT(message_of([&] { read_vector_grid(folder / "none.vdb", ""); }), Contains("there is no file"));
+    CHECK_THAT(test::error_of([&] { read_vector_grid(folder / "none.vdb", ""); }), Contains("there is no file"));
 }

@@ -18,20 +18,9 @@ using rapid::test::TemporaryFolder;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // The message of the error that an expression throws.
-template <class F>
-std::string message_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& e) {
-        return e.what();
-    }
-    return "nothing was thrown";
-}
-
 std::filesystem::path asset(const std::string& name)
 {
     return std::filesystem::path(RAPID_SOURCE_DIR).parent_path() / "shared/assets" / name;
@@ -198,27 +187,27 @@ TEST_CASE("faces of many points are split into fans", "[mesh]")
 TEST_CASE("wrong arguments of built-in meshes are refused with their value", "[mesh]")
 {
     const Vec3d o = Vec3d::Zero();
-    CHECK_THAT(message_of([&] { make_sphere(-1, 8, o); }),
+    CHECK_THAT(test::error_of([&] { make_sphere(-1, 8, o); }),
                Equals("radius of a mesh sphere = -1 is out of range; it must be above 0"));
-    CHECK_THAT(message_of([&] { make_sphere(1, 2, o); }),
+    CHECK_THAT(test::error_of([&] { make_sphere(1, 2, o); }),
                Equals("divisions of a mesh sphere = 2 is out of range; it must be from 3 to 32000"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    make_box({1, 0, 1}, o);
                }),
                Equals("size of a mesh box = 0 is out of range; it must be above 0"));
-    CHECK_THAT(message_of([&] { make_grid(1, 1, 0, o); }),
+    CHECK_THAT(test::error_of([&] { make_grid(1, 1, 0, o); }),
                Equals("divisions of a mesh grid = 0 is out of range; it must be from 1 to 32000"));
-    CHECK_THAT(message_of([&] { make_torus(1, 2, 8, o); }),
+    CHECK_THAT(test::error_of([&] { make_torus(1, 2, 8, o); }),
                Equals("tube of a mesh torus = 2 is out of range; it must be below its radius, 1"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 3}});
                }),
                Equals("face 0 of a mesh names point 3; points are numbered from 0 to 2"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    make_mesh({{0, 0, 0}, {1, 0, 0}}, {{0, 1}});
                }),
                Equals("face 0 of a mesh has 2 points; it must have at least 3"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    make_mesh({{0, 0, NAN}}, {});
                }),
                Equals("point 0 of a mesh is at (0, 0, nan); coordinates must be finite"));
@@ -320,7 +309,7 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
     // The error of reading a file of this name and content, without the folder's name.
     const auto refusal = [&](const char* name, const char* content) {
         const auto path = content ? folder.write(name, content) : folder / name;
-        std::string message = message_of([&] { read_mesh(path); });
+        std::string message = test::error_of([&] { read_mesh(path); });
         const std::string in = folder.path().string() + "/";
         if (const auto at = message.find(in); at != std::string::npos) message.erase(at, in.size());
         return message;
@@ -356,7 +345,7 @@ TEST_CASE("a small file of parts without number is refused for its memory or its
                                                        std::string(48, 'A') + "\"}]}");
     // With the address sanitizer, which maps more than any limit, it is refused for its time.
     using Catch::Matchers::Contains;
-    CHECK_THAT(message_of([&] { read_mesh(path); }),
+    CHECK_THAT(test::error_of([&] { read_mesh(path); }),
                Contains("it takes more than 1024 MB of memory") || Contains("it takes its reader longer than 5 s"));
 }
 

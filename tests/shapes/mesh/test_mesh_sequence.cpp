@@ -14,7 +14,7 @@ using rapid::test::close_to;
 
 namespace {
 
-struct Folder : test::TemporaryFolder {
+struct SequenceFolder : test::TemporaryFolder {
     // A tetrahedron with its apex at this height.
     void tetrahedron(int frame, double apex) const
     {
@@ -31,24 +31,13 @@ struct Folder : test::TemporaryFolder {
     }
 };
 
-template <class F>
-std::string message_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& e) {
-        return e.what();
-    }
-    return "nothing was thrown";
-}
-
 double apex(const Mesh& mesh) { return mesh.bounds().max().y(); }
 
 }  // namespace
 
 TEST_CASE("a sequence has each frame's vertices, and holds its first and last file outside", "[mesh]")
 {
-    const Folder folder;
+    const SequenceFolder folder;
     for (int frame = 3; frame <= 6; ++frame) folder.tetrahedron(frame, frame);
     const MeshSequence sequence = folder.sequence(1, 9);
     CHECK(sequence.first() == 3);
@@ -94,7 +83,7 @@ TEST_CASE("the file of a frame is the one that walking there step by step ends a
 
 TEST_CASE("only the files that are needed are read, and the last few are kept", "[mesh]")
 {
-    const Folder folder;
+    const SequenceFolder folder;
     for (int frame = 1; frame <= 20; ++frame) folder.tetrahedron(frame, frame);
     folder.file(15, "nothing that is a mesh");
     const MeshSequence sequence = folder.sequence(1, 20);
@@ -102,29 +91,29 @@ TEST_CASE("only the files that are needed are read, and the last few are kept", 
     for (int frame = 3; frame <= 8; ++frame) sequence.at(frame);
     std::filesystem::remove(folder / "body.0002.obj");
     CHECK(sequence.at(2) == first);
-    CHECK_THAT(message_of([&] { sequence.at(15); }), Contains("frame 15"));
+    CHECK_THAT(test::error_of([&] { sequence.at(15); }), Contains("frame 15"));
 }
 
 TEST_CASE("a sequence whose topology changes is refused, with the frame and both counts", "[mesh]")
 {
-    const Folder folder;
+    const SequenceFolder folder;
     for (int frame = 1; frame <= 3; ++frame) folder.tetrahedron(frame, 1);
     folder.file(2, "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
     folder.file(3, "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 1 0\nf 1 3 2\nf 1 3 4\nf 1 4 2\nf 2 4 3\n");
     const MeshSequence sequence = folder.sequence(1, 3);
     CHECK_THAT(
-        message_of([&] { sequence.at(2); }),
+        test::error_of([&] { sequence.at(2); }),
         Contains("changes at frame 2: it has 6 corners and 2 faces there, and 12 corners and 4 faces at frame 1"));
     // Corners in another order keep their vertices.
-    CHECK_THAT(message_of([&] { sequence.at(3); }), Contains("at frame 3"));
+    CHECK_THAT(test::error_of([&] { sequence.at(3); }), Contains("at frame 3"));
 }
 
 TEST_CASE("a sequence without a file, or with a gap, says which frame is missing", "[mesh]")
 {
-    const Folder folder;
-    CHECK_THAT(message_of([&] { folder.sequence(1, 3); }), Contains("there is no mesh file \"body.####.obj\""));
+    const SequenceFolder folder;
+    CHECK_THAT(test::error_of([&] { folder.sequence(1, 3); }), Contains("there is no mesh file \"body.####.obj\""));
     folder.tetrahedron(1, 1);
     folder.tetrahedron(3, 1);
-    CHECK_THAT(message_of([&] { folder.sequence(1, 3); }),
+    CHECK_THAT(test::error_of([&] { folder.sequence(1, 3); }),
                Contains("frame 2 of \"body.####.obj\" is missing; there must be a file for each frame from 1 to 3"));
 }

@@ -31,7 +31,7 @@ private:
     TemporaryFolder folder_;
 };
 
-std::string square(const std::string& faces, const std::string& body)
+std::string square_file(const std::string& faces, const std::string& body)
 {
     return "ply\nformat ascii 1.0\nelement vertex 4\n" + xyz + "element face " + faces +
            "\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + body;
@@ -42,9 +42,9 @@ std::string square(const std::string& faces, const std::string& body)
 TEST_CASE("an index without a vertex is an error that names the face", "[mesh][ply]")
 {
     const PlyFolder folder;
-    CHECK(folder.error(square("1", "3 0 1 1000000\n")) == "face 0 has the vertex 1000000; there are 4, from 0");
-    CHECK(folder.error(square("2", "3 0 1 2\n3 0 1 4\n")) == "face 1 has the vertex 4; there are 4, from 0");
-    CHECK(folder.error(square("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; there are 4, from 0");
+    CHECK(folder.error(square_file("1", "3 0 1 1000000\n")) == "face 0 has the vertex 1000000; there are 4, from 0");
+    CHECK(folder.error(square_file("2", "3 0 1 2\n3 0 1 4\n")) == "face 1 has the vertex 4; there are 4, from 0");
+    CHECK(folder.error(square_file("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; there are 4, from 0");
 }
 
 TEST_CASE("elements before and behind the vertices are passed over", "[mesh][ply]")
@@ -62,9 +62,9 @@ TEST_CASE("elements before and behind the vertices are passed over", "[mesh][ply
 TEST_CASE("a damaged mesh .ply is an error that says how", "[mesh][ply]")
 {
     const PlyFolder folder;
-    CHECK(folder.error(square("3", "3 0 1 2\n3 0 2 3\n")) ==
+    CHECK(folder.error(square_file("3", "3 0 1 2\n3 0 2 3\n")) ==
           "face 2 of 3: there is no vertex_indices; the file ends early or is damaged");
-    CHECK_THAT(folder.error(square("1000000", "3 0 1 2\n")),
+    CHECK_THAT(folder.error(square_file("1000000", "3 0 1 2\n")),
                Catch::StartsWith("the file ends early: its header promises"));
     CHECK(folder.error(
               "ply\nformat ascii 1.0\nelement face 0\nproperty list uchar int vertex_indices\nelement vertex 0\n" +
@@ -78,7 +78,7 @@ TEST_CASE("a damaged mesh .ply is an error that says how", "[mesh][ply]")
 TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[mesh][ply]")
 {
     const PlyFolder folder;
-    const MeshPtr quad = folder.read(square("1", "4 0 1 2 3\n"));
+    const MeshPtr quad = folder.read(square_file("1", "4 0 1 2 3\n"));
     REQUIRE(quad->triangles.size() == 2);
     CHECK((quad->triangles[0] == Mesh::Triangle(0, 1, 2) && quad->triangles[1] == Mesh::Triangle(0, 2, 3)));
 

@@ -11,7 +11,7 @@ using rapid::test::close_to;
 namespace {
 
 constexpr double everywhere = std::numeric_limits<double>::infinity();
-const FrameClock clock_24{24, 1};
+const FrameClock film_clock{24, 1};
 
 // The curve of one point through four frames.
 Cubic<Vec3d> through(const FramePath& path, const std::function<Vec3d(double)>& place, double frame)
@@ -163,13 +163,13 @@ TEST_CASE("a turning body carries births along arcs, and their normals turn with
     const double angle = 0.1;  // a frame
     const MotionPtr motion = keyed_motion({{1, turned(0)}, {11, turned(10 * angle)}});
     const AnimatedShape shape(make_sphere_shape(1, {3, 0, 0}), motion);
-    const FramePath path = path_of(shape, clock_24, 5, {});
+    const FramePath path = path_of(shape, film_clock, 5, {});
     REQUIRE(path.kind == FramePath::Curved);
     std::vector<Birthplace> places(3);
     for (Birthplace& place : places) place.P = {4, 0, 0}, place.N = {1, 0, 0};
     std::vector<Vec3d> velocity(3);
     const std::vector<double> t{0, 0.5, 1};
-    rigid_path(*motion, clock_24, 5, path)->carry(t, true, places, velocity);
+    rigid_path(*motion, film_clock, 5, path)->carry(t, true, places, velocity);
     for (int i = 0; i < 3; ++i) {
         const double at = angle * (3 + t[i]);
         const Vec3d out(std::cos(at), std::sin(at), 0), along(-out.y(), out.x(), 0);

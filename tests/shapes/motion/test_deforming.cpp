@@ -17,7 +17,7 @@ using rapid::test::close_to;
 
 namespace {
 
-const FrameClock clock_24{24, 1};
+const FrameClock sequence_clock{24, 1};
 constexpr double h = 1.0 / 24;
 
 // A mesh whose files are written for it: each vertex of `rest` is where `place` has it at the frame.
@@ -48,7 +48,7 @@ struct Body {
     }
     Deformation::Interval over(double from, double to, double voxel, const PathOptions& options = {}) const
     {
-        return Deformation(level_set(voxel)).over(clock_24, from, to, nullptr, options, 0);
+        return Deformation(level_set(voxel)).over(sequence_clock, from, to, nullptr, options, 0);
     }
 };
 
@@ -67,7 +67,7 @@ double distance_at(const ShapePtr& shape, const Vec3d& P, double time)
     return phi;
 }
 
-Contact contact_of(const ShapePtr& shape, const Path& path)
+Contact contact_with_deforming(const ShapePtr& shape, const Path& path)
 {
     Contact contact;
     shape->first_contact({&path, 1}, {&contact, 1});
@@ -85,7 +85,7 @@ TEST_CASE("a ball that moves by more than its size between files meets points wh
     const Path path{{x, y, 0.1}, {-20, 0, 0}, {0, 0, 0}, h, r};
     // (x - 20 s - 9 - speed s)² + y² + z² = (R + r)²
     const double half = std::sqrt(std::pow(ball_radius + r, 2) - y * y - 0.01), s = (x - 9 - half) / (speed + 20);
-    const Contact contact = contact_of(shape, path);
+    const Contact contact = contact_with_deforming(shape, path);
     // A level set rounds a sphere by about voxel² / (8 R): 0.6 mm.
     CHECK(contact.time == Approx(s).margin(0.002 / speed));
     CHECK_THAT(contact.vc, close_to(Vec3d(speed, 0, 0), 1e-4));
@@ -99,10 +99,10 @@ TEST_CASE("at both ends of an interval a deforming level set is that of the mesh
 {
     const Body ball = fast_ball();
     Deformation deformation(ball.level_set(voxel));
-    const ShapePtr first = deformation.over(clock_24, 2, 3, nullptr, {}, 0).shape;
-    const ShapePtr second = deformation.over(clock_24, 3, 4, nullptr, {}, 0).shape;
+    const ShapePtr first = deformation.over(sequence_clock, 2, 3, nullptr, {}, 0).shape;
+    const ShapePtr second = deformation.over(sequence_clock, 3, 4, nullptr, {}, 0).shape;
     std::vector<std::string> warnings;
-    const LevelSetPtr still = level_set_from_mesh(ball.mesh->at(clock_24, 3), {voxel, 3}, warnings);
+    const LevelSetPtr still = level_set_from_mesh(ball.mesh->at(sequence_clock, 3), {voxel, 3}, warnings);
     for (const Vec3d& P : {Vec3d(9.5, 0.02, 0.1), Vec3d(9.2, 0.3, -0.3), Vec3d(8.6, 0, 0.2)}) {
         double phi = 0;
         still->distance({&P, 1}, {&phi, 1}, {});
@@ -138,7 +138,7 @@ TEST_CASE("a point deep in a deforming body has the nearest direction out", "[de
     const ShapePtr shape = box.over(2, 3, voxel).shape;
     const double begin = GENERATE(0.0, 0.01);
     const Path path{{0.2, 0.1, 0.1}, {0, 0, 0}, {0, -9.81, 0}, h - begin, 0.02, begin};
-    const Contact contact = contact_of(shape, path);
+    const Contact contact = contact_with_deforming(shape, path);
     CHECK(contact.time == 0);
     CHECK(contact.depth == Approx(0.32).margin(0.01));
     CHECK_THAT(contact.n, close_to(Vec3d(0, 0, 1), 1e-6));
@@ -156,7 +156,7 @@ TEST_CASE("a path that leaves a deforming body meets it again where it reaches i
     for (int i = 0; i < 2000; ++i) {
         const Vec3d to = 100 * Vec3d(in(random), 0, in(random)).normalized();
         const Path inwards{{0, 0, 0}, to - Vec3d(0, 10 * in(random), 0), Vec3d::Zero(), h / 2, 0};
-        const Contact first = contact_of(shape, inwards);
+        const Contact first = contact_with_deforming(shape, inwards);
         REQUIRE(first.time < inwards.duration);
         const double away = 100 * std::pow(10, 1.5 * in(random)-2.5);
         const Vec3d across = first.n.cross(Vec3d::UnitY()).normalized();
@@ -166,7 +166,7 @@ TEST_CASE("a path that leaves a deforming body meets it again where it reaches i
                        h / 2,
                        0,
                        first.time};
-        const Contact second = contact_of(shape, out);
+        const Contact second = contact_with_deforming(shape, out);
         CAPTURE(i, second.time, away);
         REQUIRE(second.time < out.duration);
         REQUIRE(second.n.dot(out.v - second.vc) < 0.1);
@@ -191,7 +191,7 @@ TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point through
         const double r = 0.5 + 1.4 * u(random), part = 0.2 + 0.6 * u(random), z = 0.8 * (u(random) - 0.5);
         const Path path{turned({r, 0, z}, 3 + part), {0, 0, 0.1}, {0, -9.81, 0}, h, 0};
         CAPTURE(i, r, part, z);
-        const Contact contact = contact_of(shape, path);
+        const Contact contact = contact_with_deforming(shape, path);
         REQUIRE(contact.time != Contact::none);
         if (contact.depth > 0) continue;  // it began in the paddle
         // A spline through steps of 40 degrees has 3 % of the velocity's error (numerics.md: the second order).
@@ -211,7 +211,7 @@ TEST_CASE("a deforming body that jumps sweeps nothing along, and says so; cut = 
     const Deformation::Interval jump = ball.over(4, 5, voxel);
     REQUIRE(jump.jump);
     CHECK(jump.jump->distance == Approx(10.01).epsilon(1e-3));
-    CHECK(contact_of(jump.shape, between).time == Contact::none);
+    CHECK(contact_with_deforming(jump.shape, between).time == Contact::none);
     // It arrives as it continues.
     CHECK_THAT(jump.shape->velocity_at({10.5, 0, 0}, 0.5 * h), close_to(Vec3d(0.01 / h, 0, 0), 1e-4));
 
@@ -219,18 +219,18 @@ TEST_CASE("a deforming body that jumps sweeps nothing along, and says so; cut = 
     no_cut.cuts.emplace();
     const Deformation::Interval sweep = ball.over(4, 5, voxel, no_cut);
     CHECK_FALSE(sweep.jump);
-    CHECK(contact_of(sweep.shape, between).time != Contact::none);
+    CHECK(contact_with_deforming(sweep.shape, between).time != Contact::none);
 }
 
 TEST_CASE("before and after its files a body is at rest, and built once", "[deforming]")
 {
     const Body ball = fast_ball();
     Deformation deformation(ball.level_set(voxel));
-    const ShapePtr before = deformation.over(clock_24, -1, 0, nullptr, {}, 0).shape;
+    const ShapePtr before = deformation.over(sequence_clock, -1, 0, nullptr, {}, 0).shape;
     CHECK_FALSE(before->moves());
-    CHECK(deformation.over(clock_24, 0, 1, nullptr, {}, 0).shape == before);
-    CHECK(deformation.over(clock_24, 1, 2, nullptr, {}, 0).shape->moves());
-    CHECK_FALSE(deformation.over(clock_24, 20, 21, nullptr, {}, 0).shape->moves());
+    CHECK(deformation.over(sequence_clock, 0, 1, nullptr, {}, 0).shape == before);
+    CHECK(deformation.over(sequence_clock, 1, 2, nullptr, {}, 0).shape->moves());
+    CHECK_FALSE(deformation.over(sequence_clock, 20, 21, nullptr, {}, 0).shape->moves());
 }
 
 TEST_CASE("users of a deforming level set share those of whole frames, as far as their bands reach", "[deforming]")
@@ -238,15 +238,15 @@ TEST_CASE("users of a deforming level set share those of whole frames, as far as
     const Body ball = fast_ball();
     const DeformingLevelSetPtr body = ball.level_set(voxel);
     Deformation one(body), other(body), wide(body);
-    const Deformation::Interval interval = one.over(clock_24, 2, 3, nullptr, {}, 0);
-    other.over(clock_24, 2, 3, nullptr, {}, 0);
+    const Deformation::Interval interval = one.over(sequence_clock, 2, 3, nullptr, {}, 0);
+    other.over(sequence_clock, 2, 3, nullptr, {}, 0);
     CHECK(one.at_end() == other.at_end());
-    wide.over(clock_24, 2, 3, nullptr, {}, 5 * voxel);
+    wide.over(sequence_clock, 2, 3, nullptr, {}, 5 * voxel);
     CHECK(wide.at_end() != one.at_end());
     CHECK(wide.at_end()->band() >= 5 * voxel * (1 - 1e-6));
     const auto moved = body->transformed(constant_motion({Vec3d(0, 1, 0), Eigen::Quaterniond::Identity(), 1}));
-    CHECK(moved->at(clock_24, 3, 0)->bounds().center().y() > 0.9);
-    CHECK(std::abs(body->at(clock_24, 3, 0)->bounds().center().y()) < 0.1);
+    CHECK(moved->at(sequence_clock, 3, 0)->bounds().center().y() > 0.9);
+    CHECK(std::abs(body->at(sequence_clock, 3, 0)->bounds().center().y()) < 0.1);
 }
 
 TEST_CASE("parts of a frame are parts of its curve", "[deforming]")
@@ -255,6 +255,6 @@ TEST_CASE("parts of a frame are parts of its curve", "[deforming]")
     const ShapePtr whole = ball.over(3, 4, voxel).shape, half = ball.over(3.5, 4, voxel).shape;
     const Path path{{11.4, 0, 0.1}, {-1, 0, 0}, {0, 0, 0}, h, 0};
     const Path later{{11.4 - 0.5 * h, 0, 0.1}, {-1, 0, 0}, {0, 0, 0}, 0.5 * h, 0};
-    const double s = contact_of(whole, path).time;
-    CHECK(contact_of(half, later).time == Approx(s - 0.5 * h).margin(0.002 * h));
+    const double s = contact_with_deforming(whole, path).time;
+    CHECK(contact_with_deforming(half, later).time == Approx(s - 0.5 * h).margin(0.002 * h));
 }

@@ -15,7 +15,7 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const FrameClock clock_24{24, 1};
 
 Eigen::Quaterniond about(const Vec3d& axis, double angle)

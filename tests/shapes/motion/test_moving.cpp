@@ -13,7 +13,7 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const FrameClock clock_1{1, 0};  // a frame a second
 
 MotionPtr along(const Vec3d& way) { return keyed_motion({{0, {}}, {1, {way}}}); }

@@ -9,6 +9,7 @@
 #include "runtime/parallel.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
+#include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -17,7 +18,7 @@ using rapid::test::close_to;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 std::vector<Birthplace> births(const ScatterPtr& scatter, std::size_t n, std::uint64_t seed = 1)
 {
@@ -65,17 +66,6 @@ MeshPtr both(const MeshPtr& a, const MeshPtr& b, bool turn_b)
         mesh->triangles.push_back(t.array() + first);
     }
     return mesh;
-}
-
-template <class F>
-std::string message_of(const F& f)
-{
-    try {
-        f();
-    } catch (const Error& e) {
-        return e.what();
-    }
-    return "nothing was thrown";
 }
 
 }  // namespace
@@ -258,27 +248,27 @@ TEST_CASE("births in a level set are inside it, and uniform by volume", "[scatte
 TEST_CASE("sources without area or volume are refused with the numbers", "[scatter]")
 {
     const Vec3d o = Vec3d::Zero();
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    scatter_on_surface(make_mesh({{0, 0, 0}, {1, 0, 0}}, {{0, 1, 1}}));
                }),
                Equals("mesh \"points and faces\" has 1 faces and no area; nothing can be born on it"));
     CHECK_THAT(
-        message_of([&] { scatter_in_volume(make_grid(1, 1, 2, o)); }),
+        test::error_of([&] { scatter_in_volume(make_grid(1, 1, 2, o)); }),
         Equals("mesh \"grid\" bounds no volume: 8 of its edges have an odd number of faces; close it, or use its "
                "surface"));
     CHECK_THAT(
-        message_of([&] { scatter_in_volume(both(make_grid(1, 1, 2, o), make_grid(1, 1, 2, o), true)); }),
+        test::error_of([&] { scatter_in_volume(both(make_grid(1, 1, 2, o), make_grid(1, 1, 2, o), true)); }),
         Equals("mesh \"grid\" bounds no volume: 16 of its edges have an odd number of faces; close it, or use its "
                "surface"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    scatter_in_volume(make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}));
                }),
                Equals("mesh \"points and faces\" has 2 faces and no volume; use its surface"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    scatter_on_surface(make_plane({0, 1, 0}, 0));
                }),
                Equals("a plane has no finite surface to be born on; use a mesh, a level set, a sphere or a box"));
-    CHECK_THAT(message_of([&] {
+    CHECK_THAT(test::error_of([&] {
                    scatter_in_volume(make_plane({0, 1, 0}, 0));
                }),
                Equals("a plane has no finite volume to be born in; use a closed mesh, a level set, a sphere or a box"));

@@ -11,7 +11,7 @@ using namespace rapid::test;
 
 namespace {
 
-std::vector<Birthplace> births(const ScatterPtr& scatter, std::size_t n)
+std::vector<Birthplace> places_of(const ScatterPtr& scatter, std::size_t n)
 {
     std::vector<Birthplace> out(n);
     scatter->place(RandomKey(1, "emit1"), 0, out);
@@ -30,7 +30,7 @@ std::vector<float> by_x(const Mesh& mesh)
     return density;
 }
 
-std::vector<float> everywhere(const Mesh& mesh, float density)
+std::vector<float> uniform(const Mesh& mesh, float density)
 {
     return std::vector<float>(3 * mesh.triangles.size(), density);
 }
@@ -45,7 +45,7 @@ TEST_CASE("births by the density x on a square are distributed as x², and unifo
     const MeshPtr mesh = square(divisions);
     constexpr std::size_t n = 200'000, bins = 20;
     std::vector<double> along(bins), across(bins);
-    for (const Birthplace& birth : births(scatter_by_density(mesh, by_x(*mesh)), n)) {
+    for (const Birthplace& birth : places_of(scatter_by_density(mesh, by_x(*mesh)), n)) {
         ++along[std::min(bins - 1, static_cast<std::size_t>(birth.P.x() * bins))];
         ++across[std::min(bins - 1, static_cast<std::size_t>(birth.P.z() * bins))];
     }
@@ -63,7 +63,7 @@ TEST_CASE("births by the density x on a square are distributed as x², and unifo
 TEST_CASE("a birth by density lies on its face, at its weights, with the face's normal", "[scatter][density]")
 {
     const MeshPtr mesh = make_torus(1, 0.3, 12, Vec3d::Zero());
-    for (const Birthplace& birth : births(scatter_by_density(mesh, everywhere(*mesh, 3)), 500)) {
+    for (const Birthplace& birth : places_of(scatter_by_density(mesh, uniform(*mesh, 3)), 500)) {
         const Mesh::Triangle& t = mesh->triangles.at(static_cast<std::size_t>(birth.element));
         const auto corner = [&](int c) { return mesh->positions[static_cast<std::size_t>(t[c])]; };
         const Vec3f there = (1 - birth.b1 - birth.b2) * corner(0) + birth.b1 * corner(1) + birth.b2 * corner(2);
@@ -80,11 +80,11 @@ TEST_CASE("nothing is born where the density is 0, whatever batch a birth is in"
     std::vector<float> density = by_x(*mesh);
     for (float& d : density) d = d > 0.55f ? 1.0f : 0.0f;
     const ScatterPtr scatter = scatter_by_density(mesh, density);
-    const std::vector<Birthplace> all = births(scatter, 5000);
+    const std::vector<Birthplace> all = places_of(scatter, 5000);
     for (const Birthplace& birth : all) CHECK(birth.P.x() >= 0.5f);
     std::vector<Birthplace> later(7);
     scatter->place(RandomKey(1, "emit1"), 4000, later);
     for (std::size_t i = 0; i < later.size(); ++i) CHECK(later[i].P == all[4000 + i].P);
-    CHECK(error_of([&] { scatter_by_density(mesh, everywhere(*mesh, 0)); }) ==
+    CHECK(error_of([&] { scatter_by_density(mesh, uniform(*mesh, 0)); }) ==
           "the density is 0 wherever the mesh has area; it must be above 0 somewhere");
 }

@@ -18,7 +18,8 @@ using test::NarrowBall;
 using test::points;
 using test::Scene;
 
-constexpr double g = 9.81, h = 1.0 / 24;
+using test::g;
+using test::h;
 constexpr double degrees = std::numbers::pi / 180;
 
 // A ball dropped from rest, bouncing with ε on a floor that it touches at the height 0.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "tests/solver/scene.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -9,7 +10,7 @@ namespace {
 
 using test::close_to;
 
-constexpr double g = 9.81;
+using test::g;
 const HalfSpace floor_plane{{0, 1, 0}, 0};
 
 void add(PlaneBatch& batch, const Vec3d& P, const Vec3d& v, const Vec3d& a = {0, -g, 0})

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "tests/solver/scene.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -9,7 +10,7 @@ namespace {
 
 using test::close_to;
 
-constexpr double g = 9.81;
+using test::g;
 
 Support support(const Vec3d& normal, double friction)
 {

@@ -26,6 +26,8 @@ public:
     }
 };
 
+inline std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
+
 class Granular : public Scene {
 public:
     ShapeLoads loads;

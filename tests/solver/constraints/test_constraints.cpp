@@ -20,7 +20,7 @@ using test::points;
 using test::rods;
 using test::Scene;
 
-constexpr double g = 9.81;
+using test::g;
 
 // A chain of n links that hangs straight down from an immovable point.
 Scene chain(std::size_t n, double link, double compliance, float mass = 1)

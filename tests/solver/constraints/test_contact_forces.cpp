@@ -14,7 +14,7 @@ using test::points;
 using test::same_bits;
 using test::Scene;
 
-constexpr double g = 9.81;
+using test::g;
 
 void record(Granular& scene)
 {

@@ -24,10 +24,9 @@ using test::Granular;
 using test::points;
 using test::same_bits;
 
-constexpr double g = 9.81;
+using test::g;
 
-std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
-
+using test::alike;
 TEST_CASE("a head-on impact keeps the momentum, and bounces back by its restitution", "[contacts]")
 {
     const float bounce = GENERATE(0.0f, 0.5f, 1.0f);

@@ -13,13 +13,13 @@ namespace rapid {
 namespace {
 
 // Points in free space, of random masses and velocities; links between neighbours in pairs.
-struct Pairs {
+struct FoundPairs {
     std::vector<ProjectedPoint> points;
     std::vector<Vec3d> v, start, displacement;
     std::vector<double> inverse_mass;
     Substep step;
 
-    explicit Pairs(unsigned seed, std::size_t n = 8) : random_(seed)
+    explicit FoundPairs(unsigned seed, std::size_t n = 8) : random_(seed)
     {
         for (std::size_t i = 0; i < n; ++i) {
             const double w = std::pow(10, 3 * number_(random_));
@@ -73,9 +73,9 @@ private:
 TEST_CASE("no pair has more energy than before, but for what is told, and each keeps its momentum", "[energy_bound]")
 {
     rc::prop("", [](unsigned seed) {
-        Pairs pairs(seed);
+        FoundPairs pairs(seed);
         EnergyBound bound;
-        bound.begin(pairs.step, Pairs::nothing);
+        bound.begin(pairs.step, FoundPairs::nothing);
         std::vector<double> before;
         std::vector<Vec3d> momentum;
         for (std::size_t i = 0; i < pairs.v.size(); i += 2)
@@ -93,9 +93,9 @@ TEST_CASE("no pair has more energy than before, but for what is told, and each k
 
 TEST_CASE("a change that takes energy stays as it is, and is told", "[energy_bound]")
 {
-    Pairs pairs(1, 2);
+    FoundPairs pairs(1, 2);
     EnergyBound bound;
-    bound.begin(pairs.step, Pairs::nothing);
+    bound.begin(pairs.step, FoundPairs::nothing);
     const double before = pairs.energy(0);
     const Vec3d mean = pairs.momentum(0) / (1 / pairs.inverse_mass[0] + 1 / pairs.inverse_mass[1]);
     pairs.v[0] = pairs.v[1] = mean;
@@ -107,10 +107,10 @@ TEST_CASE("a change that takes energy stays as it is, and is told", "[energy_bou
 
 TEST_CASE("a pair that corrections of positions lift out of all proportion moves as a rigid body", "[energy_bound]")
 {
-    Pairs pairs(1, 4);
+    FoundPairs pairs(1, 4);
     pairs.step.displacement = pairs.displacement;
     EnergyBound bound;
-    bound.begin(pairs.step, Pairs::nothing);
+    bound.begin(pairs.step, FoundPairs::nothing);
     RigidFallback fallback;
     fallback.begin(pairs.step);
     const double before = pairs.energy(0), length = (pairs.start[0] - pairs.start[1]).norm();
@@ -130,7 +130,7 @@ TEST_CASE("a pair that corrections of positions lift out of all proportion moves
 TEST_CASE("a pair that corrections of positions move farther off what a spring draws it to has no solution",
           "[energy_bound]")
 {
-    Pairs pairs(1, 2);
+    FoundPairs pairs(1, 2);
     pairs.step.displacement = pairs.displacement;
     std::vector<Mobility> mobility(2, {0.01, 5e-5});
     const ShapePtr sphere = make_sphere_shape(0.3, Vec3d::Zero());
@@ -144,7 +144,7 @@ TEST_CASE("a pair that corrections of positions move farther off what a spring d
     pairs.v.assign(2, Vec3d::Zero());
     pairs.step.mobility = mobility, pairs.step.surface_springs = springs;
     EnergyBound bound;
-    bound.begin(pairs.step, Pairs::nothing);
+    bound.begin(pairs.step, FoundPairs::nothing);
     RigidFallback fallback;
     fallback.begin(pairs.step);
     pairs.points[0].P.y() += (std::sqrt(1.8) - 1) * 0.1;
@@ -156,10 +156,10 @@ TEST_CASE("a pair that corrections of positions move farther off what a spring d
 
 TEST_CASE("a pair without a solution, one of whose points a place holds, stays where it was", "[energy_bound]")
 {
-    Pairs pairs(1, 2);
+    FoundPairs pairs(1, 2);
     pairs.step.displacement = pairs.displacement;
     EnergyBound bound;
-    bound.begin(pairs.step, Pairs::nothing);
+    bound.begin(pairs.step, FoundPairs::nothing);
     RigidFallback fallback;
     fallback.begin(pairs.step);
     for (ProjectedPoint& point : pairs.points) point.P += Vec3d(0, 1e6, 0);
@@ -167,7 +167,7 @@ TEST_CASE("a pair without a solution, one of whose points a place holds, stays w
         islands.link(std::array{0u, 1u});
         islands.drive(1u, {});
     };
-    bound.close(pairs.step, Pairs::nothing, link, &fallback);
+    bound.close(pairs.step, FoundPairs::nothing, link, &fallback);
     for (std::size_t i : {0, 1}) {
         CHECK(pairs.points[i].P == pairs.start[i]);
         CHECK(pairs.v[i].isZero(0));
@@ -178,7 +178,7 @@ TEST_CASE("a pair without a solution, one of whose points a place holds, stays w
 TEST_CASE("what a point drives has no more energy than before, as it is seen from there", "[energy_bound]")
 {
     rc::prop("", [](unsigned seed) {
-        Pairs pairs(seed);
+        FoundPairs pairs(seed);
         std::vector<Vec3d> A(pairs.v.size(), Vec3d::Zero());
         for (std::size_t i = 1; i < pairs.v.size(); i += 2) {
             A[i - 1] = 100 * pairs.any();
@@ -189,7 +189,7 @@ TEST_CASE("what a point drives has no more energy than before, as it is seen fro
             return (0.5 * v.squaredNorm() - a.dot(pairs.points[i].P)) / pairs.inverse_mass[i];
         };
         EnergyBound bound;
-        bound.begin(pairs.step, Pairs::nothing);
+        bound.begin(pairs.step, FoundPairs::nothing);
         std::vector<double> before;
         for (std::size_t i = 0; i < pairs.v.size(); i += 2) before.push_back(seen(i));
         const double shift = *rc::gen::elementOf(std::vector<double>{0, 1e-3});
@@ -204,7 +204,7 @@ TEST_CASE("what a point drives has no more energy than before, as it is seen fro
                 islands.move(i + 1, Drive::of(v[i + 1] - dt * A[i], v[i + 1], dt));
             }
         };
-        bound.close(pairs.step, Pairs::nothing, link, nullptr);
+        bound.close(pairs.step, FoundPairs::nothing, link, nullptr);
         for (std::size_t i = 0; i < pairs.v.size(); i += 2) {
             const double rounding = 1e-9 * (1 + std::abs(before[i / 2]));
             if (seen(i) <= before[i / 2] + rounding) continue;
@@ -220,7 +220,7 @@ TEST_CASE("what a point drives has no more energy than before, as it is seen fro
 TEST_CASE("what two points drive apart has no more than a wall of their speed would give", "[energy_bound]")
 {
     rc::prop("", [](unsigned seed) {
-        Pairs pairs(seed, 3);
+        FoundPairs pairs(seed, 3);
         pairs.step.acceleration.setZero();
         double spread = 0;
         for (const std::size_t i : {1, 2}) {
@@ -231,13 +231,13 @@ TEST_CASE("what two points drive apart has no more than a wall of their speed wo
         const Vec3d mean = 0.5 * (pairs.v[1] + pairs.v[2]);
         const double before = (pairs.v[0] - mean).norm();
         EnergyBound bound;
-        bound.begin(pairs.step, Pairs::nothing);
+        bound.begin(pairs.step, FoundPairs::nothing);
         pairs.v[0] += 1e3 * pairs.any();
         const auto link = [](EnergyIslands& islands) {
             islands.link(std::array{0u, 1u});
             islands.link(std::array{0u, 2u});
         };
-        bound.close(pairs.step, Pairs::nothing, link, nullptr);
+        bound.close(pairs.step, FoundPairs::nothing, link, nullptr);
         RC_ASSERT((pairs.v[0] - mean).norm() <= before + 2 * spread + 1e-9);
     });
 }

@@ -17,10 +17,9 @@ using test::Granular;
 using test::points;
 using test::same_bits;
 
-constexpr double g = 9.81;
+using test::g;
 
-std::vector<float> alike(std::size_t n, float value) { return std::vector<float>(n, value); }
-
+using test::alike;
 double kinetic_energy(const Granular& scene)
 {
     const auto* mass = scene.points.find<float>("mass");

@@ -10,7 +10,7 @@ namespace {
 using test::Granular;
 using test::points;
 
-std::string error_of(Granular& scene)
+std::string projection_error(Granular& scene)
 {
     try {
         scene.run(1);
@@ -26,7 +26,7 @@ TEST_CASE("points that become infinite within a frame stop it before neighbours 
     Granular scene(points({{0, 0, 0}, {0.3f, 0, 0}, {5, 0, 0}}).set<float>("pscale", {0.2f, 0.2f, 0.2f}));
     scene.force([huge](const Chunk& chunk, std::size_t i) { return Vec3d(chunk.P[i].x() > 1 ? huge : 0, 0, 0); });
     scene.substeps(8);
-    CHECK(error_of(scene) ==
+    CHECK(projection_error(scene) ==
           "point 2, frame 1: P became {inf, 0, 0} in a sub-step; the frame was not written; weaker forces or more "
           "sub-steps would keep it finite; it had P = {5, 0, 0}, v = {0, 0, 0}, pscale = 0.2");
 }

@@ -71,7 +71,7 @@ Scene scene_of(const Linked& linked, double compliance, int substeps)
     return scene;
 }
 
-double kinetic_energy(const Scene& scene, const Linked& linked)
+double energy_of_links(const Scene& scene, const Linked& linked)
 {
     double sum = 0;
     for (std::size_t i = 0; i < linked.P.size(); ++i) sum += 0.5 * linked.mass[i] * scene.v(i).squaredNorm();
@@ -94,10 +94,10 @@ TEST_CASE("rods give no energy, whatever they link and however they turn", "[con
             size += linked.mass[i] * linked.v[i].cast<double>().norm();
         }
         Scene scene = scene_of(linked, 0, substeps);
-        double before = kinetic_energy(scene, linked);
+        double before = energy_of_links(scene, linked);
         for (int f = 0; f < 12; ++f) {
             scene.run(1);
-            const double now = kinetic_energy(scene, linked);
+            const double now = energy_of_links(scene, linked);
             // Positions and velocities are rounded once a frame.
             RC_ASSERT(now <= before * (1 + 1e-5));
             before = now;
@@ -117,7 +117,7 @@ TEST_CASE("springs between points give no energy, however stiff", "[constraints]
         const Linked linked = random_links(seed, n, 0, 3);
         Scene scene = scene_of(linked, compliance, substeps);
         const auto energy = [&] {
-            double sum = kinetic_energy(scene, linked);
+            double sum = energy_of_links(scene, linked);
             for (const auto& link : linked.links) {
                 const auto i = static_cast<std::size_t>(link[0]), j = static_cast<std::size_t>(link[1]);
                 const double stretch =
@@ -143,10 +143,10 @@ TEST_CASE("two heavy points with a light hub between them lose less than 1 % a s
                         links_of_chain(2)};
     Scene scene = scene_of(linked, 0, 16);
     scene.run(1);  // takes off what is along the rods at first
-    const double first = kinetic_energy(scene, linked);
+    const double first = energy_of_links(scene, linked);
     scene.run(120);
-    CHECK(kinetic_energy(scene, linked) <= first * (1 + 1e-5));
-    CHECK(kinetic_energy(scene, linked) >= first * 0.95);
+    CHECK(energy_of_links(scene, linked) <= first * (1 + 1e-5));
+    CHECK(energy_of_links(scene, linked) >= first * 0.95);
 }
 
 TEST_CASE("a free dumbbell at 0.2 rad a sub-step keeps energy and angular momentum", "[constraints]")
@@ -158,10 +158,10 @@ TEST_CASE("a free dumbbell at 0.2 rad a sub-step keeps energy and angular moment
                         links_of_chain(1)};
     Scene scene = scene_of(linked, 0, 4);
     const auto spin = [&] { return Vec3d(scene.P(0).cross(scene.v(0)) + 3 * scene.P(1).cross(scene.v(1))); };
-    const double first = kinetic_energy(scene, linked);
+    const double first = energy_of_links(scene, linked);
     const Vec3d L = spin();
     scene.run(240);
-    CHECK(kinetic_energy(scene, linked) == Approx(first).epsilon(1e-4));
+    CHECK(energy_of_links(scene, linked) == Approx(first).epsilon(1e-4));
     CHECK((spin() - L).norm() < 1e-4 * L.norm());
 }
 

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t points = 12, rows = 20, arity = 2;
+constexpr std::size_t point_count = 12, rows = 20, arity = 2;
 
 // Random rows over pairs of points, with masses over three decades.
 struct RandomRows {
@@ -20,31 +20,32 @@ struct RandomRows {
     {
         std::mt19937 random(seed);
         std::uniform_real_distribution<double> number(-1, 1);
-        system.begin(rows, arity, points);
+        system.begin(rows, arity, point_count);
         std::vector<std::uint32_t> numbers(rows);
         for (std::uint32_t r = 0; r < rows; ++r) {
             numbers[r] = r;
-            const auto first = static_cast<std::uint32_t>(random() % points);
+            const auto first = static_cast<std::uint32_t>(random() % point_count);
             system.points[r * arity] = first;
-            system.points[r * arity + 1] = static_cast<std::uint32_t>((first + 1 + random() % (points - 1)) % points);
+            system.points[r * arity + 1] =
+                static_cast<std::uint32_t>((first + 1 + random() % (point_count - 1)) % point_count);
             for (std::size_t k = 0; k < arity; ++k)
                 system.gradient[r * arity + k] = Vec3d(number(random), number(random), number(random));
             system.e[r] = number(random);
             system.s[r] = compliance;
         }
         for (double& w : system.w) w = std::pow(10, 1.5 * number(random));
-        schedule = RowSchedule(numbers, system.points, arity, std::vector<std::uint8_t>(points), false);
+        schedule = RowSchedule(numbers, system.points, arity, std::vector<std::uint8_t>(point_count), false);
     }
 
     Eigen::MatrixXd matrix() const
     {
-        Eigen::MatrixXd G = Eigen::MatrixXd::Zero(rows, 3 * points);
-        Eigen::VectorXd w(3 * points);
+        Eigen::MatrixXd G = Eigen::MatrixXd::Zero(rows, 3 * point_count);
+        Eigen::VectorXd w(3 * point_count);
         for (std::size_t r = 0; r < rows; ++r)
             for (std::size_t k = 0; k < arity; ++k)
                 G.block<1, 3>(static_cast<Eigen::Index>(r), 3 * system.points[r * arity + k]) +=
                     system.gradient[r * arity + k].transpose();
-        for (std::size_t i = 0; i < points; ++i)
+        for (std::size_t i = 0; i < point_count; ++i)
             w.segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(system.w[i]);
         Eigen::MatrixXd A = G * w.asDiagonal() * G.transpose();
         for (std::size_t r = 0; r < rows; ++r) {

@@ -17,7 +17,7 @@ using test::Granular;
 using test::points;
 using test::same_bits;
 
-constexpr double g = 9.81;
+using test::g;
 constexpr float r = 0.05f;
 
 // n spheres that fall into a box of the floor's friction, from a loose lattice.

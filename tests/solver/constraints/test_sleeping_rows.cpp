@@ -21,7 +21,7 @@ using test::rods;
 using test::same_bits;
 using test::Scene;
 
-constexpr double g = 9.81;
+using test::g;
 
 class Drag : public Force {
 public:

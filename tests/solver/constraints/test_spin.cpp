@@ -17,7 +17,7 @@ using test::Granular;
 using test::points;
 using test::same_bits;
 
-constexpr double g = 9.81;
+using test::g;
 
 class Spinning : public Granular {
 public:

@@ -23,7 +23,7 @@ PointSet row_of(std::size_t n, float spacing)
 }
 
 // A chain whose first point is turned about the others, and falls.
-Scene chain(int substeps)
+Scene falling_chain(int substeps)
 {
     Scene scene(row_of(6, 0.1f));
     scene.points.v().write()[0] = {0, 3, 1};
@@ -49,7 +49,7 @@ struct Pile {
     }
 };
 
-CoupledErrors::Errors frame(CoupledErrors& errors, Scene& scene)
+CoupledErrors::Errors errors_of_frame(CoupledErrors& errors, Scene& scene)
 {
     errors.begin(scene.points, scene.dynamics, scene.options);
     scene.run(1);
@@ -68,12 +68,12 @@ std::vector<double> twice_the_distances(const Scene& a, const Scene& b)
 TEST_CASE("the error of coupled points is twice their distance from a run of twice the sub-steps", "[coupled errors]")
 {
     CoupledErrors of_chain, of_pile;
-    Scene coarse = chain(4), fine = chain(8);
+    Scene coarse = falling_chain(4), fine = falling_chain(8);
     Pile pile(20, 4), finer(20, 8);
     for (int f = 0; f < 20; ++f) {
-        const std::vector<double> chain_errors = frame(of_chain, coarse).since_birth;
+        const std::vector<double> chain_errors = errors_of_frame(of_chain, coarse).since_birth;
         CHECK(chain_errors == twice_the_distances(coarse, fine.run(1)));
-        const std::vector<double> pile_errors = frame(of_pile, pile.scene).since_birth;
+        const std::vector<double> pile_errors = errors_of_frame(of_pile, pile.scene).since_birth;
         CHECK(pile_errors == twice_the_distances(pile.scene, finer.scene.run(1)));
     }
     CHECK(of_chain.end(coarse.points).unknown.empty());
@@ -83,7 +83,7 @@ TEST_CASE("an estimate changes nothing of the points and of what their constrain
 {
     CoupledErrors errors;
     Pile with(50, 3), without(50, 3);
-    for (int f = 0; f < 30; ++f) frame(errors, with.scene);
+    for (int f = 0; f < 30; ++f) errors_of_frame(errors, with.scene);
     without.scene.run(30);
     CHECK(same_bits(with.scene.points, without.scene.points));
 }
@@ -91,7 +91,7 @@ TEST_CASE("an estimate changes nothing of the points and of what their constrain
 TEST_CASE("changes by nodes, births and deaths are those of the shadows, too", "[coupled errors]")
 {
     CoupledErrors errors;
-    Scene coarse = chain(4), fine = chain(8);
+    Scene coarse = falling_chain(4), fine = falling_chain(8);
     const auto both = [&](const auto& change) { change(coarse.points), change(fine.points); };
     for (int f = 0; f < 12; ++f) {
         both([&](PointSet& points) {
@@ -106,7 +106,7 @@ TEST_CASE("changes by nodes, births and deaths are those of the shadows, too", "
                 points.id().write()[5] = 77;
             }
         });
-        const std::vector<double> found = frame(errors, coarse).since_birth,
+        const std::vector<double> found = errors_of_frame(errors, coarse).since_birth,
                                   expected = twice_the_distances(coarse, fine.run(1));
         REQUIRE(found.size() == expected.size());
         // Velocities are added to in single precision, here and there.
@@ -121,7 +121,7 @@ TEST_CASE("of too many points the errors of the frames 1, 2, 4, 8, ... and 40 ar
     Pile pile(CoupledErrors::most_points + 1, 2);
     for (int f = 0; f < 42; ++f) {
         const bool is_due = f < 2 || f == 3 || f == 7 || f == 15 || f == 31 || f == 39;
-        const CoupledErrors::Errors found = frame(errors, pile.scene);
+        const CoupledErrors::Errors found = errors_of_frame(errors, pile.scene);
         CHECK(found.since_birth.empty());
         CHECK_THAT(found.unknown, Catch::Contains("more than 1,000 points act on one another"));
         REQUIRE(found.of_frame.size() == (is_due ? pile.scene.points.size() : 0));
@@ -137,7 +137,7 @@ TEST_CASE("the error of one frame is that of all of its sub-frames", "[coupled e
     Pile pile(CoupledErrors::most_points + 1, 1), fine(CoupledErrors::most_points + 1, 2);
     for (int step = 0; step < 9; ++step) {
         pile.scene.options.begins_frame = step % 3 == 0;  // the third frame is not due
-        const CoupledErrors::Errors found = frame(errors, pile.scene);
+        const CoupledErrors::Errors found = errors_of_frame(errors, pile.scene);
         fine.scene.run(1);
         if (step < 3) CHECK(found.of_frame == twice_the_distances(pile.scene, fine.scene));
         CHECK(found.of_frame.empty() == (step >= 6));
@@ -155,7 +155,7 @@ TEST_CASE("what can't be solved a second time is named", "[coupled errors]")
     links->rows->add({0, 1}, {0.1}, 0);
     scene.dynamics.add(links);
     CoupledErrors errors;
-    const CoupledErrors::Errors found = frame(errors, scene);
+    const CoupledErrors::Errors found = errors_of_frame(errors, scene);
     CHECK(found.since_birth.empty());
     CHECK(found.of_frame.empty());
     CHECK_THAT(found.unknown, Catch::Contains("\"links1\""));

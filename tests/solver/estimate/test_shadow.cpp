@@ -30,7 +30,7 @@ auto by(float way)
     };
 }
 
-std::vector<double> frame(Shadows& shadows, PointSet& points, float way, float finer_way)
+std::vector<double> shadow_frame(Shadows& shadows, PointSet& points, float way, float finer_way)
 {
     shadows.begin(points, false);
     by(way)(points);
@@ -55,13 +55,13 @@ TEST_CASE("errors of frames accumulate from a point's birth on", "[shadow]")
     Shadows shadows;
     PointSet points = points_with_ids(0, 10);
     for (int f = 1; f <= 4; ++f) {
-        const std::vector<double> errors = frame(shadows, points, 1, 1.25f);
+        const std::vector<double> errors = shadow_frame(shadows, points, 1, 1.25f);
         CHECK(errors == std::vector<double>(10, 2 * 0.25 * f));
     }
     // Those born now have been off for one frame.
     PointSet both = points_with_ids(0, 13);
     std::copy_n(points.P().read().data, 10, both.P().write().begin());
-    std::vector<double> errors = frame(shadows, both, 1, 1.25f);
+    std::vector<double> errors = shadow_frame(shadows, both, 1, 1.25f);
     std::sort(errors.begin(), errors.end());
     CHECK(errors.front() == 0.5);
     CHECK(errors[2] == 0.5);
@@ -72,21 +72,21 @@ TEST_CASE("changes of a point by nodes between two frames are applied to its sha
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 3);
-    frame(shadows, points, 1, 1.25f);
+    shadow_frame(shadows, points, 1, 1.25f);
     for (Vec3f& P : points.P().write()) P += Vec3f(0, 7, -3);
-    CHECK(frame(shadows, points, 1, 1).front() == 0.5);
+    CHECK(shadow_frame(shadows, points, 1, 1).front() == 0.5);
 }
 
 TEST_CASE("of many points 1,000 to 1,250 have a shadow, the same ones in any order of birth", "[shadow]")
 {
     Shadows shadows;
     PointSet points = points_with_ids(0, 900);
-    CHECK(frame(shadows, points, 0, 0).size() == 900);
+    CHECK(shadow_frame(shadows, points, 0, 0).size() == 900);
     points = points_with_ids(0, 50000);
-    CHECK(frame(shadows, points, 0, 0).size() == 1000);
+    CHECK(shadow_frame(shadows, points, 0, 0).size() == 1000);
     for (std::int64_t n = 51000; n < 90000; n += 1000) {
         points = points_with_ids(0, n);
-        const std::size_t size = frame(shadows, points, 0, 0).size();
+        const std::size_t size = shadow_frame(shadows, points, 0, 0).size();
         CHECK(size >= 1000);
         CHECK(size <= 1250);
     }
@@ -97,7 +97,7 @@ TEST_CASE("the shadow of a point dies with it, and stays with a point that moves
     Shadows shadows;
     PointSet points = points_with_ids(0, 100);
     for (std::size_t i = 0; i < 100; ++i) points.P().write()[i].y() = static_cast<float>(i);
-    frame(shadows, points, 1, 1.5f);
+    shadow_frame(shadows, points, 1, 1.5f);
     std::vector<std::uint8_t> keep(100, 1);
     keep[3] = keep[50] = keep[99] = 0;
     points.keep(keep);
@@ -105,7 +105,7 @@ TEST_CASE("the shadow of a point dies with it, and stays with a point that moves
     std::vector<std::uint32_t> reversed(left);
     for (std::size_t i = 0; i < left; ++i) reversed[i] = static_cast<std::uint32_t>(left - 1 - i);
     points = points.select(reversed);
-    CHECK(frame(shadows, points, 1, 1.5f) == std::vector<double>(left, 2.0));
+    CHECK(shadow_frame(shadows, points, 1, 1.5f) == std::vector<double>(left, 2.0));
 }
 
 TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
@@ -114,7 +114,7 @@ TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
         Shadows shadows;
         std::int64_t next = 3000;
         PointSet points = points_with_ids(0, next);
-        frame(shadows, points, 0, 0);
+        shadow_frame(shadows, points, 0, 0);
         for (int f = 0; f < 4; ++f) {
             // Of a stretch many die, elsewhere few.
             const auto first = *rc::gen::inRange<std::size_t>(0, points.size());
@@ -126,7 +126,7 @@ TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
             for (std::size_t i = 0; i < keep.size(); ++i)
                 if (!keep[i]) expected.erase(points.id()[i]);
             points.keep(keep);
-            frame(shadows, points, 0, 0);
+            shadow_frame(shadows, points, 0, 0);
             RC_ASSERT(std::set<std::int64_t>(shadows.ids().begin(), shadows.ids().end()) == expected);
             for (std::size_t k = 0; k < shadows.ids().size(); ++k)
                 RC_ASSERT(points.id()[shadows.indices()[k]] == shadows.ids()[k]);
@@ -159,7 +159,7 @@ TEST_CASE("exact frames are not solved again while no shadow differs from its po
     CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>{0});
     CHECK(solved == 0);
     // From here on the errors that there are go on being told, of those too that were born in between.
-    CHECK(frame(shadows, points, 1, 1.25f) == std::vector<double>(20, 0.5));
+    CHECK(shadow_frame(shadows, points, 1, 1.25f) == std::vector<double>(20, 0.5));
     CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>(20, 0.5));
     CHECK(solved == 1);
     PointSet nobody;

@@ -13,8 +13,8 @@ namespace {
 using test::close_to;
 using test::Scene;
 
-const Vec3d g(0.5, -9.81, 1);
-constexpr double h = 1.0 / 24;
+const Vec3d gravity(0.5, -9.81, 1);
+using test::h;
 
 struct Crowd {
     std::vector<Vec3f> P, v;
@@ -38,7 +38,7 @@ bool comes_near(const Vec3d& P, const Vec3d& v, double t, const Box3d& box, doub
 {
     for (int k = 0; k <= 256; ++k) {
         const double s = t * k / 256;
-        if (box.exteriorDistance(Vec3d(P + s * (v + 0.5 * s * g))) <= margin) return true;
+        if (box.exteriorDistance(Vec3d(P + s * (v + 0.5 * s * gravity))) <= margin) return true;
     }
     return false;
 }
@@ -53,13 +53,13 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[ballisti
     const Crowd crowd(n);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    BallisticBatch(g, 0).advance(P, v, crowd.time(own), begin, n, near);
+    BallisticBatch(gravity, 0).advance(P, v, crowd.time(own), begin, n, near);
     CHECK(near.empty());
     for (std::size_t i = 0; i < n; ++i) {
         const double t = i < begin ? 0 : crowd.time(own)(i);
         const Vec3d from = crowd.P[i].cast<double>(), speed = crowd.v[i].cast<double>();
-        REQUIRE_THAT(P[i], close_to(Vec3f((from + t * (speed + 0.5 * t * g)).cast<float>()), 1e-7));
-        REQUIRE_THAT(v[i], close_to(Vec3f((speed + t * g).cast<float>()), 1e-6));
+        REQUIRE_THAT(P[i], close_to(Vec3f((from + t * (speed + 0.5 * t * gravity)).cast<float>()), 1e-7));
+        REQUIRE_THAT(v[i], close_to(Vec3f((speed + t * gravity).cast<float>()), 1e-6));
     }
 }
 
@@ -74,7 +74,7 @@ TEST_CASE("points that come near a box are not advanced, and are listed in order
         {Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2)},
         {Vec3d::Constant(-std::numeric_limits<double>::infinity()),
          Vec3d(std::numeric_limits<double>::infinity(), -0.9 - away, std::numeric_limits<double>::infinity())}};
-    BallisticBatch batch(g, 0);
+    BallisticBatch batch(gravity, 0);
     for (const Box3d& box : boxes) batch.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near{42};  // entries of before are kept
@@ -99,14 +99,14 @@ TEST_CASE("points that come near a box are not advanced, and are listed in order
     CHECK(near.size() - 1 <= 2 * met + 8);
 }
 
-// v' = g - k v, by its closed form; k t not so small that it cancels.
-struct Dragged {
+// v' = gravity - k v, by its closed form; k t not so small that it cancels.
+struct DraggedPoint {
     Vec3d P, v;
 
-    Dragged(const Vec3d& from, const Vec3d& speed, double k, double t)
+    DraggedPoint(const Vec3d& from, const Vec3d& speed, double k, double t)
     {
         const double decay = std::exp(-k * t);
-        const Vec3d end = g / k;
+        const Vec3d end = gravity / k;
         v = end + (speed - end) * decay;
         P = from + t * end + (speed - end) * ((1 - decay) / k);
     }
@@ -121,9 +121,9 @@ TEST_CASE("points under drag follow the closed form, each for its own time", "[b
     const Crowd crowd(n);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
-    BallisticBatch(g, k).advance(P, v, crowd.time(own), 0, n, near);
+    BallisticBatch(gravity, k).advance(P, v, crowd.time(own), 0, n, near);
     for (std::size_t i = 0; i < n; ++i) {
-        const Dragged right(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, crowd.time(own)(i));
+        const DraggedPoint right(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, crowd.time(own)(i));
         REQUIRE_THAT(P[i], close_to(Vec3f(right.P.cast<float>()), 1e-7));
         REQUIRE_THAT(v[i], close_to(Vec3f(right.v.cast<float>()), 1e-6));
     }
@@ -137,7 +137,7 @@ TEST_CASE("points under drag that come near a box are not advanced", "[ballistic
     const std::size_t n = 1003;
     const Crowd crowd(n);
     const Box3d box(Vec3d(away - 0.3, -0.2, -0.4), Vec3d(away + 0.1, 0.3, 0.2));
-    BallisticBatch batch(g, k);
+    BallisticBatch batch(gravity, k);
     batch.avoid(box, 0.05);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
     std::vector<std::uint32_t> near;
@@ -149,7 +149,7 @@ TEST_CASE("points under drag that come near a box are not advanced", "[ballistic
         bool comes = false;
         for (int part = 0; part <= 256; ++part) {
             const double t = crowd.time(true)(i) * part / 256;
-            const Vec3d at = t > 0 ? Dragged(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, t).P
+            const Vec3d at = t > 0 ? DraggedPoint(crowd.P[i].cast<double>(), crowd.v[i].cast<double>(), k, t).P
                                    : Vec3d(crowd.P[i].cast<double>());
             comes |= box.exteriorDistance(at) <= 0.05;
         }
@@ -167,7 +167,7 @@ TEST_CASE("under drag, points near and far from shapes have the same path", "[ba
         void contribute(const Chunk&, Forces&) const override {}
         std::optional<Uniform> uniform() const override
         {
-            Uniform air{g};
+            Uniform air{gravity};
             air.linear.k = 3;
             air.linear.ku = Vec3d(1, 2, 3);
             return air;

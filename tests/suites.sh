@@ -72,11 +72,11 @@ catch_filter() {
 lua_tests() { "$1/bin/rapid" test --slowest 30 "${@:2}"; }
 
 # sanitized SUITE PRESET FOLDER...: builds the Catch2 tests of these folders with a sanitizer and assertions, and runs
-# them.
+# them; FOLDER_thorough runs the cases of the folder that are tagged [slow].
 sanitized() {
     local name=$1 preset=$2
     shift 2
-    if built "build/$preset" "$preset" "${@/#/test_}"; then
+    if built "build/$preset" "$preset" $(printf 'test_%s ' "${@%_thorough}"); then
         suite "$name" catch_tests "$preset" --tests-regex "^($(IFS='|' && echo "$*"))\$"
     fi
 }

@@ -1,4 +1,5 @@
 -- What a run of many frames keeps: nothing that grows with their number.
+local amount = require "tests.amount"
 local json = require "dkjson"
 local scene = require "testing.scene"
 
@@ -25,12 +26,14 @@ describe("the memory of a run", function()
     assert.equal(20000, #json.decode(scene.folder:read "stats.json").frames)
   end)
 
-  it("does not grow where a function of the frame makes a level set in each", function()
+  local it_if_thorough = amount.thorough and it or function() end
+
+  it_if_thorough("does not grow where a function of the frame makes a level set in each", function()
     local few, many = peak(ball, 150), peak(ball, 450)
     assert.truthy(many - few < 1, ("%g MiB after 150 frames, %g after 450"):format(few, many))
   end)
 
-  it("does not grow with pictures and files of points", function()
+  it_if_thorough("does not grow with pictures and files of points", function()
     local text = "return rapid.create { points = two } :collide { shape = rapid.shape.sphere {} } :gravity {} :solve {}"
     local files = "--size 32x18 -o picture.####.png -o points.####.csv"
     local few, many = peak(text, 100, files), peak(text, 1000, files)
@@ -50,7 +53,7 @@ describe("the memory of a run", function()
   end)
 
   -- The peak varies by a few MiB with the moments of collections; 300 surfaces are hundreds.
-  it("holds no surface of earlier frames where pictures show it", function()
+  it_if_thorough("holds no surface of earlier frames where pictures show it", function()
     local small = "--size 32x18 -o picture.####.png"
     local few, many = peak(ball, 150, small), peak(ball, 450, small)
     assert.truthy(many - few < 20, ("%g MiB after 150 pictures, %g after 450"):format(few, many))

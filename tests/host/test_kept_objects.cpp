@@ -91,7 +91,7 @@ std::size_t most_bytes(Evaluator& evaluator, std::int64_t last)
 
 }  // namespace
 
-TEST_CASE("of level sets that are another one in each frame a few are alive, not one a frame", "[kept]")
+TEST_CASE("of level sets that are another one in each frame a few are alive, not one a frame", "[kept][long]")
 {
     constexpr double uncollected = 16 << 20;  // bytes, which the collector lets be
     for (const double voxel : {0.2, 0.02}) {

@@ -166,7 +166,7 @@ TEST_CASE("alignment and drag never add energy, at any rate", "[interaction]")
 }
 
 TEST_CASE("no strength blows up: a crowd that separates moves no faster than the radius allows",
-          "[interaction][extreme]")
+          "[interaction][extreme][slow]")
 {
     const float strength = GENERATE(1.0f, 1e4f, 1e12f);
     PointSet points = moving_cloud(200, 0.2f, 0);

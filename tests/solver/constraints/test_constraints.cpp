@@ -122,7 +122,7 @@ TEST_CASE("a chain hangs in its closed form, independent of sub-steps and iterat
     }
 }
 
-TEST_CASE("a chain of 1,000 links hangs, and swings, with a strain below 1 %", "[constraints]")
+TEST_CASE("a chain of 1,000 links hangs, and swings, with a strain below 1 %", "[constraints][slow]")
 {
     Scene scene = chain(1000, 0.1, 0);
     const auto P = scene.points.P().write();
@@ -159,7 +159,7 @@ TEST_CASE("rods keep the momentum, and a dumbbell its angular momentum to second
     CHECK((fine < 2e-6 || coarse / fine > 3));
 }
 
-TEST_CASE("a net, which is no tree, has the same bits on any number of threads", "[constraints][threads]")
+TEST_CASE("a net, which is no tree, has the same bits on any number of threads", "[constraints][threads][slow]")
 {
     constexpr std::int64_t side = 60;
     const auto hang = [&](int threads) {

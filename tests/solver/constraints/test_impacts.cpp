@@ -250,7 +250,7 @@ TEST_CASE("balls that bounce on one that lies on the ground gain no energy", "[i
 }
 
 // Clusters that fly into each other, of any masses, friction and iterations, some born overlapping, some between walls.
-TEST_CASE("impacts of random clusters add no energy, and keep the momentum where there are no walls", "[impacts]")
+TEST_CASE("impacts of random clusters add no energy, and keep the momentum where there are no walls", "[impacts][slow]")
 {
     std::mt19937 random(11);
     const auto in = [&](double low, double high) {

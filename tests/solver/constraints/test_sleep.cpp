@@ -84,7 +84,7 @@ TEST_CASE("a pile at rest sleeps: the same bits from frame to frame, and no more
     CHECK(box.deepest() < 0.06 * r);
 }
 
-TEST_CASE("most piles sleep six seconds after their fall, and all after ten", "[sleep]")
+TEST_CASE("most piles sleep six seconds after their fall, and all after ten", "[sleep][slow]")
 {
     int early = 0;
     for (unsigned seed = 1; seed <= 15; ++seed) {

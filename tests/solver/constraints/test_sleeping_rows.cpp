@@ -255,7 +255,7 @@ Granular net(std::int64_t n, const Vec3f& ball)
     return scene;
 }
 
-TEST_CASE("a ball wakes all of a sleeping net, and is caught as by an awake one", "[sleep]")
+TEST_CASE("a ball wakes all of a sleeping net, and is caught as by an awake one", "[sleep][slow]")
 {
     const auto caught = [](bool sleeps) {
         Granular scene = net(8, {0.3f, -10, 0.3f});
@@ -312,7 +312,7 @@ TEST_CASE("a heap of dumbbells falls asleep, and then has the same bits from fra
     CHECK(same_bits(scene.points, rests));
 }
 
-TEST_CASE("islands that fall asleep and wake have the same bits on any number of threads", "[sleep][threads]")
+TEST_CASE("islands that fall asleep and wake have the same bits on any number of threads", "[sleep][threads][slow]")
 {
     const auto run = [](int threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,

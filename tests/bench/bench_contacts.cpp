@@ -290,12 +290,16 @@ public:
     std::shared_ptr<AveragedJacobi> rows = std::make_shared<AveragedJacobi>();
 };
 
-// So many frames of the column under these contacts; after_frame is not timed.
+// s of rest after which points sleep, the default of the node Solve.
+constexpr double default_sleep = 0.25;
+
+// Advances the column by this many frames with these contacts; after_frame is not timed.
 template <class F>
 PointSet collapse(benchmark::State& state, const Column& start, std::shared_ptr<const Constraint> contacts,
-                  std::int64_t frames, int substeps, int iterations, const F& after_frame)
+                  std::int64_t frames, int substeps, int iterations, double sleep, const F& after_frame)
 {
     PointSet points = start.points;
+    points.add({"still", 0.0f});
     Dynamics dynamics = test::chain(std::make_shared<test::UniformForce>(), contacts);
     const double w = start.width;
     for (const auto& [normal, offset] :
@@ -313,6 +317,9 @@ PointSet collapse(benchmark::State& state, const Column& start, std::shared_ptr<
     options.substeps = substeps;
     options.iterations = iterations;
     options.loads = &loads;
+    SleepRecords sleep_records;
+    options.sleep = sleep;
+    options.sleep_records = &sleep_records;
     for (options.frame = 1; options.frame <= frames; ++options.frame) {
         options.time = static_cast<double>(options.frame) * options.h;
         solve(points, dynamics, options);
@@ -334,8 +341,8 @@ void column(benchmark::State& state)
     for (auto _ : state) {
         const auto spheres = std::make_shared<Spheres>();
         spheres->options.friction = 0.3f;
-        overlaps =
-            Overlaps(collapse(state, start, spheres, frames, static_cast<int>(substeps), 1, [](const PointSet&) {}));
+        overlaps = Overlaps(collapse(state, start, spheres, frames, static_cast<int>(substeps), 1, default_sleep,
+                                     [](const PointSet&) {}));
     }
     state.SetItemsProcessed(frames * state.iterations());  // frames a second
     state.counters["p99"] = overlaps.p99;
@@ -375,8 +382,10 @@ void contacts_by(benchmark::State& state)
             contacts = spheres;
         }
         p99 = worst = 0;
+        // No point sleeps: the overlaps are those of the iterations alone.
+        constexpr double never = std::numeric_limits<double>::infinity();
         collapse(state, start, contacts, frames, static_cast<int>(state.range(0)), static_cast<int>(state.range(1)),
-                 [&](const PointSet& points) {
+                 never, [&](const PointSet& points) {
                      const Overlaps overlaps(points);
                      p99 += overlaps.p99 / frames;
                      worst += overlaps.worst / frames;

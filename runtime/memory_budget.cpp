@@ -105,11 +105,17 @@ bool fits_in_memory(double bytes)
     return static_cast<double>(own_memory()) + bytes <= static_cast<double>(memory_budget());
 }
 
+std::uint64_t free_memory()
+{
+    const std::uint64_t most = memory_budget(), used = own_memory();
+    return most - std::min(most, used);
+}
+
 Error beyond_memory(const std::string& what, double bytes, const std::string& remedy)
 {
-    const double most = static_cast<double>(memory_budget()), used = static_cast<double>(own_memory());
     return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set --memory", what,
-                             memory_text(bytes), memory_text(std::max(0.0, most - used)), memory_text(most), remedy));
+                             memory_text(bytes), memory_text(static_cast<double>(free_memory())),
+                             memory_text(static_cast<double>(memory_budget())), remedy));
 }
 
 std::string memory_text(double bytes)

@@ -34,6 +34,9 @@ constexpr std::uint64_t negligible_memory = std::uint64_t{64} << 20;  // bytes
 // Whether the process may have so many bytes more.
 bool fits_in_memory(double bytes);
 
+// Bytes that the process may have more.
+std::uint64_t free_memory();
+
 // "WHAT would take about 119.2 GiB, and 21.3 GiB are free; REMEDY, or set --memory"
 Error beyond_memory(const std::string& what, double bytes, const std::string& remedy);
 

@@ -15,10 +15,12 @@
 #include <csignal>
 #include <cstring>
 #include <ctime>
+#include <limits>
 #include <new>
 
 #include "runtime/files/file_error.h"
 #include "runtime/files/input_file.h"
+#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {
@@ -27,14 +29,17 @@ namespace {
 // times its size).
 struct Limits {
     std::size_t memory;  // bytes
+    bool is_of_budget;   // memory is what the budget leaves, which says nothing about the file
     unsigned seconds;    // of the processor
 };
 
-Limits limits_of(std::size_t file_bytes)
+Limits limits_of(std::size_t file_bytes, std::size_t most_memory)
 {
     constexpr std::size_t base = std::size_t{1} << 30, factor = 64, bytes_a_second = 2'000'000;
     constexpr unsigned base_seconds = 5;
-    return {base + factor * file_bytes, base_seconds + static_cast<unsigned>(file_bytes / bytes_a_second)};
+    const std::size_t memory = base + factor * file_bytes;
+    return {std::min(memory, most_memory), most_memory < memory,
+            base_seconds + static_cast<unsigned>(file_bytes / bytes_a_second)};
 }
 
 enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
@@ -179,14 +184,31 @@ std::string text_of_end(int status, const Limits& limits)
     return "ends its reader";
 }
 
+Error beyond_limit(const Limits& limits)
+{
+    if (limits.is_of_budget)
+        return Error(
+            fmt::format("can't be read: its reader takes more than the {} that are left for it; read a smaller file, "
+                        "or set --memory",
+                        memory_text(static_cast<double>(limits.memory))));
+    return Error(
+        fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged", limits.memory >> 20));
+}
+
 }  // namespace
 
 void confine_copies(std::function<void()> further) { further_limits() = std::move(further); }
 
-void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                  const std::function<void(MessageReader&)>& receive)
+std::size_t memory_of_copy()
 {
-    const Limits limits = limits_of(check_readable(path));
+    if (!is_memory_limited()) return std::numeric_limits<std::size_t>::max();
+    return std::max(negligible_memory, free_memory() / 2);
+}
+
+void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
+                  const std::function<void(MessageReader&)>& receive, std::size_t most_memory)
+{
+    const Limits limits = limits_of(check_readable(path), most_memory);
     const SharedMemory shared(limits.memory);
     // The copy has one thread. In an arena without workers TBB asks for no others, and takes no lock that one of this
     // process's threads, of which the copy has none, may hold.
@@ -218,8 +240,7 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
         case Outcome::Refused:
             throw Error(reader.take_text());
         case Outcome::OutOfMemory:
-            throw Error(fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged",
-                                    limits.memory >> 20));
+            throw beyond_limit(limits);
         case Outcome::None:
             break;
     }

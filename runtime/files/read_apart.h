@@ -1,7 +1,8 @@
 // Reading by a library that trusts files (OpenVDB, Assimp): in a process of its own, so that a damaged or hostile file
 // ends that process, beyond its limits or by a signal, and is an error of that file here.
 //
-// The process is a copy of this one (fork) with limits of memory and time by the file's size. What it has read comes
+// The process is a copy of this one (fork) with limits of memory and time by the file's size, and of memory by what
+// --memory leaves. What it has read comes
 // back in shared memory, and is checked. A file that this process wrote is read here. Where this process may start no
 // others (--untrusted), the reader process forks the copy (reader_process.h).
 //
@@ -18,10 +19,14 @@
 
 namespace rapid {
 
-// Calls `read` in another process, a copy of this one, and `receive` here. Error: what `read` throws; the process ended
-// otherwise.
+// Bytes that the budget of this process (memory_budget.h) leaves to a copy, and as many again to what the copy sends
+// back, as both are in memory at the same time. At least 64 MiB; without limit if no budget has been set.
+std::size_t memory_of_copy();
+
+// Calls `read` in another process, a copy of this one, and `receive` here. Throws Error if `read` does, or if the
+// process ends otherwise. The file's size limits the copy's memory, and so does `most_memory`.
 void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                  const std::function<void(MessageReader&)>& receive);
+                  const std::function<void(MessageReader&)>& receive, std::size_t most_memory = memory_of_copy());
 
 // Called in each such process before it reads: what further confines it.
 void confine_copies(std::function<void()> further);

@@ -25,11 +25,12 @@ std::map<std::string, NamedReader>& readers()
     return all;
 }
 
-void read_in_copy(const ReadRequest& request, const std::function<void(MessageReader&)>& receive)
+void read_in_copy(const ReadRequest& request, const std::function<void(MessageReader&)>& receive,
+                  std::size_t most_memory)
 {
     const NamedReader& reader = readers().at(request.reader);
     rapid::read_in_copy(
-        request.path, [&](MessageWriter& message) { reader(request, message); }, receive);
+        request.path, [&](MessageWriter& message) { reader(request, message); }, receive, most_memory);
 }
 
 // All of the bytes, or false: the other end is closed.
@@ -79,15 +80,18 @@ bool put_answer(int pipe, bool refused, const void* from, std::size_t bytes)
     return put(pipe, &header, sizeof header) && put(pipe, from, bytes);
 }
 
-bool answer(int pipe, const ReadRequest& request)
+bool answer(int pipe, const ReadRequest& request, std::size_t most_memory)
 {
     const auto refuse = [&](const std::string& why) { return put_answer(pipe, true, why.data(), why.size()); };
     bool sent = false;
     try {
-        read_in_copy(request, [&](MessageReader& message) {
-            const std::span<const unsigned char> bytes = message.left();
-            sent = put_answer(pipe, false, bytes.data(), bytes.size());
-        });
+        read_in_copy(
+            request,
+            [&](MessageReader& message) {
+                const std::span<const unsigned char> bytes = message.left();
+                sent = put_answer(pipe, false, bytes.data(), bytes.size());
+            },
+            most_memory);
         return sent;
     } catch (const Error& error) {
         return refuse(error.message());
@@ -112,9 +116,10 @@ struct Pipe {
 [[noreturn]] void serve(const Descriptor& requests, const Descriptor& answers)
 {
     ReadRequest request;
+    std::size_t most_memory = 0;  // of the budget of the process that asks
     while (take_text(requests.number(), request.reader) && take_text(requests.number(), request.path) &&
-           take_text(requests.number(), request.what))
-        if (!answer(answers.number(), request)) break;
+           take_text(requests.number(), request.what) && take(requests.number(), &most_memory, sizeof most_memory))
+        if (!answer(answers.number(), request, most_memory)) break;
     ::_exit(0);
 }
 
@@ -153,8 +158,9 @@ public:
         {
             const std::lock_guard lock(mutex_);
             const int to = requests_.number(), from = answers_.number();
+            const std::size_t most_memory = memory_of_copy();
             if (!put_text(to, request.reader) || !put_text(to, request.path) || !put_text(to, request.what) ||
-                !take(from, &header, sizeof header))
+                !put(to, &most_memory, sizeof most_memory) || !take(from, &header, sizeof header))
                 throw Error("can't be read: the reader process has ended");
             bytes = std::make_unique_for_overwrite<unsigned char[]>(header.bytes);
             if (!take(from, bytes.get(), header.bytes)) throw Error("can't be read: the reader process has ended");
@@ -208,7 +214,7 @@ void read_by_name(const ReadRequest& request, const std::function<void(MessageRe
     if (process())
         process()->read(request, receive);
     else
-        read_in_copy(request, receive);
+        read_in_copy(request, receive, memory_of_copy());
 }
 
 }  // namespace rapid

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <ctime>
 
+#include "runtime/memory_budget.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -87,6 +88,25 @@ TEST_CASE("the end of a reader is an error of its file", "[files]")
     CHECK(error_in([]() -> Numbers { ::_exit(0); }) == "can't be read: it ends its reader, and must be damaged");
     CHECK(error_in([]() -> Numbers { return Numbers(std::size_t{1} << 30); }) ==
           "can't be read: it takes more than 1024 MB of memory, and must be damaged");
+}
+
+TEST_CASE("a reader takes no more than half of what the budget leaves, and may take 64 MiB", "[files]")
+{
+    constexpr std::size_t mebibyte = std::size_t{1} << 20;
+    const auto refusal_of = [](std::size_t bytes) {
+        return error_in([=]() -> Numbers { return Numbers{Numbers(bytes / sizeof(Numbers::value_type)).front()}; });
+    };
+    {
+        const MemoryBudget used_up(1);
+        CHECK(refusal_of(32 * mebibyte).empty());
+        CHECK(refusal_of(96 * mebibyte) ==
+              "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or set "
+              "--memory");
+    }
+    const std::uint64_t used = memory_budget() - free_memory();
+    const MemoryBudget budget(used + 512 * mebibyte);
+    CHECK(refusal_of(128 * mebibyte).empty());
+    CHECK_THAT(refusal_of(384 * mebibyte), Catch::StartsWith("can't be read: its reader takes more than the 2"));
 }
 
 TEST_CASE("a reader that takes too long is told from others that end by a signal", "[files]")

@@ -20,6 +20,21 @@ public:
         return text;
     }
 
+    // One or two numbers, in bytes or in text, become so large that as counts they ask for much memory.
+    std::string with_large_numbers(std::string text)
+    {
+        static constexpr std::array<std::string_view, 6> numbers = {"1048576",    "16777216",   "268435456",
+                                                                    "2147483647", "4294967296", "1099511627776"};
+        for (std::size_t left = 1 + below(2); left > 0; --left) {
+            const std::size_t at = below(text.size());
+            if (below(2) == 0)
+                replace_number(text, at, numbers[below(numbers.size())]);
+            else
+                overwrite(text, at, std::uint64_t{1} << (16 + below(32)), std::size_t{2} << below(3));
+        }
+        return text;
+    }
+
 private:
     std::size_t below(std::size_t n) { return n == 0 ? 0 : static_cast<std::size_t>(random_() % n); }
 
@@ -39,10 +54,7 @@ private:
                 break;
             case 2: {
                 const std::uint64_t word = words[below(words.size())];
-                const std::size_t bytes = std::size_t{1} << below(4);
-                const bool swapped = below(2) == 1;
-                for (std::size_t b = 0; b < bytes && at + b < text.size(); ++b)
-                    text[at + b] = static_cast<char>(word >> 8 * (swapped ? bytes - 1 - b : b));
+                overwrite(text, at, word, std::size_t{1} << below(4));
                 break;
             }
             case 3:
@@ -64,6 +76,14 @@ private:
                 break;
             }
         }
+    }
+
+    // The low bytes of a word, in either order.
+    void overwrite(std::string& text, std::size_t at, std::uint64_t word, std::size_t bytes)
+    {
+        const bool swapped = below(2) == 1;
+        for (std::size_t b = 0; b < bytes && at + b < text.size(); ++b)
+            text[at + b] = static_cast<char>(word >> 8 * (swapped ? bytes - 1 - b : b));
     }
 
     static void replace_number(std::string& text, std::size_t at, std::string_view number)

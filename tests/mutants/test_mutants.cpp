@@ -1,6 +1,7 @@
 // Damaged and cut files for every reader. Each file is read twice, with different bytes in memory that nobody has
 // written, and both readings must agree: in all that was read, or in an error that names the file. No file ends the
-// process by a signal, takes more than ten seconds of the processor, or exceeds the limit of memory.
+// process by a signal, takes more than ten seconds of the processor, or exceeds the limit of memory. Files whose
+// numbers are large take no more than a budget (--memory).
 //
 //   RAPID_MUTANTS=20000 build/test/bin/test_mutants       as many, of all readers together (200)
 //   RAPID_MUTANT_READER=.vdb build/test/bin/test_mutants  only readers with this in their names
@@ -17,6 +18,7 @@
 #include <functional>
 
 #include "runtime/error.h"
+#include "runtime/memory_budget.h"
 #include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/mutants/filled_memory.h"
@@ -99,11 +101,13 @@ std::string fault_of(const Outcome& first, const Outcome& second, const Path& pa
     return "";
 }
 
-// Makes mutants and reads them in a copy of this process, up to the first fault. `further` looks for other faults than
-// fault_of().
-void check_mutants(const WholeFile& whole, std::size_t count,
-                   const std::function<std::string(std::size_t k)>& mutant_of,
-                   const std::function<std::string(const std::string& mutant, const Outcome& outcome)>& further)
+using MutantOf = std::function<std::string(std::size_t k)>;
+// Reads a mutant and describes what is wrong with that. Empty if nothing is.
+using FaultOfReading = std::function<std::string(const std::string& mutant, const Path& path, Report& report)>;
+
+// Makes mutants and reads them in a copy of this process, up to the first fault. Returns the number of refused ones.
+std::size_t check_in_copy(const WholeFile& whole, std::size_t count, const std::function<void()>& confine,
+                          const MutantOf& mutant_of, const FaultOfReading& fault_of_reading)
 {
     const TemporaryFolder folder;
     const Path path = folder / whole.name;
@@ -113,15 +117,11 @@ void check_mutants(const WholeFile& whole, std::size_t count,
     const pid_t child = ::fork();
     if (child == 0) {
         for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGILL, SIGBUS, SIGALRM, SIGPROF}) ::signal(signal, SIG_DFL);
-        limit_memory();
+        confine();
         for (; report->mutant < count; ++report->mutant) {
             const std::string mutant = mutant_of(report->mutant);
             std::ofstream(path, std::ios::binary) << mutant;
-            const Outcome first = outcome_with_memory_of(0x5a, whole.content, path);
-            const Outcome second = outcome_with_memory_of(0xa5, whole.content, path);
-            ++(first.is_read ? report->read : report->refused);
-            std::string wrong = fault_of(first, second, path);
-            if (wrong.empty()) wrong = further(mutant, first);
+            const std::string wrong = fault_of_reading(mutant, path, *report);
             if (wrong.empty()) continue;
             wrong.copy(report->wrong, sizeof report->wrong - 1);
             break;
@@ -133,8 +133,36 @@ void check_mutants(const WholeFile& whole, std::size_t count,
     CAPTURE(report->mutant, report->read, report->refused, std::string(report->wrong));
     CHECK(status == 0);
     CHECK(report->wrong[0] == '\0');
-    CHECK(report->refused > 0);
+    const std::size_t refused = report->refused;
     ::munmap(report, sizeof(Report));
+    return refused;
+}
+
+// Reads each mutant twice. `further` looks for other faults than fault_of().
+void check_mutants(const WholeFile& whole, std::size_t count, const MutantOf& mutant_of,
+                   const std::function<std::string(const std::string& mutant, const Outcome& outcome)>& further)
+{
+    const std::size_t refused = check_in_copy(
+        whole, count, limit_memory, mutant_of, [&](const std::string& mutant, const Path& path, Report& report) {
+            const Outcome first = outcome_with_memory_of(0x5a, whole.content, path);
+            const Outcome second = outcome_with_memory_of(0xa5, whole.content, path);
+            ++(first.is_read ? report.read : report.refused);
+            const std::string wrong = fault_of(first, second, path);
+            return wrong.empty() ? further(mutant, first) : wrong;
+        });
+    CHECK(refused > 0);
+}
+
+// The most memory that this process, or one that it has waited for, has had so far. Bytes.
+std::size_t peak_memory()
+{
+    std::size_t peak = 0;
+    for (const auto who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+        rusage usage{};
+        ::getrusage(who, &usage);
+        peak = std::max(peak, static_cast<std::size_t>(usage.ru_maxrss) << 10);
+    }
+    return peak;
 }
 
 std::vector<WholeFile> chosen_files()
@@ -192,4 +220,32 @@ TEST_CASE("a file that is cut anywhere is an error, unless it only lacks white s
                        " it is read as if it were whole";
             });
     }
+}
+
+TEST_CASE("a file takes no more memory than the budget and 128 MiB, whatever its numbers ask for", "[mutants][random]")
+{
+    constexpr std::size_t budget = std::size_t{256} << 20, let_pass = std::size_t{128} << 20;
+    const auto limit = [] { set_memory_budget(budget); };
+    const auto refused = [&](const WholeFile& whole, std::size_t count, const MutantOf& mutant_of) {
+        CAPTURE(whole.reader);
+        return check_in_copy(
+            whole, count, limit, mutant_of, [&](const std::string&, const Path& path, Report& report) -> std::string {
+                const Outcome outcome = outcome_with_memory_of(0x5a, whole.content, path);
+                ++(outcome.is_read ? report.read : report.refused);
+                const std::size_t peak = peak_memory();
+                if (peak <= budget + let_pass) return "";
+                return "takes " + std::to_string(peak >> 20) + " MiB; " + outcome.content.substr(0, 500);
+            });
+    };
+    const std::vector<WholeFile> files = chosen_files();
+    std::size_t all = 0;
+    for (const WholeFile& whole : files)
+        all += refused(whole, 2 * mutants_of_each_reader(files.size()), [&](std::size_t k) {
+            std::string mutant = Mutator(k).with_large_numbers(whole.bytes);
+            if (whole.seal) whole.seal(mutant);
+            return mutant;
+        });
+    CHECK(all > 0);
+    const WholeFile sparse = sparse_fog(1500);  // 0.5 GiB
+    CHECK(refused(sparse, 1, [&](std::size_t) { return sparse.bytes; }) == 1);
 }

@@ -176,6 +176,17 @@ std::vector<WholeFile> registered_formats()
 
 }  // namespace
 
+WholeFile sparse_fog(int values)
+{
+    const auto write = [&](const Path& path) {
+        openvdb::initialize();
+        const auto grid = openvdb::FloatGrid::create();
+        for (int i = 0; i < values; ++i) grid->tree().addTile(1, {i << 12, 0, 0}, 1.0f, true);
+        write_grid(path, grid, "density", openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    };
+    return {"sparse fog .vdb", "a.vdb", written("a.vdb", write), content_of_fog};
+}
+
 std::vector<WholeFile> whole_files()
 {
     std::vector<WholeFile> files = registered_formats();

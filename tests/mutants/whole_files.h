@@ -24,4 +24,7 @@ struct WholeFile {
 
 std::vector<WholeFile> whole_files();
 
+// A fog whose tree has a branch of 0.3 MB in memory, and 9 kB in the file, for each of these values.
+WholeFile sparse_fog(int values);
+
 }  // namespace rapid::test

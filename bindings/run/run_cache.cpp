@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr double longest_wait = 5;  // s, for a run that ends
 constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
+const std::string errors_estimated = "the estimate of errors";  // in a fingerprint
 
 // What a snapshot's file holds.
 struct KeptRun {
@@ -96,12 +97,21 @@ void RunCache::refuse(const std::vector<std::string>& differences)
     again_ = true;
 }
 
+Fingerprint RunCache::with_errors_as_in(const Fingerprint& other) const
+{
+    Fingerprint likewise = fingerprint_;
+    if (const auto was = other.find(errors_estimated); was != other.end()) likewise[errors_estimated] = was->second;
+    return likewise;
+}
+
 void RunCache::read_journal()
 {
-    const std::string hash = hash_of(fingerprint_);
+    const auto is_of_run = [this](const Fingerprint& other) {
+        return hash_of(other) == hash_of(with_errors_as_in(other));
+    };
     bool is_there = false;
     try {
-        known_ = RunJournal::read(folder_ / "journal", hash, is_there);
+        known_ = RunJournal::read(folder_ / "journal", is_of_run, is_there);
     } catch (Error& error) {
         throw error.at({(folder_ / "journal").string(), 0});
     }
@@ -113,8 +123,8 @@ void RunCache::read_journal()
         failures_.push_back(fmt::format("{}: {} damaged; frames without a record are computed again",
                                         (folder_ / "journal").string(),
                                         known_.damaged == 1 ? "an entry is" : "some entries are"));
-    if (!known_.fingerprint.empty() && hash_of(known_.fingerprint) != hash)
-        refuse(differences(known_.fingerprint, fingerprint_));
+    if (!known_.fingerprint.empty() && !is_of_run(known_.fingerprint))
+        refuse(differences(known_.fingerprint, with_errors_as_in(known_.fingerprint)));
     else
         check_contents();
 }
@@ -147,6 +157,17 @@ void RunCache::begin_anew()
     fs::remove(events_log(), ignored);
 }
 
+void RunCache::go_on_as_before()
+{
+    fingerprint_ = with_errors_as_in(known_.fingerprint);
+    const bool wanted = std::exchange(estimates_errors_, fingerprint_.at(errors_estimated) == "yes");
+    if (wanted && !estimates_errors_)
+        failures_.push_back(
+            fmt::format("--cache {}: no errors are estimated, as the run that began it has estimated none (--quiet); "
+                        "give --again to estimate them",
+                        folder_.string()));
+}
+
 void RunCache::begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
                      FrameFiles& files, EventFile& events)
 {
@@ -155,9 +176,13 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
     lock();
     Fingerprint all = options;
     all.merge(read_->take());
+    all[errors_estimated] = estimates_errors_ ? "yes" : "no";
     fingerprint_ = fingerprint_of(session, plan, graph_, all);
     if (!again_) read_journal();
-    if (again_ || known_.fingerprint.empty()) begin_anew();
+    if (again_ || known_.fingerprint.empty())
+        begin_anew();
+    else
+        go_on_as_before();
     known_.fingerprint = fingerprint_;
     find_due(plan, files);
     if (!events.path().empty()) {  // those up to the last frame are known when it is computed

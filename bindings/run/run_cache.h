@@ -25,9 +25,14 @@ public:
         std::int64_t every = 10;       // frames; 0: no snapshots
         bool again = false;            // computes all, whatever the folder has
         bool replaces = false;         // another run's cache is no error
+        bool estimates_errors = true;  // if the cache begins with this run
     };
     explicit RunCache(Options options)
-        : folder_(std::move(options.folder)), every_(options.every), again_(options.again), replaces_(options.replaces)
+        : folder_(std::move(options.folder)),
+          every_(options.every),
+          again_(options.again),
+          replaces_(options.replaces),
+          estimates_errors_(options.estimates_errors)
     {
     }
 
@@ -43,6 +48,10 @@ public:
     // or it is of a run of another fingerprint.
     void begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
                FrameFiles& files, EventFile& events);
+
+    // After begin(): whether this run estimates errors. All runs of a cache do, or none, as its first one has decided:
+    // estimates accumulate from frame to frame.
+    bool estimates_errors() const { return estimates_errors_; }
 
     // The frames that are to be computed; nothing: all that was asked for is there.
     std::optional<std::int64_t> first_due() const { return first_due_; }
@@ -71,9 +80,12 @@ public:
 private:
     void lock();
     void read_journal();
+    // fingerprint_ with the estimate of errors of another run.
+    Fingerprint with_errors_as_in(const Fingerprint& other) const;
     void refuse(const std::vector<std::string>& differences);
     void check_contents();
     void begin_anew();
+    void go_on_as_before();
     // What is whole of the frames, and the frames that are not.
     void find_due(const Plan& plan, FrameFiles& files);
     void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;
@@ -87,6 +99,7 @@ private:
     const std::int64_t every_;
     bool again_;
     const bool replaces_;
+    bool estimates_errors_;
     std::filesystem::path graph_;
 
     Descriptor lock_;

@@ -59,7 +59,8 @@ std::vector<SavedState> entries_of(std::string_view text, std::size_t& damaged)
 
 }  // namespace
 
-RunJournal::Contents RunJournal::read(const std::filesystem::path& file, const std::string& hash, bool& is_there)
+RunJournal::Contents RunJournal::read(const std::filesystem::path& file,
+                                      const std::function<bool(const Fingerprint&)>& is_of_run, bool& is_there)
 {
     Contents contents;
     is_there = std::filesystem::exists(file);
@@ -80,7 +81,7 @@ RunJournal::Contents RunJournal::read(const std::filesystem::path& file, const s
             if ((kind == EntryKind::Head) != (&entry == &entries.front())) StateReader::fail();
             if (kind == EntryKind::Head) {
                 reader(contents.fingerprint);
-                if (hash_of(contents.fingerprint) != hash) return contents;
+                if (!is_of_run(contents.fingerprint)) return contents;
             } else if (contents.fingerprint.empty()) {
                 return contents;
             } else if (kind == EntryKind::Frame) {

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -27,9 +28,10 @@ public:
         std::map<std::string, WrittenFile> films;  // by path
         std::size_t damaged = 0;                   // entries
     };
-    // Nothing but what is whole. Entries behind the fingerprint are read only where it has this hash, as others may be
-    // those of another version. is_there: whether there is a journal at all.
-    static Contents read(const std::filesystem::path& file, const std::string& hash, bool& is_there);
+    // Reads what is whole. Entries after the fingerprint are read only if `is_of_run` says so, as others may be those
+    // of another version. Sets is_there to false if there is no journal.
+    static Contents read(const std::filesystem::path& file, const std::function<bool(const Fingerprint&)>& is_of_run,
+                         bool& is_there);
 
     // Writes these contents anew. Error: it can't be written.
     void begin(const std::filesystem::path& file, const Contents& contents);

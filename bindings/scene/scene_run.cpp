@@ -92,7 +92,8 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
           listener(std::move(told)),
           files(frame_files(options.files)),
           events(name_in_part(options.events, options.part)),
-          cache({options.cache.folder, options.cache.every, options.cache.again, options.cache.replace}),
+          cache({options.cache.folder, options.cache.every, options.cache.again, options.cache.replace,
+                 scene_options.estimate_errors}),
           report({file, scene_options.threads > 0 ? scene_options.threads : tbb::this_task_arena::max_concurrency(),
                   name_in_part(options.statistics, options.part), name_in_part(options.profile, options.part)},
                  {[this](const FrameStatistics& frame, double seconds, bool is_known) {
@@ -109,6 +110,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         scene.file = std::move(file);
         scene.text = options.text;
         scene.options = std::move(scene_options);
+        if (cache.asked()) scene.options.estimate_errors = true;  // until the cache says whether they are
         scene.hooks = std::move(hooks);
         scene.may_write = true;
         if (options.part) note_settings();
@@ -213,10 +215,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     // What else changes what a run keeps.
     Fingerprint fingerprint_options() const
     {
-        const auto answer = [](bool is) { return is ? "yes" : "no"; };
-        Fingerprint all = {{"the estimate of errors", answer(scene.options.estimate_errors)},
-                           {"--events", answer(!options.events.empty())},
-                           {"--keep-all", answer(scene.options.keep_all)}};
+        Fingerprint all = {{"--events", options.events.empty() ? "no" : "yes"}};
         if (options.part) all["--part"] = name_of(*options.part);
         if (options.sample) all["--sample"] = fmt::format("{}", *options.sample);
         return all;
@@ -229,7 +228,10 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         if (has_begun) refuse("the run has been computed; make another one");
         has_begun = true;
         events.begin();
-        if (cache.asked()) cache.begin(*scene.session, *scene.plan, frames, fingerprint_options(), files, events);
+        if (cache.asked()) {
+            cache.begin(*scene.session, *scene.plan, frames, fingerprint_options(), files, events);
+            if (!cache.estimates_errors()) scene.evaluator->leave_out_errors();
+        }
         computes = true;
         RunOutcome outcome;
         outcome.last_frame = first - 1;

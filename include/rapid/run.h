@@ -53,7 +53,8 @@ struct OutputFormat {
 Result<OutputFormat> output_format(const std::string& output);
 
 // Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended. Of scenes that
-// take nothing of the program's own (SceneOptions::objects and nodes), as that may change unseen.
+// take nothing of the program's own (SceneOptions::objects and nodes), as that may change unseen. The run that begins a
+// cache decides whether errors are estimated (SceneOptions::estimate_errors); later ones do likewise.
 struct RunCacheOptions {
     std::string folder;       // empty: there is none
     std::int64_t every = 10;  // a snapshot after each n-th frame, and after the last; 0: none

@@ -195,11 +195,6 @@ return rapid.create { seed = 3 }
     assert.equal("emit1.rate was 20000, is 30000; rate was 20000, is 30000", refused "--set rate=30000")
     assert.equal("solve1.substeps was 2, is 3", refused "--set solve.substeps=3")
     assert.equal("seed of create1 was 3, is 4", refused "--seed 4")
-    assert.equal("the estimate of errors was yes, is no", (function()
-      local result = folder:run "-f 1-3 --cache cache -o a.####.bgeo --quiet"
-      assert.equal(2, result.status)
-      return result.stderr:match "another run: (.-);"
-    end)())
     folder:write("scene.lua", (text:gsub("p.v %* helper", "0.5 * p.v * helper")))
     assert.equal("the function in line 6 of scene.lua is another one", refused())
     folder:write("scene.lua", (text:gsub(":solve", ":gravity {} :solve")))
@@ -214,6 +209,73 @@ return rapid.create { seed = 3 }
     assert.equal("the content of points.csv is another one", refused())
     folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json --again"
     folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"
+  end)
+
+  it("goes on whatever options are given that do not change frames, and refuses all others", function()
+    -- By option: how it is given in the second run. Refused are those that say what differs.
+    local options = {
+      ["--set"] = { "--set rate=500", differs = "emit1.rate" },
+      ["--seed"] = { "--seed 4", differs = "seed of create1" },
+      ["--keep-all"] = { "--keep-all", differs = "attributes of create1" },  -- snapshots lack some
+      ["--script-timeout"] = { "--script-timeout 100" },
+      ["--script-memory"] = { "--script-memory 512M" },
+      ["--memory"] = { "--memory 2G" }, ["--frames"] = { "--frames 1-6" },
+      ["--output"] = { "--output b.####.bgeo" },
+      ["--camera"] = { "--camera 0,1,5,0,0,0" }, ["--size"] = { "--size 64x64" },
+      ["--part"] = { "--part 1/2", differs = "--part" }, ["--sample"] = { "--sample 0.5", differs = "--sample" },
+      ["--stats"] = { "--stats s.json" }, ["--profile"] = { "--profile p.json" },
+      ["--events"] = { "--events e.csv", differs = "--events" }, ["--cache"] = { "" },
+      ["--cache-every"] = { "--cache-every 3" }, ["--again"] = { "--again" }, ["--grace"] = { "--grace 5" },
+      ["--durable"] = { "--durable" }, ["--quiet"] = { "--quiet" },
+      ["--untrusted"] = { "--untrusted" }, ["--allow-read"] = { "--untrusted --allow-read ." },
+      ["--threads"] = { "--threads 3" }, ["--plugin"] = false,  -- loads other code, which may do anything
+      ["--verbose"] = { "--verbose" },
+      -- Not given together with --cache, or not for a run.
+      ["--watch"] = false, ["--farm"] = false, ["--farm-options"] = false, ["--dry-run"] = false, ["--parts"] = false,
+      ["--help"] = false,
+    }
+    local help, listed = command.rapid("run --help").stdout, 0
+    for name in help:gmatch "\n  [%-%w,]*(%-%-[%w%-]+)" do
+      listed = listed + 1
+      assert.truthy(options[name] ~= nil, name .. " is an option of run that this test does not know")
+    end
+    assert.truthy(listed > 30, help)
+
+    local begun, whole = new_folder(), new_folder()
+    begun:done "-f 1-4 -o a.####.bgeo --cache cache"
+    whole:done "-f 1-6 -o a.####.bgeo"
+    for name, option in pairs(options) do
+      if option then
+        begun:shell "rm -rf trial && mkdir trial && cp -rp scene.lua cache trial"
+        local result = command.rapid("run scene.lua -o a.####.bgeo --cache cache " .. option[1] ..
+          (name == "--frames" and "" or " -f 1-6"),
+          { cwd = begun:file "trial" })
+        local differs = result.stderr:match "it is of another run: (.-) was "
+        assert.equal(option.differs, differs, name)
+        assert.equal(option.differs and 2 or 0, result.status, name .. ": " .. result.stderr)
+        if result.status == 0 then
+          assert.equal(whole:read "a.0006.bgeo", begun:read "trial/a.0006.bgeo", name)
+        end
+      end
+    end
+  end)
+
+  it("estimates errors in all runs, or in none, as the first one has", function()
+    local with, without, whole = new_folder(), new_folder(), new_folder()
+    whole:done "-f 1-6 --stats s.json"
+    with:done "-f 1-4 --cache cache"
+    with:done "-f 1-5 --cache cache --quiet"
+    with:done "-f 1-6 --cache cache --stats s.json"
+    assert.same(statistics.of(whole:read "s.json"), statistics.of(with:read "s.json"))
+    without:done "-f 1-4 --cache cache --quiet"
+    without:done "-f 1-5 --cache cache --quiet"
+    local result = without:run "-f 1-6 --cache cache --stats s.json"
+    assert.equal(0, result.status)
+    assert.equal("warning: --cache cache: no errors are estimated, as the run that began it has estimated none " ..
+      "(--quiet); give --again to estimate them\n", result.stderr)
+    assert.falsy(without:read "s.json":find("position_max", 1, true))
+    without:done "-f 1-6 --cache cache --stats s.json --again"
+    assert.same(statistics.of(whole:read "s.json"), statistics.of(without:read "s.json"))
   end)
 
   it("refuses files that are read in frames and have changed", function()

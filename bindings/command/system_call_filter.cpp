@@ -48,7 +48,11 @@ class Filter {
 public:
     Filter() : context_(seccomp_init(SCMP_ACT_ERRNO(EPERM)), seccomp_release)
     {
-        status_ = context_ ? seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1) : -ENOSYS;  // all threads
+        status_ = context_ ? 0 : -ENOSYS;
+        set(SCMP_FLTATR_CTL_TSYNC, 1);  // all threads
+        // By default such a call ends its thread alone; the others, and whoever waits for the process, would wait for
+        // it.
+        set(SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
     }
 
     void allow(int call) { add(SCMP_ACT_ALLOW, call, {}); }
@@ -67,6 +71,10 @@ public:
     int load() { return status_ == 0 ? seccomp_load(context_.get()) : status_; }
 
 private:
+    void set(scmp_filter_attr attribute, std::uint32_t value)
+    {
+        if (status_ == 0) status_ = seccomp_attr_set(context_.get(), attribute, value);
+    }
     void add(std::uint32_t action, int call, std::initializer_list<scmp_arg_cmp> arguments)
     {
         if (status_ != 0) return;

@@ -1,5 +1,5 @@
 // The system calls that a sandboxed process may make: a list of those that Rapid needs (seccomp). All others fail with
-// EPERM.
+// EPERM. A call by the numbers of another architecture (32 bits, x32) ends the process with SIGSYS.
 #pragma once
 
 namespace rapid {

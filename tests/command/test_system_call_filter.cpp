@@ -38,12 +38,17 @@ namespace {
 
 constexpr int not_loaded = 254;
 
-// The errno of a call that returns -1, in a process with the filter; 0 where it succeeds.
+constexpr unsigned hangs_after = 60;  // s
+
+// The errno of a call that returns -1, in a process with the filter; 0 where it succeeds. Minus the signal that ended
+// the process if one did.
 int error_in_sandbox(Processes processes, const std::function<long()>& call,
                      Connections connections = Connections::None)
 {
     const pid_t child = fork();
     if (child == 0) {
+        signal(SIGALRM, SIG_DFL);
+        alarm(hangs_after);
         if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || load_system_call_filter(processes, connections) != 0)
             _exit(not_loaded);
         errno = 0;
@@ -237,6 +242,24 @@ TEST_CASE("in the sandbox there is no socket, no program, and no way around the 
             CHECK(error_in_sandbox(processes, call) == EPERM);
         }
     CHECK(error_in_sandbox(Processes::None, [] { return fork(); }) == EPERM);
+}
+
+TEST_CASE("in the sandbox a call of another architecture ends the process, and not its thread alone", "[untrusted]")
+{
+    constexpr long x32 = 0x40000000;  // __X32_SYSCALL_BIT
+    const auto call = [] { return syscall(x32 | SYS_getpid); };
+    for (const Processes processes : {Processes::None, Processes::Copies}) {
+        CHECK(error_in_sandbox(processes, [&] {
+                  std::thread([] {
+                      for (;;) pause();
+                  }).detach();
+                  return call();
+              }) == -SIGSYS);
+        CHECK(error_in_sandbox(processes, [&] {
+                  std::thread(call).join();
+                  return 0L;
+              }) == -SIGSYS);
+    }
 }
 
 TEST_CASE("in the sandbox threads, files and memory are as ever", "[untrusted]")

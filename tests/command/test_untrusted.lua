@@ -319,4 +319,19 @@ end)]])
     assert.is_nil(folder:read "outside/new")
     assert.not_equal(0, command.rapid("test inside/test_sandboxed.lua", { cwd = folder.path }).status)
   end)
+
+  it("ends with an error if a test makes a call of another architecture", function()
+    local folder = new_folder(plain)
+    folder:write("inside/test_call.lua", [[
+local ffi = require "ffi"
+ffi.cdef "long syscall(long number, ...);"
+it("calls", function() ffi.C.syscall(0x40000000 + 39) end)
+it("is run in another process", function() end)]])
+    local result = command.shell('ulimit -t 60; exec timeout 60 "$RAPID" test --untrusted inside/test_call.lua',
+      { cwd = folder.path })
+    assert.equal(1, result.status, result.stderr)
+    assert.match("inside/test_call%.lua: the test ended the process with signal 31 %(Bad system call%)",
+      result.stdout .. result.stderr)
+    assert.match("1 passed, 1 failed", result.stdout)
+  end)
 end)

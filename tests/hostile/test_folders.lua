@@ -63,6 +63,50 @@ describe("the name of an output", function()
   end)
 end)
 
+describe("a file that a scene writes", function()
+  local writers = {
+    ["x.0001.csv"] = point .. " :write { file = '%sx.####.csv' }",
+    ["x.0001.vdb"] = point .. " :rasterize { file = '%sx.####.vdb' }",
+    ["x.vdb"] = point .. ", rapid.levelset.sphere { voxel = 0.2 } :write '%sx.vdb'",
+  }
+  -- A folder with a scene that writes to `place`, a folder.
+  local function new_folder(text, place)
+    local folder = command.folder()
+    command.shell("mkdir work beside", { cwd = folder.path })
+    folder:write("work/scene.lua", 'local rapid = require "rapid"\nlocal chain = ' ..
+      text:format(place:gsub("PATH", folder.path)) .. "\nreturn chain")
+    return folder
+  end
+  local function run_in(folder, arguments)
+    return command.rapid("run scene.lua -f 1 --quiet " .. arguments, { cwd = folder:file "work" })
+  end
+
+  it("is where the scene says", function()
+    for file, text in pairs(writers) do
+      for _, place in ipairs { "../beside/", "PATH/beside/", "" } do
+        local folder = new_folder(text, place)
+        local result = run_in(folder, "")
+        assert.equal("", result.stderr)
+        assert.equal(0, result.status)
+        assert.truthy(folder:read((place == "" and "work/" or "beside/") .. file), place .. file)
+      end
+    end
+  end)
+
+  it("is nowhere but in the outputs' folders with --untrusted", function()
+    for file, text in pairs(writers) do
+      for _, place in ipairs { "../beside/", "PATH/beside/", "" } do
+        local folder = new_folder(text, place)
+        local result = run_in(folder, "--untrusted -o out/{output}.####.csv")
+        assert.not_equal(0, result.status, place .. file)
+        assert.match("x%.[%w.]+\"?: can't be written", result.stderr)
+        assert.is_nil(folder:read((place == "" and "work/" or "beside/") .. file), place .. file)
+        assert.equal(0, run_in(new_folder(text, "out/"), "--untrusted -o out/{output}.####.csv").status)
+      end
+    end
+  end)
+end)
+
 describe("a name with a byte 0", function()
   it("is not cut there: it names no file", function()
     local folder = command.folder()

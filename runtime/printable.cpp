@@ -5,15 +5,17 @@
 #include <algorithm>
 
 namespace rapid {
+namespace {
 
-std::string printable(std::string_view text)
+// kept: control characters that stay as they are.
+std::string without_commands(std::string_view text, std::string_view kept)
 {
     std::string result;
     result.reserve(text.size());
     for (std::size_t i = 0; i < text.size(); ++i) {
         const auto byte = static_cast<unsigned char>(text[i]);
         const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
-        if ((byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7f) {
+        if ((byte < 0x20 && kept.find(text[i]) == std::string_view::npos) || byte == 0x7f) {
             result += fmt::format("\\x{:02x}", byte);
         } else if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {
             result += fmt::format("\\x{:02x}", next);
@@ -23,6 +25,16 @@ std::string printable(std::string_view text)
         }
     }
     return result;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) { return without_commands(text, "\n\t"); }
+
+std::string printable_name(std::string_view name)
+{
+    constexpr std::size_t most = 200;  // bytes, as of a node's name in an error
+    return without_commands(shortened(name, most), "");
 }
 
 std::string shortened(std::string_view text, std::size_t most)

@@ -13,6 +13,9 @@ std::string printable(std::string_view text);
 // With its middle left out where a name or a value makes it longer than so many bytes.
 std::string shortened(std::string_view text, std::size_t most);
 
+// A name or a value from a file, in one line of bounded length: shortened, and tab and newline as \xNN, too.
+std::string printable_name(std::string_view name);
+
 // What a table has room for in the column of such a text: one that is endless does not make all lines as long.
 std::size_t width_of(std::string_view text);
 

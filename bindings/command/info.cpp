@@ -15,6 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr std::size_t most_of_warning = 4000;  // bytes that are printed
+
 class Info : public Command, public Confined {
 public:
     std::string name() const override { return "info"; }
@@ -55,10 +57,10 @@ public:
                 json["left_out"] = points.warnings();
                 all.push_back(std::move(json));
             } else {
-                if (cache.sequence) print(printable(path.string()) + "\n");
+                if (cache.sequence) print(path.string() + '\n');
                 print(report.text);
                 for (const std::string& what : points.warnings())
-                    print(fmt::format("left out    {}\n", printable(what)));
+                    print(fmt::format("left out    {}\n", shortened(what, most_of_warning)));
             }
         }
         if (json_)

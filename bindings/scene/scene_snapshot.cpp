@@ -6,6 +6,7 @@
 
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
+#include "runtime/printable.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {
@@ -26,14 +27,15 @@ CheckedJson told_of(const std::string& path)
 std::string told_as_text(const std::string& path, const CheckedJson& told)
 {
     const auto word = [](const CheckedJson& value) {
-        return value.is_string() ? value.get<std::string>() : value.dump();
+        constexpr std::size_t most = 4000;  // bytes: the code of some hundred functions
+        return shortened(value.is_string() ? value.get<std::string>() : value.dump(), most);
     };
     std::string text =
         fmt::format("{}: a snapshot, {} bytes\n", path, with_separators(told.at("bytes").get<std::uint64_t>()));
     const auto add = [&](const char* key, const char* unit) {
         if (!told.contains(key)) return;
         for (const auto& [name, value] : told.at(key).items())
-            text += fmt::format("  {}  {}{}\n", name, word(value), unit);
+            text += fmt::format("  {}  {}{}\n", printable_name(name), word(value), unit);
     };
     if (told.contains("graph"))
         text += fmt::format("of {} after frame {}\n", word(told.at("graph")), word(told.at("frame")));

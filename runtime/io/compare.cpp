@@ -249,7 +249,7 @@ std::string missing_text(const std::vector<std::int64_t>& ids, const char* set)
 
 std::string attribute_text(const AttributeDifference& d, std::size_t width)
 {
-    const std::string head = fmt::format("  {:<{}}  ", printable(d.name), width);
+    const std::string head = fmt::format("  {:<{}}  ", printable_name(d.name), width);
     if (d.type_a.empty() || d.type_b.empty())
         return head +
                fmt::format("only in {} ({})\n", d.type_a.empty() ? "B" : "A", d.type_a.empty() ? d.type_b : d.type_a);
@@ -265,7 +265,7 @@ std::string attribute_text(const AttributeDifference& d, std::size_t width)
 
 std::string group_text(const AttributeDifference& d, std::size_t width)
 {
-    const std::string head = fmt::format("  {:<{}}  group  ", printable(d.name), width);
+    const std::string head = fmt::format("  {:<{}}  group  ", printable_name(d.name), width);
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 

@@ -57,7 +57,7 @@ std::string text_list(const AttributeSummary& a)
 {
     std::string list;
     for (const std::string& text : a.first_texts)
-        list += fmt::format("{}\"{}\"", list.empty() ? "" : " ", printable(text));
+        list += fmt::format("{}\"{}\"", list.empty() ? "" : " ", printable_name(text));
     return a.texts > a.first_texts.size() ? list + fmt::format(" ... of {} texts", a.texts) : list;
 }
 
@@ -120,7 +120,7 @@ std::string to_text(const PointSummary& summary)
 
     text += "attributes\n";
     for (const AttributeSummary& a : summary.attributes) {
-        text += fmt::format("  {:<{}}  {:<5}", printable(a.name), width, type_name(a.type));
+        text += fmt::format("  {:<{}}  {:<5}", printable_name(a.name), width, type_name(a.type));
         if (!a.min.empty())
             text += a.uniform ? fmt::format("  {} everywhere", number_list(a.min))
                               : fmt::format("  {}  to  {}", number_list(a.min), number_list(a.max));
@@ -130,7 +130,7 @@ std::string to_text(const PointSummary& summary)
     }
     if (!summary.groups.empty()) text += "groups\n";
     for (const GroupSummary& g : summary.groups)
-        text += fmt::format("  {:<{}}  {}\n", printable(g.name), width, g.members);
+        text += fmt::format("  {:<{}}  {}\n", printable_name(g.name), width, g.members);
     return text;
 }
 

@@ -26,8 +26,9 @@ public:
             name = std::max(name, width_of(row.name)), fact = std::max(fact, width_of(row.fact));
         std::string text = heading + '\n';
         for (const Row& row : rows_)
-            text += fact == 0 ? fmt::format("  {:{}}  {}\n", row.name, name, row.why)
-                              : fmt::format("  {:{}}  {:{}}  {}\n", row.name, name, row.fact, fact, row.why);
+            text += fact == 0 ? fmt::format("  {:{}}  {}\n", printable_name(row.name), name, row.why)
+                              : fmt::format("  {:{}}  {:{}}  {}\n", printable_name(row.name), name,
+                                            printable_name(row.fact), fact, row.why);
         return text;
     }
 

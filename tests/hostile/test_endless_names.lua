@@ -81,6 +81,25 @@ describe("a file that is there to be slow, or long", function()
     assert.truthy(#result.stdout < 5e6, #result.stdout)
   end)
 
+  it("is shown with names and texts that are cut, in one line each", function()
+    local folder = command.folder()
+    local endless = ("n"):rep(60000)
+    folder:write("a.usda", usda:format('float[] primvars:' .. endless .. " = [1]\n"))
+    folder:write("a.ply", "ply\nformat ascii 1.0\nelement vertex 1\n" .. place .. "property uchar group_" .. endless ..
+      "\nend_header\n0 0 0 1\n")
+    folder:write("a.csv", 'id,Px,Py,Pz,group:' .. endless .. ',"name\27[2J",text\n0,0,0,0,1,2,' .. endless .. "\n")
+    folder:write("b.csv", 'id,Px,Py,Pz,group:' .. endless .. ',"name\27[2J",text\n0,0,0,0,0,3,' .. endless .. "b\n")
+    for line, status in pairs {
+      ["info a.usda"] = 0, ["info a.ply"] = 0, ["info a.csv"] = 0, ["diff a.csv b.csv"] = 1, ["diff a.csv a.ply"] = 1,
+    } do
+      local result = command.rapid(line, { cwd = folder.path })
+      assert.equal(status, result.status, line .. ": " .. result.stderr)
+      assert.truthy(#result.stdout < 4000, ("%s: %d bytes"):format(line, #result.stdout))
+      assert.falsy(result.stdout:find "[%z\1-\8\11-\31\127]", result.stdout)
+      assert.match("n %[%.%.%. %d+ bytes %.%.%.%] n", result.stdout)
+    end
+  end)
+
   it("is written in little memory, where it has one endless text", function()
     local folder = command.folder()
     -- Of .npz all texts of an attribute are as long: 80 MB here.

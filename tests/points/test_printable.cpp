@@ -25,3 +25,12 @@ TEST_CASE("an endless text is shortened in its middle, between characters", "[pr
     CHECK(width_of("name") == 4);
     CHECK(width_of(std::string(1000, 'n')) == 40);
 }
+
+TEST_CASE("a name from a file is one line of bounded length", "[printable]")
+{
+    CHECK(printable_name("caf\xc3\xa9") == "caf\xc3\xa9");
+    CHECK(printable_name("a\n\tb\x1b[2J") == "a\\x0a\\x09b\\x1b[2J");
+    CHECK(printable_name(std::string(60000, 'n')) ==
+          std::string(150, 'n').append(" [... 59800 bytes ...] ").append(50, 'n'));
+    CHECK(printable_name(std::string(60000, '\x1b')).size() < 1000);
+}

@@ -39,4 +39,12 @@ FrameSelection read_frames(const std::string& text)
     return range;
 }
 
+void declare_frames(Options& options, std::optional<FrameSelection>& frames, const std::string& doc)
+{
+    options
+        .add_option(
+            "-f,--frames", [&frames](const std::string& text) { frames = read_frames(text); }, doc)
+        .type_name("FRAMES");
+}
+
 }  // namespace rapid

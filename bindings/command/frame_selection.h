@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "bindings/command/options.h"
 #include "runtime/files/frame_selection.h"
 
 namespace rapid {
@@ -14,5 +16,8 @@ constexpr std::int64_t default_frames = 48;
 // 1-48, 1-48x2, 12. All frames from the scene's first one are computed; these are written. Error: the text is not of
 // this form.
 FrameSelection read_frames(const std::string& text);
+
+// Declares -f. doc: which frames they are, and how many are taken without it.
+void declare_frames(Options& options, std::optional<FrameSelection>& frames, const std::string& doc);
 
 }  // namespace rapid

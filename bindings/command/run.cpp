@@ -6,6 +6,7 @@
 #include <csignal>
 #include <optional>
 
+#include "bindings/command/cache_options.h"
 #include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
 #include "bindings/command/file_options.h"
@@ -35,17 +36,11 @@ public:
     {
         given_ = &options;
         graph_.declare(options);
-        options
-            .add_option(
-                "-f,--frames",
-                [this](const std::string& text) {
-                    const FrameSelection frames = read_frames(text);
-                    options_.frames = RunFrames{frames.first, frames.last, frames.step};
-                },
-                fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
-                            "[default: {} from the first]",
-                            default_frames))
-            .type_name("FRAMES");
+        declare_frames(
+            options, frames_,
+            fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
+                        "[default: {} from the first]",
+                        default_frames));
         files_.declare(options);
         part_.declare(options);
         options.add_option("--stats", options_.statistics, "writes points and seconds of each frame as JSON")
@@ -84,13 +79,18 @@ public:
     {
         if (watch_ && untrusted_.asked())
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
-        if (watch_ && caches())
+        if (watch_ && cache_.asked())
             throw Error("--watch runs a graph that changes, of which --cache holds nothing; give one of them");
-        if (options_.cache.again && !caches())
+        if (!farm_.asked()) cache_.check();  // each task of a farm has one
+        if (cache_.again() && !cache_.asked())
             throw Error("--again says what to do with a --cache; give one, or leave it out");
         if (untrusted_.asked() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
         check_farm();
+        if (frames_) options_.frames = RunFrames{frames_->first, frames_->last, frames_->step};
+        options_.cache.folder = cache_.folder();
+        options_.cache.every = cache_.every().value_or(options_.cache.every);
+        options_.cache.again = cache_.again();
         options_.files = files_.files();
         options_.part = part_.part();
         options_.sample = part_.sample();
@@ -141,28 +141,18 @@ public:
 private:
     void declare_cache(Options& options)
     {
-        RunCacheOptions& cache = options_.cache;
-        options
-            .add_option("--cache", cache.folder,
-                        "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame "
-                        "that is still to be computed; frames that are there already are left as they are")
-            .type_name("DIR");
-        options
-            .add_option(
-                "--cache-every",
-                [&cache](const std::string& text) { cache.every = read_whole("--cache-every", text, 0); },
-                "a snapshot after every N-th frame, and the last [default 10]; 0: none")
-            .type_name("N");
-        options.add_flag("--again", cache.again, "computes and writes all frames, whatever the cache holds");
+        cache_.declare(options,
+                       "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame "
+                       "that is still to be computed; frames that are there already are left as they are",
+                       "computes and writes all frames, whatever the cache holds");
         options
             .add_option(
                 "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
                 "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
             .type_name("SECONDS");
-        options.add_flag("--cache-replace", cache.replace).internal();  // of wedge: another run's is no error
+        // Of wedge: another run's is no error.
+        options.add_flag("--cache-replace", options_.cache.replace).internal();
     }
-
-    bool caches() const { return !options_.cache.folder.empty(); }
 
     // end: called from another thread where a limit is reached and the run does not end; it must not return.
     SceneRun make(const std::function<void(const std::string& message)>& end, RunListener listener) const
@@ -234,6 +224,8 @@ private:
     SceneArguments graph_;
     FileOptions files_;
     PartOptions part_;
+    CacheOptions cache_;
+    std::optional<FrameSelection> frames_;
     RunOptions options_;
     double grace_ = 20;  // s
     FarmOptions farm_;

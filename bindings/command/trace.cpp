@@ -32,12 +32,10 @@ public:
             .type_name("N[,M...]")
             .required();
         options.add_option("--of", create_, "the create whose points they are [default: every one]").type_name("NAME");
-        options
-            .add_option(
-                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-                fmt::format("the frames that are told; all before them are computed too [default: {} from the first]",
-                            default_frames))
-            .type_name("FRAMES");
+        declare_frames(
+            options, frames_,
+            fmt::format("the frames that are told; all before them are computed too [default: {} from the first]",
+                        default_frames));
         options.add_flag("--json", json_, "as JSON");
         untrusted_.declare(options, "graph");
     }

@@ -115,12 +115,9 @@ public:
         list("--reference", reference_, "VALUE",
              "of a graph: the value that is taken for right (of several swept parameters: NODE.PARAM=VALUE)");
         list("--lines", lines_, "NODE.PARAM", "of a graph: a swept parameter that tells the lines of the plot apart");
-        options
-            .add_option(
-                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-                fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]",
-                            default_frames))
-            .type_name("FRAMES");
+        declare_frames(
+            options, frames_,
+            fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]", default_frames));
         const SceneStudy defaults;
         options
             .add_option("--error", error_,

@@ -47,11 +47,7 @@ public:
     void declare(Options& options) override
     {
         graph_.declare(options);
-        options
-            .add_option(
-                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-                "the frames to compute: 1-240 or 100 [default: 240 from the first]")
-            .type_name("FRAMES");
+        declare_frames(options, frames_, "the frames to compute: 1-240 or 100 [default: 240 from the first]");
         options
             .add_option(
                 "--port",

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "bindings/command/cache_options.h"
 #include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
 #include "bindings/command/file_options.h"
@@ -47,26 +48,16 @@ public:
             .required();
         options.add_flag("--zip", zip_,
                          "the n-th values of all that is varied go together, in place of all combinations");
-        options
-            .add_option(
-                "-f,--frames", [this](const std::string& text) { frames_ = read_frames(text); },
-                fmt::format("the frames to write, as of run [default: {} from the first]", default_frames))
-            .type_name("FRAMES");
+        declare_frames(options, frames_,
+                       fmt::format("the frames to write, as of run [default: {} from the first]", default_frames));
         files_.declare(options);
         options
             .add_option(
                 "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
                 "rows that run at a time, which share the threads [default 1]")
             .type_name("N");
-        options.add_option("--cache", cache_, "rows keep snapshots too, in folders below this one, as of run")
-            .type_name("DIR");
-        options
-            .add_option(
-                "--cache-every",
-                [this](const std::string& text) { every_ = fmt::format("{}", read_whole("--cache-every", text, 0)); },
-                "with --cache: as of run")
-            .type_name("N");
-        options.add_flag("--again", again_, "computes rows that are done, too");
+        cache_.declare(options, "rows keep snapshots too, in folders below this one, as of run",
+                       "computes rows that are done, too");
         options.add_flag("--quiet", quiet_, "no progress and no table");
         farm_.declare(options);
         options.add_option(collect_option, collect_).internal();  // what comes last on a farm
@@ -82,8 +73,7 @@ public:
         const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
         const std::vector<std::string> folders = or_throw(output_folders(files_.files()));
         const fs::path folder = folders.empty() ? "." : folders.front();
-        if (cache_.empty() && !every_.empty())
-            throw Error("--cache-every says how often a --cache is written; give one");
+        cache_.check();
         farm_.check();
         WedgeReport report(graph_.file(), settings_, rows, folder, quiet_);
         if (!collect_.empty()) return collect(rows, report);
@@ -185,12 +175,12 @@ private:
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
         for (const std::string& frames : given_->values_of("--frames")) words.push_back("--frames=" + frames);
         // What a row has done is known by its journal: one of the same fingerprint is not run again.
-        const fs::path of_rows = cache_.empty() ? folder / "wedge.cache" : fs::path(cache_);
+        const fs::path of_rows = cache_.asked() ? fs::path(cache_.folder()) : folder / "wedge.cache";
         words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
         words.push_back("--cache-replace");
-        if (cache_.empty()) words.push_back("--cache-every=0");
-        if (!every_.empty()) words.push_back("--cache-every=" + every_);
-        if (again_) words.push_back("--again");
+        if (const std::int64_t every = cache_.asked() ? cache_.every().value_or(-1) : 0; every >= 0)
+            words.push_back(fmt::format("--cache-every={}", every));
+        if (cache_.again()) words.push_back("--again");
         add_shared(words, row, common);
         add_outputs(words, row);
         return words;
@@ -220,8 +210,8 @@ private:
     std::vector<SweptSetting> settings_;
     std::optional<FrameSelection> frames_;
     std::int64_t jobs_ = 1;
-    std::string cache_, every_;
-    bool zip_ = false, again_ = false, quiet_ = false;
+    CacheOptions cache_;
+    bool zip_ = false, quiet_ = false;
     FarmOptions farm_;
     std::string collect_;  // the folder of their statistics
 };

@@ -489,6 +489,7 @@ diff -r whole b
       return result.stderr
     end
     assert.equal("--again says what to do with a --cache; give one, or leave it out\n", refusal "-f 1-2 --again")
+    assert.equal("--cache-every says how often a --cache is written; give one\n", refusal "-f 1-2 --cache-every 3")
     assert.equal("--watch runs a graph that changes, of which --cache holds nothing; give one of them\n",
       refusal "-f 1-2 --cache cache --watch")
     assert.truthy(refusal "-f 1-2 --cache cache --cache-every -1":find("whole number, at least 0", 1, true))

@@ -126,7 +126,7 @@ typedef struct rapid_options {
     size_t size;                   /* sizeof(rapid_options) */
     const rapid_setting* settings; /* as --set gives them */
     size_t setting_count;          /* of `settings` */
-    const uint64_t* seed;          /* replaces the seed of each create; NULL: theirs */
+    const uint64_t* seed;          /* replaces the seed of each create, but no rapid.param "seed"; NULL: theirs */
     const char* const* paths;      /* folders where modules and nodes in Lua are looked for */
     size_t path_count;             /* of `paths` */
     int threads;                   /* 0: those of the caller's TBB arena; n: n of its own */

@@ -307,7 +307,7 @@ struct SceneOptions {
     // Values of the scene's parameters by name, and of its nodes' by NODE.PARAM ("solve.substeps"), as --set gives
     // them.
     std::vector<std::pair<std::string, SceneValue>> set;
-    std::optional<std::uint64_t> seed;  // replaces the seed of each create
+    std::optional<std::uint64_t> seed;  // replaces the seed of each create, but no rapid.param "seed"
 
     // Folders where modules and nodes in Lua are looked for, after that of the scene and before those of RAPID_PATH.
     std::vector<std::string> paths;

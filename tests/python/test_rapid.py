@@ -251,6 +251,21 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(TypeError):
             scene.set(height=None)
 
+    def test_an_option_that_is_the_name_of_a_parameter_is_refused(self):
+        def opened(**options):
+            return rapid.Scene("scene.lua", text="""local rapid = require "rapid"
+local seed, memory = rapid.param("seed", 1), rapid.param("memory", 2)
+return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :solve {}""", **options)
+        for options in {"seed": 5}, {"memory": 2**30}, {"seed": 5, "set": {"memory": 3}}:
+            with self.assertRaisesRegex(TypeError, 'option of rapid.Scene, and the scene has a parameter "(seed|memory)"; '
+                                                   'give set={"'):
+                opened(**options)
+        self.assertEqual(opened(set={"seed": 5}).parameters["seed"]["value"], 5)
+        self.assertEqual(opened(seed=7, set={"seed": 5}).parameters["seed"]["value"], 5)
+        scene = opened()
+        scene.set(seed=6, memory=4)
+        self.assertEqual(list(scene.advance()["P"][0]), [6, 4, 0])
+
     def test_frames_come_one_by_one(self):
         scene = fall()
         self.assertEqual([frame.number for frame in scene.run(3, 6)], [3, 4, 5, 6])

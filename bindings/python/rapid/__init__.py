@@ -230,19 +230,21 @@ class Scene:
     """A scene of a file, or with text= of a text, whose messages name it so.
 
     Parameters of the scene are given by name (rate=5000); those of nodes, and names that are no words of Python, in
-    set={"solve.substeps": 4}. paths: folders where modules are looked for. threads: 0 for all. script_seconds,
+    set={"solve.substeps": 4}; so are parameters that are called as one of the options here. seed replaces the seed of
+    every create, as --seed does. paths: folders where modules are looked for. threads: 0 for all. script_seconds,
     script_memory, memory: limits. errors=False estimates none. log(text) is told of what scripts print, and of warnings;
     progress(frame, last) of each frame that advance_to() has done, and ends it where it returns False. module(name) gives
     the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
 
     objects={"floor": rapid.Shape(...)}: what the scene takes as rapid.host "floor", and set={"collide2.shape": "host:floor"}
-    for a parameter of a node. nodes: further types of nodes, rapid.Force, rapid.Edit and rapid.Constraint. guard_callbacks=True finds those
-    that write past the ends of their arrays.
+    for a parameter of a node. nodes: further types of nodes, rapid.Force, rapid.Edit and rapid.Constraint.
     """
 
     def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=0, script_memory=0,
                  memory=0, errors=True, keep_all=False, log=None, progress=None, module=None, find_file=None,
-                 objects=None, nodes=(), guard_callbacks=False, **parameters):
+                 objects=None, nodes=(), **parameters):
+        numbers = {"seed": seed, "threads": threads, "script_seconds": script_seconds, "script_memory": script_memory,
+                   "memory": memory, "errors": errors, "keep_all": keep_all}
         self._raised = None  # by a callback: raised when the call ends
         self._handle = None
         self._held = {}      # texts that callbacks have returned
@@ -262,8 +264,7 @@ class Scene:
             options.find_module = Find(self._guard(lambda _, name: self._hold("module", module(name.decode())), None))
         if find_file:
             options.find_file = Find(self._guard(lambda _, path: self._hold("file", find_file(path.decode())), None))
-        self._guard_callbacks = guard_callbacks
-        options.offers = make_offers(objects or {}, nodes, guard_callbacks, self._guard)
+        options.offers = make_offers(objects or {}, nodes, self._guard)
         self._options = options  # the callbacks live as long as the scene
         handle = c_void_p()
         try:
@@ -275,6 +276,16 @@ class Scene:
             call("offers_release", options.offers)
         self._handle = _Handle(handle, "scene_close")
 
+        self._refuse_ambiguous(numbers, set or {})
+
+    def _refuse_ambiguous(self, options, settings):
+        """Raises TypeError if an option was given that is also the name of a parameter, which it does not set."""
+        defaults = Scene.__init__.__kwdefaults__
+        parameters = self.parameters
+        for name, value in options.items():
+            if value != defaults[name] and name in parameters and name not in settings:
+                raise TypeError(f'{name} = {value!r} is an option of rapid.Scene, and the scene has a parameter '
+                                f'"{name}"; give set={{"{name}": {value!r}}} for the parameter, and both for both')
     @property
     def parameters(self):
         """By name: {"value", "default", "doc"}."""
@@ -308,7 +319,7 @@ class Scene:
         text = get("scene_warnings", self._handle.value, c_char_p()).value
         return text.decode().split("\n") if text else []
 
-    def set(self, values=None, **parameters):
+    def set(self, values=None, /, **parameters):
         """Gives parameters values, as Scene() does, and goes back to the start."""
         settings = to_settings({**(values or {}), **parameters})
         self._call("scene_set", self._handle.value, settings, len(settings))
@@ -316,7 +327,7 @@ class Scene:
     def offer(self, name, thing):
         """Replaces or adds an object: functions of the frame that say rapid.host "NAME" get it from the next frame on, all
         else when the scene is set()."""
-        offers = make_offers({name: thing}, (), self._guard_callbacks, self._guard)
+        offers = make_offers({name: thing}, (), self._guard)
         try:
             self._call("scene_offer", self._handle.value, offers)
         finally:

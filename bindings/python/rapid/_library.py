@@ -167,7 +167,6 @@ for _name, _types in {
         "frame_describe": [c_void_p, _text],
         "frame_compare": [c_void_p, c_void_p, c_double, POINTER(c_int), _text],
         "offers_new": [_handle],
-        "offers_guard": [c_void_p, c_int],
         "offers_on_release": [c_void_p, Release, c_void_p],
         "offers_mesh": [c_void_p, c_char_p, c_void_p, c_size_t, c_void_p, c_size_t],
         "offers_points": [c_void_p, c_char_p, c_size_t, POINTER(Column), c_size_t],

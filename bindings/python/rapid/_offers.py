@@ -223,7 +223,7 @@ _numbers = itertools.count(1)
 _forget = Release(lambda number: _used_callbacks.pop(number, None))
 
 
-def make_offers(objects, nodes, guard_callbacks, guard):
+def make_offers(objects, nodes, guard):
     """A handle of all that is offered; guard: see Callbacks."""
     offers = c_void_p()
     call("offers_new", byref(offers))
@@ -231,9 +231,8 @@ def make_offers(objects, nodes, guard_callbacks, guard):
         number = next(_numbers)
         callbacks = _used_callbacks[number] = Callbacks(guard)
         call("offers_on_release", offers, _forget, number)
-        call("offers_guard", offers, int(guard_callbacks))
         for name, thing in objects.items():
-            if not hasattr(thing, "offer"):
+            if not isinstance(thing, (Points, Mesh, Shape)):
                 raise TypeError(f"{name} is a {type(thing).__name__}; it must be of rapid.from_numpy, rapid.Mesh or "
                                 "rapid.Shape")
             thing.offer(offers, name, callbacks)
@@ -243,3 +242,6 @@ def make_offers(objects, nodes, guard_callbacks, guard):
         call("offers_release", offers)
         raise
     return offers
+            if not isinstance(node, _Node):
+                raise TypeError(f"a node is a {type(node).__name__}; it must be of rapid.Force, rapid.Edit or "
+                                "rapid.Constraint")

@@ -9,6 +9,27 @@
 #include "runtime/points/id_index.h"
 
 namespace rapid {
+namespace {
+
+void refuse_before_first(const Plan& plan, std::int64_t frame)
+{
+    if (frame < plan.first_frame())
+        refuse(fmt::format("frame {} is before the scene's first, {}", frame, plan.first_frame()));
+}
+
+// The node of this name, of `all` that the scene makes.
+const PlannedNode& planned_node(const Plan& plan, const std::string& name, const std::vector<SceneNode>& all)
+{
+    for (const PlannedNode& planned : plan.nodes)
+        if (planned.node->name == name) return planned;
+    std::vector<std::string> names;
+    for (const SceneNode& one : all) names.push_back(one.name);
+    const bool is_left_out = std::find(names.begin(), names.end(), name) != names.end();
+    refuse(is_left_out ? fmt::format("node \"{}\" is left out: no output comes from it", name)
+                       : fmt::format("the scene has no node \"{}\"{}", name, did_you_mean(name, names)));
+}
+
+}  // namespace
 
 Result<std::vector<SceneAttribute>> Scene::attributes()
 {
@@ -50,8 +71,7 @@ void Scene::Impl::compute_beside(const Plan& apart, std::int64_t frame, const Sn
                                  Evaluator::ResultHook results)
 {
     const Running running(*this);
-    if (frame < apart.first_frame())
-        refuse(fmt::format("frame {} is before the scene's first, {}", frame, apart.first_frame()));
+    refuse_before_first(apart, frame);
     Evaluator run(apart, {}, std::move(results));
     if (hooks.tell_points) run.tell_points();
     if (!hooks.tell_points || !options.estimate_errors) run.leave_out_errors();
@@ -77,22 +97,16 @@ SceneFrame Scene::Impl::frame_behind(const Plan& apart, const PlannedNode& plann
 
 SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t frame)
 {
+    planned_node(*plan, node, nodes);
+    refuse_before_first(*plan, frame);
+    start_again();  // not before the arguments are known to be right
     const Plan watched(session->graph(), plan_options());
-    const auto& nodes_of_plan = watched.nodes;
-    const auto found = std::find_if(nodes_of_plan.begin(), nodes_of_plan.end(),
-                                    [&](const PlannedNode& planned) { return planned.node->name == node; });
-    if (found == nodes_of_plan.end()) {
-        std::vector<std::string> names;
-        for (const SceneNode& one : nodes) names.push_back(one.name);
-        const bool is_left_out = std::find(names.begin(), names.end(), node) != names.end();
-        refuse(is_left_out ? fmt::format("node \"{}\" is left out: no output comes from it", node)
-                           : fmt::format("the scene has no node \"{}\"{}", node, did_you_mean(node, names)));
-    }
+    const PlannedNode& found = planned_node(watched, node, nodes);
     PointSet points;  // of a node whose result never changes, those of its only evaluation
     compute_beside(watched, frame, nullptr, [&](const Node& of, std::int64_t, const PointSet& result) {
         if (of.name == node) points = result;
     });
-    return frame_behind(watched, *found, frame, std::move(points));
+    return frame_behind(watched, found, frame, std::move(points));
 }
 
 const std::map<std::string, SceneFrame>& Scene::Impl::points_behind_all(std::int64_t frame, const SceneSnapshot* from)
@@ -149,10 +163,7 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
 
 Result<SceneFrame> Scene::points_behind(const std::string& node, std::int64_t frame)
 {
-    return impl_->call(SceneError::FailedFrame, [&] {
-        impl_->start_again();
-        return impl_->points_behind(node, frame);
-    });
+    return impl_->call(SceneError::FailedFrame, [&] { return impl_->points_behind(node, frame); });
 }
 
 Result<std::map<std::string, SceneFrame>> Scene::points_behind_all(std::int64_t frame,

@@ -54,13 +54,15 @@ Result<std::string> Scene::graph_json(GraphLayout* kept)
 
 Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
 {
+    Biographer(*plan, asked.ids, asked.create);  // throws Error if there is no such create
+    if (asked.last < plan->first_frame())
+        refuse(fmt::format("frame {} is before the scene's first, {}", asked.last, plan->first_frame()));
+    start_again();  // not before the arguments are known to be right
     const Running running(*this);
     PlanOptions with_steps = plan_options();
     with_steps.keep_steps = true;
     const Plan traced(session->graph(), with_steps);
     Biographer biographer(traced, asked.ids, asked.create);
-    if (asked.last < traced.first_frame())
-        refuse(fmt::format("frame {} is before the scene's first, {}", asked.last, traced.first_frame()));
     Evaluator run(traced, {}, biographer.results());
     run.leave_out_errors();
     biographer.watch(run);
@@ -94,7 +96,6 @@ Result<SceneTrace> Scene::trace(const TraceOptions& options)
     Result<Impl::Traced> traced = impl_->call(SceneError::WrongCall, [&] {
         if (options.ids.empty()) refuse("there are no ids; give those of the points that are to be told of");
         if (options.step < 1) refuse(fmt::format("step = {}; it must be at least 1", options.step));
-        impl_->start_again();
         return impl_->trace(options);
     });
     if (!traced) return traced.error();

@@ -541,8 +541,13 @@ return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0
         self.assertEqual(len(rapid._offers._used_callbacks), held)
 
 
-if __name__ == "__main__":
-    outcome = unittest.main(exit=False, verbosity=0).result
+def main(module="__main__"):
+    """Runs the tests of a module, or those that the arguments name, and prints their counts as tests/run reads them."""
+    outcome = unittest.main(module, exit=False, verbosity=0).result
     failed = len(outcome.failures) + len(outcome.errors)
-    print(f"{outcome.testsRun - failed - len(outcome.skipped)} passed, {failed} failed, {len(outcome.skipped)} skipped")
+    print(f"{max(0, outcome.testsRun - failed - len(outcome.skipped))} passed, {failed} failed, {len(outcome.skipped)} skipped")
     sys.exit(failed > 0)
+
+
+if __name__ == "__main__":
+    main()

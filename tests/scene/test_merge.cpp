@@ -1,11 +1,17 @@
 // Parts of a run as one: the points of all in the order of their ids, and parts that are no whole.
+//
+//   WRONG_MERGES=2000 test_scene "a merge of wrong parts*"      more of them; WRONG_MERGES_SEED=7 others
+#include <array>
 #include <filesystem>
 #include <functional>
+#include <random>
+#include <regex>
 #include <vector>
 
 #include "include/rapid/merge.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/input_file.h"
+#include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"
@@ -182,6 +188,162 @@ TEST_CASE("a merge refuses files that are not those that their part has written"
         CHECK_THAT(merged.error().text(),
                    Contains("x_part2of2.0002.csv") && Contains("is not the file that the part has written"));
         CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0002.csv"));
+    }
+}
+
+namespace {
+
+// Two parts of which one thing is wrong, by chance.
+class WrongParts {
+public:
+    explicit WrongParts(std::uint64_t seed) : random_(seed) {}
+
+    // Makes it wrong and says how.
+    std::string damage()
+    {
+        switch (below(5)) {
+            case 0:
+                return remove();
+            case 1:
+                return change_record();
+            default:
+                return change_file();
+        }
+    }
+
+    Result<MergedFiles> merge() const { return merge_files(given_, whole()); }
+    // Whether what has been written are the frames of the whole before the first wrong one, and no others.
+    bool is_right_so_far() const
+    {
+        const Parts right;
+        REQUIRE(merge_files({right.all()}, right.folder / "whole.####.csv"));
+        for (int frame = 1; frame <= 3; ++frame) {
+            const std::string name = "whole.000" + std::to_string(frame) + ".csv";
+            if (!std::filesystem::exists(parts_.folder / name)) continue;
+            if (frame >= wrong_frame_ || bytes_of(parts_.folder / name) != bytes_of(right.folder / name)) return false;
+        }
+        return true;
+    }
+
+private:
+    std::size_t below(std::size_t n) { return static_cast<std::size_t>(random_() % n); }
+    std::string whole() const { return parts_.folder / "whole.####.csv"; }
+    static std::string bytes_of(const std::string& file) { return std::string(InputFile(file).text()); }
+    void write(const std::string& file, const std::string& bytes) const
+    {
+        parts_.folder.write(std::filesystem::path(file).filename().string(), bytes);
+    }
+
+    std::string remove()
+    {
+        const std::string part = std::to_string(1 + below(2)), record = "x_part" + part + "of2.csv.json";
+        switch (below(4)) {
+            case 0:
+                std::filesystem::remove(parts_.folder / record);
+                return "no " + record;
+            case 1:
+                given_ = {parts_.folder / ("x_part" + part + "of2.####.csv")};
+                return "part " + part + " alone";
+            case 2:
+                given_.push_back(parts_.folder / ("x_part" + part + "of2.####.csv"));
+                return "part " + part + " twice";
+            default: {
+                const std::string file = parts_.file_of(std::stoi(part), static_cast<int>(1 + below(3)));
+                std::filesystem::remove(file);
+                return "no " + file;
+            }
+        }
+    }
+
+    std::string change_record()
+    {
+        static constexpr std::array<std::array<const char*, 2>, 12> changes = {
+            {{R"("rapid_part": 2)", R"("rapid_part": 1)"},
+             {R"("parts": 2)", R"("parts": 3)"},
+             {R"("part": 2)", R"("part": 1)"},
+             {R"("part": 2)", R"("part": 3)"},
+             {R"("sample": null)", R"("sample": 0.5)"},
+             {R"("last": 3)", R"("last": 4)"},
+             {R"("step": 1)", R"("step": 2)"},
+             {R"("fps": 24)", R"("fps": 25)"},
+             {R"("rate": "100")", R"("rate": "101")"},
+             {R"("rate": "100")", R"("--seed": "7")"},
+             {R"("identity")", R"("identities")"},
+             {"}", "]"}}};
+        const std::string file = parts_.folder / "x_part2of2.csv.json";
+        const std::size_t which = below(changes.size());
+        const auto [from, to] = changes[which];
+        std::string text = bytes_of(file);
+        text.replace(text.find(from), std::string_view(from).size(), to);
+        write(file, text);
+        return std::string("in the record ") + from + " becomes " + to;
+    }
+
+    // The file of a frame becomes another one, which the record does not know.
+    std::string change_file()
+    {
+        const int part = static_cast<int>(1 + below(2)), frame = static_cast<int>(1 + below(3));
+        const std::string file = parts_.file_of(part, frame);
+        std::string bytes = bytes_of(file);
+        const std::string before = bytes, what = make_other(bytes, part, frame);
+        if (bytes == before) bytes += "999,1,1,1,0,0,0\n";
+        write(file, bytes);
+        wrong_frame_ = frame;
+        return what + ": frame " + std::to_string(frame) + " of part " + std::to_string(part);
+    }
+
+    std::string make_other(std::string& bytes, int part, int frame)
+    {
+        const auto line_after = [&](std::size_t at) { return bytes.find('\n', at) + 1; };
+        const std::size_t at = below(bytes.size() - 1), line = line_after(at), next = line_after(line);
+        switch (below(8)) {
+            case 0:
+                bytes = bytes_of(parts_.file_of(part, 1 + frame % 3));
+                return "another frame";
+            case 1:
+                bytes = bytes_of(parts_.file_of(3 - part, frame));
+                return "another part";
+            case 2:
+                bytes.resize(line);
+                return "points lost at the end";
+            case 3:
+                bytes.resize(at);
+                return "truncated";
+            case 4:
+                if (line < bytes.size()) bytes.erase(line, next - line);
+                return "a point lost";
+            case 5:
+                if (line < bytes.size()) bytes.insert(line, bytes.substr(line, next - line));
+                return "a point twice";
+            case 6:  // ids stay, values are others
+                bytes = std::regex_replace(bytes, std::regex(",0,"), "," + std::to_string(1 + below(9)) + ",");
+                return "another seed";
+            default:
+                bytes[at] = static_cast<char>(bytes[at] ^ 1 << below(7));
+                return "a bit";
+        }
+    }
+
+    std::mt19937_64 random_;
+    const Parts parts_;
+    std::vector<std::string> given_{parts_.all()};
+    int wrong_frame_ = 1;  // the first one
+};
+
+}  // namespace
+
+TEST_CASE("a merge of wrong parts is refused, whatever is wrong, and only whole frames are there", "[merge][random]")
+{
+    const auto first = static_cast<std::uint64_t>(amount("WRONG_MERGES_SEED", 0));
+    for (std::uint64_t k = 0; k < static_cast<std::uint64_t>(amount("WRONG_MERGES", 20)); ++k) {
+        WrongParts wrong(first + k);
+        const std::string damage = wrong.damage();
+        CAPTURE(first + k, damage);
+        const Result<MergedFiles> merged = wrong.merge();
+        REQUIRE_FALSE(merged);
+        CHECK((merged.error().kind == SceneError::WrongCall || merged.error().kind == SceneError::FailedFrame));
+        CHECK_FALSE(merged.error().text().empty());
+        CHECK(wrong.is_right_so_far());
     }
 }
 

@@ -15,8 +15,8 @@ from ctypes import byref, c_char_p, c_int64, c_size_t, c_uint64, c_void_p
 
 import numpy
 
-from ._library import (Column, Error, Find, FrameInfo, Log, Node, Options, Parameter, Progress, Value, call, from_value,
-                       get, library, sized, to_settings)
+from ._library import (Column, Error, Find, FrameInfo, Int, Int64, Log, Node, Options, Parameter, Progress, UInt64, Value,
+                       call, encoded, from_value, get, library, sized, to_settings)
 from ._interrupt import interruptible
 from ._offers import Constraint, Edit, Force, Mesh, Points, Shape, from_numpy, make_offers
 
@@ -144,6 +144,8 @@ class Frame:
     def compare(self, other, tolerance=1e-6):
         """What `rapid diff` tells of the differences to another frame, between points of the same id; whether there are
         none beyond the tolerance is in ["same"]."""
+        if not isinstance(other, Frame):
+            raise TypeError(f"the other frame is a {type(other).__name__}; it must be a rapid.Frame")
         text = c_char_p()
         call("frame_compare", self._handle.value, other._handle.value, tolerance, None, byref(text))
         return json.loads(text.value)
@@ -252,11 +254,12 @@ class Scene:
         settings = to_settings({**(set or {}), **parameters})
         options.settings, options.setting_count = settings, len(settings)
         if seed is not None:
-            options.seed = ctypes.pointer(c_uint64(seed))
-        folders = (c_char_p * len(paths))(*(str(path).encode() for path in paths))
+            options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
+        folders = (c_char_p * len(paths))(*(encoded(str(path)) for path in paths))
         options.paths, options.path_count = folders, len(paths)
-        options.threads, options.script_seconds, options.script_memory = threads, script_seconds, script_memory
-        options.memory, options.no_errors, options.keep_all = memory, not errors, keep_all
+        options.threads, options.script_seconds = Int.checked(threads), script_seconds
+        options.script_memory, options.memory = UInt64.checked(script_memory), UInt64.checked(memory)
+        options.no_errors, options.keep_all = not errors, bool(keep_all)
         if log:
             options.log = Log(self._guard(lambda _, level, line: log(line.decode()), None))
         options.progress = Progress(self._guard(lambda _, frame, last: self._go_on(progress, frame, last), 0))
@@ -275,7 +278,6 @@ class Scene:
         finally:
             call("offers_release", options.offers)
         self._handle = _Handle(handle, "scene_close")
-
         self._refuse_ambiguous(numbers, set or {})
 
     def _refuse_ambiguous(self, options, settings):
@@ -286,6 +288,7 @@ class Scene:
             if value != defaults[name] and name in parameters and name not in settings:
                 raise TypeError(f'{name} = {value!r} is an option of rapid.Scene, and the scene has a parameter '
                                 f'"{name}"; give set={{"{name}": {value!r}}} for the parameter, and both for both')
+
     @property
     def parameters(self):
         """By name: {"value", "default", "doc"}."""
@@ -370,6 +373,8 @@ class Scene:
         return Snapshot(handle)
 
     def restore(self, snapshot):
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError(f"the snapshot is a {type(snapshot).__name__}; it must be a rapid.Snapshot")
         self._call("scene_restore", self._handle.value, snapshot._handle.value)
 
     def explain(self):
@@ -394,7 +399,7 @@ class Scene:
     def trace(self, ids, first, last, create=None):
         """The lives of points by their ids, as `rapid trace --json` tells them, in the frames from first to last; create:
         the name of the node that makes them. The scene is then at its start."""
-        text, places = c_char_p(), (c_int64 * len(ids))(*(int(one) for one in ids))
+        text, places = c_char_p(), (c_int64 * len(ids))(*(Int64.checked(one) for one in ids))
         self._call("scene_trace", self._handle.value, places, len(ids), create.encode() if create else None, first, last,
                    byref(text))
         return json.loads(text.value)
@@ -458,5 +463,5 @@ class Scene:
     def _hold(self, what, text):
         if text is None:
             return None
-        self._held[what] = ctypes.create_string_buffer(str(text).encode())
+        self._held[what] = ctypes.create_string_buffer(encoded(str(text)))
         return ctypes.addressof(self._held[what])

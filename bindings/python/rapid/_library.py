@@ -1,6 +1,7 @@
 """The C interface (rapid/rapid.h) by ctypes: the library, its structs, and its errors as exceptions."""
 import ctypes
 import ctypes.util
+import operator
 import os
 import pathlib
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
@@ -8,6 +9,48 @@ from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64
 NUMBER, BOOLEAN, TEXT, VEC3 = range(4)
 STATUS = {1: "wrong call", 2: "wrong scene", 3: "failed frame", 4: "cancelled", 5: "too long", 6: "out of memory",
           7: "busy", 8: "unexpected"}
+
+
+def encoded(text):
+    """A str for the library, for which a text ends at a character 0."""
+    if not isinstance(text, str):
+        raise TypeError(f"{text!r} is a {type(text).__name__}; it must be a str")
+    if "\0" in text:
+        raise ValueError(f"{text!r} holds a character 0")
+    return text.encode()
+
+
+class _Text(c_char_p):
+    """An argument of bytes, or None."""
+
+    @classmethod
+    def from_param(cls, value):
+        if isinstance(value, bytes) and 0 in value:
+            raise ValueError(f"{value!r} holds a character 0")
+        return c_char_p.from_param(value)
+
+
+def _whole(c_type):
+    """An argument of a type of integer, and a function that converts to that. ctypes would take a number modulo 2^64."""
+    bits = 8 * ctypes.sizeof(c_type)
+    signed = c_type(-1).value < 0
+    least, most = (-2**(bits - 1), 2**(bits - 1) - 1) if signed else (0, 2**bits - 1)
+
+    class Whole(c_type):
+        @classmethod
+        def from_param(cls, value):
+            return c_type(cls.checked(value))
+
+        @staticmethod
+        def checked(value):
+            number = operator.index(value.value if isinstance(value, c_type) else value)
+            if not least <= number <= most:
+                raise OverflowError(f"{number} is out of range; it must be from {least} to {most}")
+            return number
+    return Whole
+
+
+Int, Int64, Size, UInt32, UInt64 = map(_whole, (c_int, c_int64, c_size_t, c_uint32, c_uint64))
 
 
 class Value(ctypes.Structure):
@@ -127,59 +170,59 @@ library.rapid_version.restype = c_char_p
 _handle = POINTER(c_void_p)
 _text = POINTER(c_char_p)
 for _name, _types in {
-        "load_plugin": [c_char_p],
-        "scene_open": [c_char_p, POINTER(Options), _handle],
-        "scene_open_text": [c_char_p, c_char_p, POINTER(Options), _handle],
+        "load_plugin": [_Text],
+        "scene_open": [_Text, POINTER(Options), _handle],
+        "scene_open_text": [_Text, _Text, POINTER(Options), _handle],
         "scene_close": [c_void_p],
         "scene_parameter_count": [c_void_p, POINTER(c_size_t)],
-        "scene_parameter": [c_void_p, c_size_t, POINTER(Parameter)],
-        "scene_set": [c_void_p, POINTER(Setting), c_size_t],
+        "scene_parameter": [c_void_p, Size, POINTER(Parameter)],
+        "scene_set": [c_void_p, POINTER(Setting), Size],
         "scene_node_count": [c_void_p, POINTER(c_size_t)],
-        "scene_node": [c_void_p, c_size_t, POINTER(Node)],
+        "scene_node": [c_void_p, Size, POINTER(Node)],
         "scene_node_types": [c_void_p, _text],
         "scene_warnings": [c_void_p, _text],
         "scene_first_frame": [c_void_p, POINTER(c_int64)],
         "scene_next_frame": [c_void_p, POINTER(c_int64)],
         "scene_advance": [c_void_p, _handle],
-        "scene_advance_to": [c_void_p, c_int64, _handle],
+        "scene_advance_to": [c_void_p, Int64, _handle],
         "scene_restart": [c_void_p],
         "scene_cancel": [c_void_p],
         "scene_save": [c_void_p, _handle],
         "scene_restore": [c_void_p, c_void_p],
         "snapshot_frame": [c_void_p, POINTER(c_int64)],
         "snapshot_bytes": [c_void_p, POINTER(c_uint64)],
-        "snapshot_write": [c_void_p, c_char_p],
-        "snapshot_read": [c_char_p, _handle],
+        "snapshot_write": [c_void_p, _Text],
+        "snapshot_read": [_Text, _handle],
         "snapshot_release": [c_void_p],
-        "frame_output": [c_void_p, c_char_p, _handle],
-        "frame_names": [c_void_p, c_int, _text],
+        "frame_output": [c_void_p, _Text, _handle],
+        "frame_names": [c_void_p, Int, _text],
         "frame_get_info": [c_void_p, POINTER(FrameInfo)],
         "frame_statistics": [c_void_p, _text],
         "frame_profile": [c_void_p, _text],
-        "frame_column": [c_void_p, c_char_p, POINTER(Column)],
-        "frame_group": [c_void_p, c_char_p, POINTER(Column)],
-        "frame_expanded": [c_void_p, c_char_p, POINTER(Column)],
-        "token_text": [c_uint32, _text],
-        "text_token": [c_char_p, POINTER(c_uint32)],
-        "frame_detail": [c_void_p, c_char_p, POINTER(Value)],
-        "frame_write": [c_void_p, c_char_p],
-        "frame_read": [c_char_p, _handle],
+        "frame_column": [c_void_p, _Text, POINTER(Column)],
+        "frame_group": [c_void_p, _Text, POINTER(Column)],
+        "frame_expanded": [c_void_p, _Text, POINTER(Column)],
+        "token_text": [UInt32, _text],
+        "text_token": [_Text, POINTER(c_uint32)],
+        "frame_detail": [c_void_p, _Text, POINTER(Value)],
+        "frame_write": [c_void_p, _Text],
+        "frame_read": [_Text, _handle],
         "frame_describe": [c_void_p, _text],
         "frame_compare": [c_void_p, c_void_p, c_double, POINTER(c_int), _text],
         "offers_new": [_handle],
         "offers_on_release": [c_void_p, Release, c_void_p],
-        "offers_mesh": [c_void_p, c_char_p, c_void_p, c_size_t, c_void_p, c_size_t],
-        "offers_points": [c_void_p, c_char_p, c_size_t, POINTER(Column), c_size_t],
-        "offers_shape": [c_void_p, c_char_p, POINTER(Shape)],
+        "offers_mesh": [c_void_p, _Text, c_void_p, Size, c_void_p, Size],
+        "offers_points": [c_void_p, _Text, Size, POINTER(Column), Size],
+        "offers_shape": [c_void_p, _Text, POINTER(Shape)],
         "offers_node": [c_void_p, POINTER(NodeType)],
-        "call_add_rod": [POINTER(Call), c_int64, c_int64, c_double, c_double],
+        "call_add_rod": [POINTER(Call), Int64, Int64, c_double, c_double],
         "scene_offer": [c_void_p, c_void_p],
         "scene_explain": [c_void_p, _text],
-        "scene_points_behind": [c_void_p, c_char_p, c_int64, _handle],
-        "scene_graph": [c_void_p, c_int, _text],
-        "scene_trace": [c_void_p, POINTER(c_int64), c_size_t, c_char_p, c_int64, c_int64, _text],
+        "scene_points_behind": [c_void_p, _Text, Int64, _handle],
+        "scene_graph": [c_void_p, Int, _text],
+        "scene_trace": [c_void_p, POINTER(c_int64), Size, _Text, Int64, Int64, _text],
         "offers_release": [c_void_p],
-        "scene_picture": [c_void_p, c_void_p, c_int, c_int, POINTER(c_void_p), POINTER(c_size_t)],
+        "scene_picture": [c_void_p, c_void_p, Int, Int, POINTER(c_void_p), POINTER(c_size_t)],
         "frame_release": [c_void_p]}.items():
     getattr(library, f"rapid_{_name}").argtypes = _types + [_handle]
 
@@ -226,7 +269,7 @@ def to_value(value, name):
     if isinstance(value, bool):
         result.type, result.number[0] = BOOLEAN, value
     elif isinstance(value, str):
-        result.type, result.text = TEXT, value.encode()
+        result.type, result.text = TEXT, encoded(value)
     else:
         try:
             numbers = [float(number) for number in value]
@@ -254,5 +297,5 @@ def from_value(value):
 def to_settings(values):
     settings = (Setting * len(values))()
     for place, (name, value) in enumerate(values.items()):
-        settings[place].name, settings[place].value = name.encode(), to_value(value, name)
+        settings[place].name, settings[place].value = encoded(name), to_value(value, name)
     return settings

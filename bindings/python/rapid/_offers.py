@@ -6,7 +6,7 @@ from ctypes import byref, c_void_p
 import numpy
 
 from ._library import (Column, Distance, NodeCall, NodeColumn, NodeParameter, NodeType, Release, Shape as ShapeStruct, call,
-                       get, sized, to_value)
+                       encoded, get, sized, to_value)
 
 _types = {numpy.dtype(numpy.float32): {1: 0, 3: 1, 4: 4}, numpy.dtype(numpy.int32): {1: 2},
           numpy.dtype(numpy.int64): {1: 3}}
@@ -18,7 +18,7 @@ _string = 6
 def _tokens(array):
     """The library's numbers of texts."""
     texts, places = numpy.unique(array, return_inverse=True)
-    tokens = [get("text_token", str(text).encode(), ctypes.c_uint32()).value for text in texts]
+    tokens = [get("text_token", encoded(str(text)), ctypes.c_uint32()).value for text in texts]
     return numpy.array(tokens, numpy.uint32)[places]
 
 
@@ -44,11 +44,29 @@ class _Arrays:
             array.flags.writeable = False
 
 
+def _numbers_of(array, name):
+    """An array of real numbers as float32."""
+    array = numpy.asarray(array)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"{name} is of {array.dtype}; it must be of numbers")
+    return numpy.ascontiguousarray(array, numpy.float32)
+
+
+def _indices_of(array, name):
+    """An array of integers as int32."""
+    array = numpy.asarray(array)
+    if array.dtype.kind not in "iu" and array.size > 0:
+        raise TypeError(f"{name} are of {array.dtype}; they must be of integers")
+    if array.size > 0 and not (array.min() >= -2**31 and array.max() < 2**31):
+        raise ValueError(f"{name} are from {array.min()} to {array.max()}; they must fit 32 bits")
+    return numpy.ascontiguousarray(array, numpy.int32)
+
+
 class Points:
     """Points of arrays: see from_numpy()."""
 
     def __init__(self, P, columns):
-        arrays = {"P": numpy.asarray(P, numpy.float32), **columns}
+        arrays = {"P": _numbers_of(P, "P"), **columns}
         if arrays["P"].ndim != 2 or arrays["P"].shape[1] != 3:
             raise TypeError(f"P is of shape {arrays['P'].shape}; it must be (points, 3)")
         self._count, self._arrays = len(arrays["P"]), {}
@@ -69,8 +87,8 @@ class Points:
     def offer(self, offers, name, _callbacks):
         columns = (Column * len(self._arrays))()
         for place, (attribute, (array, type_)) in enumerate(self._arrays.items()):
-            columns[place].name, columns[place].type, columns[place].data = attribute.encode(), type_, array.ctypes.data
-        call("offers_points", offers, name.encode(), self._count, columns, len(columns))
+            columns[place].name, columns[place].type, columns[place].data = encoded(attribute), type_, array.ctypes.data
+        call("offers_points", offers, encoded(name), self._count, columns, len(columns))
 
 
 def from_numpy(P, **columns):
@@ -83,14 +101,14 @@ class Mesh:
     """A triangle mesh: positions of shape (n, 3), triangles of shape (m, 3), counter-clockwise seen from outside."""
 
     def __init__(self, positions, triangles):
-        self._positions = numpy.ascontiguousarray(positions, numpy.float32)
-        self._triangles = numpy.ascontiguousarray(triangles, numpy.int32)
+        self._positions = _numbers_of(positions, "positions")
+        self._triangles = _indices_of(triangles, "triangles")
         for what, array in (("positions", self._positions), ("triangles", self._triangles)):
             if array.ndim != 2 or array.shape[1] != 3:
                 raise TypeError(f"{what} are of shape {array.shape}; it must be (n, 3)")
 
     def offer(self, offers, name, _callbacks):
-        call("offers_mesh", offers, name.encode(), self._positions.ctypes.data, len(self._positions),
+        call("offers_mesh", offers, encoded(name), self._positions.ctypes.data, len(self._positions),
              self._triangles.ctypes.data, len(self._triangles))
 
 
@@ -115,7 +133,7 @@ class Shape:
             return 0
         shape.distance = Distance(callbacks.guard(distance, 1))
         callbacks.append(shape.distance)
-        call("offers_shape", offers, name.encode(), byref(shape))
+        call("offers_shape", offers, encoded(name), byref(shape))
 
 
 class _Node:
@@ -131,16 +149,16 @@ class _Node:
 
     def offer_node(self, offers, callbacks):
         node = sized(NodeType)
-        node.name, node.doc, node.kind = self._name.encode(), self._doc.encode(), self._kind
+        node.name, node.doc, node.kind = encoded(self._name), encoded(self._doc), self._kind
         parameters = (NodeParameter * len(self._parameters))()
         for place, (name, value) in enumerate(self._parameters.items()):
-            parameters[place].name, parameters[place].doc = name.encode(), b""
+            parameters[place].name, parameters[place].doc = encoded(name), b""
             parameters[place].fallback = to_value(value, name)
         node.parameters, node.parameter_count = parameters, len(parameters)
         for what, columns in (("read", self._reads), ("write", self._writes)):
             array = (NodeColumn * len(columns))()
             for place, (name, width) in enumerate(columns):
-                array[place].name, array[place].type = name.encode(), 1 if width == 3 else 0
+                array[place].name, array[place].type = encoded(name), 1 if width == 3 else 0
             setattr(node, what + "s", array)
             setattr(node, what + "_count", len(columns))
         node.call = NodeCall(callbacks.guard(lambda _, now: self._run(now.contents), 1))
@@ -237,11 +255,11 @@ def make_offers(objects, nodes, guard):
                                 "rapid.Shape")
             thing.offer(offers, name, callbacks)
         for node in nodes:
+            if not isinstance(node, _Node):
+                raise TypeError(f"a node is a {type(node).__name__}; it must be of rapid.Force, rapid.Edit or "
+                                "rapid.Constraint")
             node.offer_node(offers, callbacks)
     except BaseException:
         call("offers_release", offers)
         raise
     return offers
-            if not isinstance(node, _Node):
-                raise TypeError(f"a node is a {type(node).__name__}; it must be of rapid.Force, rapid.Edit or "
-                                "rapid.Constraint")

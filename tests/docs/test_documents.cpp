@@ -7,8 +7,9 @@ namespace {
 using namespace test;
 namespace fs = std::filesystem;
 
-const std::vector<std::string> documents = {"docs/architecture.md", "docs/numerics.md", "docs/extending.md",
-                                            "CONTRIBUTING.md"};
+const std::vector<std::string> documents = {"docs/architecture.md", "docs/numerics.md",    "docs/extending.md",
+                                            "docs/host.md",         "docs/reliability.md", "docs/cli.md",
+                                            "SECURITY.md",          "CONTRIBUTING.md"};
 
 // Files that a document's examples are, which a reader would write.
 std::set<std::string> example_files(const std::string& text)
@@ -31,6 +32,23 @@ std::vector<fs::path> sources()
     return files;
 }
 
+// The rows of the tables whose last column is "its test".
+std::vector<std::string> promises_of(const std::string& text)
+{
+    std::vector<std::string> rows;
+    std::istringstream lines(text);
+    bool is_of_promises = false;
+    for (std::string line; std::getline(lines, line);) {
+        if (line.ends_with("| its test |"))
+            is_of_promises = true;
+        else if (!line.starts_with("|"))
+            is_of_promises = false;
+        else if (is_of_promises && !line.starts_with("|--"))
+            rows.push_back(line);
+    }
+    return rows;
+}
+
 }  // namespace
 
 TEST_CASE("a file or folder that a document names is there", "[docs]")
@@ -44,6 +62,44 @@ TEST_CASE("a file or folder that a document names is there", "[docs]")
             CHECK((examples.count(path) > 0 || fs::exists(project / path)));
         }
     }
+}
+
+TEST_CASE("each promise names its test", "[docs]")
+{
+    for (const char* document : {"SECURITY.md", "docs/cli.md", "docs/host.md"}) {
+        const std::vector<std::string> promises = promises_of(read_text(project / document));
+        CAPTURE(document);
+        CHECK(promises.size() > 5);
+        for (const std::string& row : promises) {
+            CAPTURE(row);
+            const std::string cell = row.substr(row.rfind('|', row.size() - 2));
+            const auto tests = matches(cell, std::regex(R"re(`tests/[\w./-]+`)re"));
+            CHECK_FALSE(tests.empty());
+        }
+    }
+}
+
+// Of commands such as RAPID_MUTANTS=20000 build/test/bin/test_mutants "[mutants]".
+TEST_CASE("variables, test programs and tags in the commands of a document are those of tests", "[docs]")
+{
+    std::string code;
+    for (const auto& entry : fs::recursive_directory_iterator(project / "tests"))
+        if (const fs::path name = entry.path().extension(); entry.is_regular_file() && name != ".png")
+            code += read_text(entry.path());
+    std::size_t commands = 0;
+    for (const char* document : {"docs/reliability.md", "docs/numerics.md", "CONTRIBUTING.md", "SECURITY.md"})
+        for (const auto& command :
+             matches(read_text(project / document),
+                     std::regex(R"re((?:^|\n|`) *((?:[A-Z_]+=\S+ )*)build/\w+/bin/(\S+)([^\n`]*))re"))) {
+            CAPTURE(document, command[0]);
+            ++commands;
+            for (const auto& variable : matches(command[1], std::regex("([A-Z_]+)=")))
+                CHECK((variable[1] == "LD_PRELOAD" || code.find('"' + variable[1] + '"') != std::string::npos));
+            if (command[2].rfind("test_", 0) == 0) CHECK(fs::is_directory(project / "tests" / command[2].substr(5)));
+            for (const auto& tag : matches(command[3], std::regex(R"re((\[\w+\]))re")))
+                CHECK(code.find(tag[1]) != std::string::npos);
+        }
+    CHECK(commands > 20);
 }
 
 TEST_CASE("a name that a document gives with its file is in that file", "[docs]")

@@ -5,8 +5,10 @@
 
 #include <csignal>
 #include <fstream>
+#include <vector>
 
 #include "runtime/files/read_apart.h"
+#include "runtime/memory_budget.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -24,6 +26,7 @@ Number read(const std::filesystem::path&, const std::string& what)
 {
     if (what == "parent") return ::getppid();
     if (what == "crash") ::raise(SIGSEGV);
+    if (what == "much") return std::vector<Number>((96 << 20) / sizeof(Number)).back();
     throw Error("there is no " + what);
 }
 
@@ -65,6 +68,20 @@ TEST_CASE("a reader process forks the copies that read, and outlives them", "[fi
         expect(error_of([&] { reader(file, "name"); }) == "there is no name", 4);
         expect(error_of([&] { reader(file / "none", "parent"); }).starts_with("can't be read: "), 5);
         expect(reader(file, "parent") == process, 6);
+    });
+}
+
+TEST_CASE("a reader process keeps to the budget of the process that it serves", "[files]")
+{
+    in_process([](const std::filesystem::path& file) {
+        start_reader_process([] {});
+        expect(reader(file, "much") == 0, 1);
+        set_memory_budget(1);
+        expect(error_of([&] { reader(file, "much"); }) ==
+                   "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or "
+                   "set --memory",
+               2);
+        expect(reader(file, "parent") > 0, 3);
     });
 }
 

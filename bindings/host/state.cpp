@@ -85,8 +85,9 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
     make();
     if (!L_) throw std::bad_alloc();
     const std::exception_ptr error = set_up();
-    // One that is not whole is given up: closing it, LuaJIT takes it for granted that its library ffi is.
-    if (error) std::rethrow_exception(error);
+    if (!error) return;
+    close();
+    std::rethrow_exception(error);
 }
 
 // Where memory runs out behind its first block, LuaJIT closes what it has of the state, takes it for granted that this
@@ -133,9 +134,12 @@ std::exception_ptr State::set_up()
     return std::make_exception_ptr(Error(lua_tostring(L_, -1)));
 }
 
-State::~State()
+State::~State() { close(); }
+
+// LuaJIT cannot close a state that a jump has left, nor one without its library ffi: the memory of those is lost.
+void State::close()
 {
-    if (is_broken_) return;
+    if (is_broken_ || !has_libraries_) return;
     protected_ = true;  // Lua calls finalizers so, and nothing else of it allocates
     lua_close(L_);
 }
@@ -182,6 +186,7 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
 void State::open_libraries()
 {
     luaL_openlibs(L_);
+    has_libraries_ = true;
     leave_out_current_folder(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.
     const std::filesystem::path folder = lua_folder();

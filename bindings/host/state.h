@@ -129,6 +129,7 @@ private:
     void make();
     // Fills a new state; the error, where there is one.
     std::exception_ptr set_up();
+    void close();
     void open_libraries();
     void run_host_file();
 
@@ -137,6 +138,7 @@ private:
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;            // to options().script_memory, now
+    bool has_libraries_ = false;      // those of LuaJIT itself
     bool is_broken_ = false;          // compiled code was left by a jump
     bool is_left_at_limit_ = false;   // likewise, as it asked for more than it may have
     bool protected_ = false;          // now

@@ -120,4 +120,20 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } 
     CHECK(many < few + (1 << 20));
 }
 
+TEST_CASE("sessions that are stopped before their libraries are loaded leave nothing in use", "[kept]")
+{
+    const test::TemporaryFolder folder;
+    const auto file = folder.write("scene.lua", "return require 'rapid'.create {}");
+    const auto stopped_session = [&] {
+        SessionOptions options;
+        options.interruption = std::make_shared<Interruption>();
+        options.interruption->request("stopped", Interruption::Asked);
+        CHECK_THROWS_WITH(Session(file, std::move(options)), "stopped");
+    };
+    stopped_session();
+    const std::size_t before = bytes_in_use();
+    for (int i = 0; i < 20; ++i) stopped_session();
+    CHECK(bytes_in_use() < before + 20'000);  // a state of Lua has 200,000
+}
+
 }  // namespace rapid

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
@@ -15,12 +16,14 @@
 #include <boost/beast/websocket.hpp>
 #include <deque>
 #include <fstream>
+#include <list>
 #include <map>
 #include <optional>
 #include <random>
 #include <thread>
 
 #include "runtime/error.h"
+#include "runtime/printable.h"
 
 namespace rapid {
 namespace {
@@ -33,10 +36,27 @@ using Tcp = asio::ip::tcp;
 using Request = http::request<http::string_body>;
 using HttpResponse = http::response<http::string_body>;
 
-// Bytes. A header has the cookies of all views that a browser has seen: it keeps 180 of a host, of 50 bytes each.
+// Bytes. A header has the cookies of all servers of this machine that a browser has seen: it keeps 180 of a host.
 constexpr std::size_t most_header = 32768, most_body = 1024, most_message = 1 << 20;
 // Answers that a page has not taken, and their bytes: it asks for few at a time.
 constexpr std::size_t most_answers = 64, most_answer_bytes = std::size_t{256} << 20;
+// Requests of a page that are not answered yet; others are read when some are.
+constexpr int most_unanswered = 32;
+// A connection has this long for a request, and then to take the answer, unless it is the socket of a page.
+constexpr std::chrono::seconds request_time{10}, answer_time{60};
+
+// Descriptors: most of those that the process may have are left to the simulation.
+struct ConnectionLimits {
+    std::size_t pages, strangers;  // sockets with a token; connections without one
+
+    static ConnectionLimits of_process()
+    {
+        rlimit files{};
+        const bool is_known = ::getrlimit(RLIMIT_NOFILE, &files) == 0;
+        const rlim_t share = is_known ? files.rlim_cur / 8 : 0;
+        return {std::clamp<std::size_t>(share, 8, 64), std::clamp<std::size_t>(share, 8, 32)};
+    }
+};
 
 std::string random_token()
 {
@@ -53,6 +73,11 @@ bool same_secret(std::string_view a, std::string_view b)
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) differ |= static_cast<unsigned char>(a[i] ^ b[i]);
     return differ == 0;
 }
+
+// Subprotocols that a page offers with its socket: the one that it speaks, and one that is its token. A script can set
+// no other header of a socket. A cookie would not do: browsers send it to every port of this machine.
+constexpr const char* protocol = "rapid";
+constexpr std::string_view token_protocol = "rapid.token.";
 
 // Programs that are started from here, such as the browser, would keep it.
 void close_on_exec(int socket) { ::fcntl(socket, F_SETFD, FD_CLOEXEC); }
@@ -71,6 +96,19 @@ const char* type_of(std::string_view name)
     if (name.ends_with(".js")) return "text/javascript; charset=utf-8";
     if (name.ends_with(".css")) return "text/css; charset=utf-8";
     return name.ends_with(".svg") ? "image/svg+xml" : "application/octet-stream";
+}
+
+// An exception, as a rule for want of memory, ends the handler that threw it, and no other.
+void run_handlers(asio::io_context& context)
+{
+    for (;;) {
+        try {
+            context.run();
+            return;
+        } catch (const std::exception& error) {
+            fmt::print(stderr, "rapid view: a request is given up: {}\n", printable(error.what()));
+        }
+    }
 }
 
 std::string text_of(const std::filesystem::path& path)
@@ -103,7 +141,7 @@ public:
         files_["/three.module.js"] = three_file();
         acceptor_.assign(Tcp::v4(), socket);
         port_ = acceptor_.local_endpoint().port();
-        worker_ = std::thread([this] { work_.run(); });
+        worker_ = std::thread([this] { run_handlers(work_); });
     }
     ~Impl()
     {
@@ -119,7 +157,7 @@ public:
     void run()
     {
         accept();
-        net_.run();
+        run_handlers(net_);
     }
 
     void repeat(int milliseconds, std::function<void()> f)
@@ -138,44 +176,49 @@ private:
 
     void accept();
 
-    std::string cookie() const { return fmt::format("rapid_{}", port_); }
-
     std::string address_with(const std::string& token) const
     {
         return fmt::format("http://127.0.0.1:{}/?token={}", port_, token);
     }
 
-    // Whether the cookie or the query has the token, or the query that of the address to open, for the first time.
-    bool has_token(const Request& request)
+    enum class Token { None, Lasting, Once };
+
+    // For a page that has come by the address to open, so that it can come again.
+    std::string lasting_token() const { return fmt::format(R"({{"re": 0, "token": "{}"}})", token_); }
+
+    // The token among the subprotocols. That of the address to open is one for the first time only.
+    Token token_of(const Request& request)
+    {
+        const auto offered = request[http::field::sec_websocket_protocol];
+        for (const auto name : http::token_list(offered)) {
+            const std::string_view text(name.data(), name.size());
+            if (!text.starts_with(token_protocol)) continue;
+            const std::string_view token = text.substr(token_protocol.size());
+            if (same_secret(token, token_)) return Token::Lasting;
+            if (!is_opened_ && same_secret(token, token_to_open_)) {
+                is_opened_ = true;
+                return Token::Once;
+            }
+        }
+        return Token::None;
+    }
+
+    static std::string path_of(const Request& request)
     {
         const std::string target(request.target());
-        if (const std::size_t query = target.find("?token="); query != std::string::npos) {
-            const std::string told = target.substr(query + 7);
-            if (same_secret(told, token_)) return true;
-            if (!is_opened_ && same_secret(told, token_to_open_)) return is_opened_ = true;
-        }
-        std::string_view cookies(request[http::field::cookie].data(), request[http::field::cookie].size());
-        while (!cookies.empty()) {
-            const std::size_t end = std::min(cookies.find(';'), cookies.size());
-            std::string_view one = cookies.substr(0, end);
-            while (one.starts_with(' ')) one.remove_prefix(1);
-            if (one.starts_with(cookie() + "=") && same_secret(one.substr(cookie().size() + 1), token_)) return true;
-            cookies.remove_prefix(std::min(end + 1, cookies.size()));
-        }
-        return false;
+        return target.substr(0, target.find('?'));
     }
 
     // Empty, or why the request is refused.
-    std::string refusal(const Request& request)
+    std::string refusal(const Request& request) const
     {
         const std::string host(request[http::field::host]), origin(request[http::field::origin]);
         if (!is_own_host(host)) return "the Host is not this machine";
         if (!origin.empty() && origin != "http://" + host) return "the Origin is another page";
-        if (!has_token(request)) return "the token is missing; open the address that rapid view has printed";
         return "";
     }
 
-    HttpResponse answer(const Request& request)
+    static HttpResponse empty_answer(const Request& request)
     {
         HttpResponse response(http::status::ok, request.version());
         response.keep_alive(request.keep_alive());
@@ -188,36 +231,53 @@ private:
                      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src "
                      "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
         response.set(http::field::content_type, "text/plain; charset=utf-8");
-        const auto refuse = [&](http::status status, const std::string& why) {
-            response.result(status);
-            response.body() = why + '\n';
-            response.prepare_payload();
-            return response;
-        };
-        if (const std::string why = refusal(request); !why.empty()) return refuse(http::status::forbidden, why);
+        return response;
+    }
+
+    static HttpResponse refuse(const Request& request, http::status status, const std::string& why)
+    {
+        HttpResponse response = empty_answer(request);
+        response.result(status);
+        response.body() = why + '\n';
+        response.prepare_payload();
+        return response;
+    }
+
+    // A file of the page. These have nothing of the scene, and need no token.
+    HttpResponse answer(const Request& request) const
+    {
+        if (const std::string why = refusal(request); !why.empty())
+            return refuse(request, http::status::forbidden, why);
         if (request.method() != http::verb::get)
-            return refuse(http::status::method_not_allowed, "only GET is answered");
-        std::string path(request.target());
-        path = path.substr(0, path.find('?'));
+            return refuse(request, http::status::method_not_allowed, "only GET is answered");
+        const std::string path = path_of(request);
         const auto file = files_.find(path == "/" ? "/index.html" : path);
-        if (file == files_.end()) return refuse(http::status::not_found, "the page has no such file");
+        if (file == files_.end()) return refuse(request, http::status::not_found, "the page has no such file");
+        HttpResponse response = empty_answer(request);
         try {
             response.body() = text_of(file->second);
         } catch (const Error& error) {
-            return refuse(http::status::internal_server_error, error.what());
+            return refuse(request, http::status::internal_server_error, error.what());
         }
         response.set(http::field::content_type, type_of(file->first));
-        if (path == "/")
-            response.set(http::field::set_cookie,
-                         fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie(), token_));
         response.prepare_payload();
         return response;
+    }
+
+    // A page that opens a socket always sends its Origin.
+    bool asks_for_socket(const Request& request) const
+    {
+        return websocket::is_upgrade(request) && path_of(request) == "/socket" && refusal(request).empty() &&
+               !request[http::field::origin].empty();
     }
 
     const std::filesystem::path folder_;
     const Handler handler_;
     const std::string token_ = random_token(), token_to_open_ = random_token();
     bool is_opened_ = false;
+    const ConnectionLimits limits_ = ConnectionLimits::of_process();
+    std::list<Connection*> strangers_;    // connections without a token, in the order in which they came
+    std::atomic<std::size_t> pages_ = 0;  // sockets
     std::map<std::string, std::filesystem::path> files_;  // by the path of a request
     asio::io_context net_{1}, work_{1};
     Tcp::acceptor acceptor_;
@@ -229,37 +289,86 @@ private:
 // A page. Its functions run on the server's thread.
 class ViewServer::Impl::Socket : public std::enable_shared_from_this<Socket> {
 public:
-    Socket(Impl& server, beast::tcp_stream&& stream) : server_(server), stream_(std::move(stream)) {}
+    Socket(Impl& server, beast::tcp_stream&& stream) : server_(server), stream_(std::move(stream)) { ++server_.pages_; }
+    ~Socket() { --server_.pages_; }
 
-    void open(const Request& request)
+    // greeting: the first message, unless it is empty.
+    void open(const Request& request, const std::string& greeting)
     {
         beast::get_lowest_layer(stream_).expires_never();
         stream_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
         stream_.read_message_max(most_message);
         stream_.write_buffer_bytes(1 << 17);
         stream_.auto_fragment(false);
-        stream_.async_accept(request, [self = shared_from_this()](const beast::error_code& error) {
-            if (!error) self->read();
+        stream_.set_option(websocket::stream_base::decorator(
+            [](websocket::response_type& response) { response.set(http::field::sec_websocket_protocol, protocol); }));
+        stream_.async_accept(request, [self = shared_from_this(), greeting](const beast::error_code& error) {
+            if (error) return;
+            if (!greeting.empty()) self->send(greeting, false);
+            self->read();
         });
     }
 
 private:
+    // A request that is not answered yet; its answer has a share of it.
+    class Unanswered {
+    public:
+        explicit Unanswered(std::weak_ptr<Socket> page) : page_(std::move(page)) {}
+        ~Unanswered()
+        {
+            try {
+                if (auto page = page_.lock()) {
+                    asio::io_context& net = page->server_.net_;
+                    asio::post(net, [page = std::move(page)] { page->has_answered(); });
+                }
+            } catch (...) {  // for want of memory: the page may ask for one less
+            }
+        }
+        Unanswered(const Unanswered&) = delete;
+        Unanswered& operator=(const Unanswered&) = delete;
+
+    private:
+        const std::weak_ptr<Socket> page_;
+    };
+
+    void has_answered()
+    {
+        if (unanswered_-- == most_unanswered && !is_handling_) read();
+    }
+
+    void has_handled()
+    {
+        is_handling_ = false;
+        if (unanswered_ < most_unanswered) read();
+    }
+
     void read()
     {
         stream_.async_read(buffer_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
             if (error) return self->close();
             std::string text = beast::buffers_to_string(self->buffer_.data());
             self->buffer_.consume(self->buffer_.size());
-            asio::post(self->server_.work_, [self, text = std::move(text)] {
-                if (self->is_closed_) return;
-                // An answer may wait for long, and its page be gone.
-                self->server_.handler_(text, [page = std::weak_ptr(self)](std::string message, bool binary) {
-                    if (const auto open = page.lock())
-                        asio::post(open->server_.net_, [open, message = std::move(message), binary]() mutable {
-                            open->send(std::move(message), binary);
-                        });
-                });
-                asio::post(self->server_.net_, [self] { self->read(); });
+            self->is_handling_ = true;
+            ++self->unanswered_;
+            asio::post(self->server_.work_, [self, text = std::move(text)]() mutable {
+                self->handle(text);
+                asio::io_context& net = self->server_.net_;
+                asio::post(net, [self = std::move(self)] { self->has_handled(); });
+            });
+        });
+    }
+
+    // On the handler's thread. An answer may wait for long, and its page be gone.
+    void handle(const std::string& text)
+    {
+        const auto unanswered = std::make_shared<const Unanswered>(weak_from_this());
+        if (is_closed_) return;
+        server_.handler_(text, [page = weak_from_this(), unanswered](std::string message, bool binary) {
+            auto open = page.lock();
+            if (!open) return;
+            asio::io_context& net = open->server_.net_;
+            asio::post(net, [open = std::move(open), message = std::move(message), binary]() mutable {
+                open->send(std::move(message), binary);
             });
         });
     }
@@ -299,19 +408,31 @@ private:
     beast::flat_buffer buffer_;
     std::deque<std::pair<std::string, bool>> waiting_;
     std::size_t bytes_ = 0;                // of what waits
+    int unanswered_ = 0;                   // requests
+    bool is_handling_ = false;             // one of them
     std::atomic<bool> is_closed_ = false;  // what it has asked for is not answered any more
 };
 
 class ViewServer::Impl::Connection : public std::enable_shared_from_this<Connection> {
 public:
-    Connection(Impl& server, Tcp::socket&& socket) : server_(server), stream_(std::move(socket)) {}
+    Connection(Impl& server, Tcp::socket&& socket)
+        : server_(server), stream_(std::move(socket)), place_(server_.strangers_.insert(server_.strangers_.end(), this))
+    {
+    }
+    ~Connection() { leave(); }
+
+    void close()
+    {
+        leave();
+        stream_.close();
+    }
 
     void read()
     {
         parser_.emplace();
         parser_->header_limit(most_header);
         parser_->body_limit(most_body);
-        stream_.expires_after(std::chrono::seconds(60));
+        stream_.expires_after(request_time);
         http::async_read(stream_, buffer_, *parser_,
                          [self = shared_from_this()](const beast::error_code& error, std::size_t) {
                              if (!error) self->respond();
@@ -319,15 +440,26 @@ public:
     }
 
 private:
+    void leave()
+    {
+        if (place_) server_.strangers_.erase(*place_);
+        place_.reset();
+    }
+
     void respond()
     {
         const Request& request = parser_->get();
-        const std::string_view target(request.target().data(), request.target().size());
-        // A page that opens a socket tells its Origin, always.
-        if (websocket::is_upgrade(request) && target.substr(0, target.find('?')) == "/socket" &&
-            server_.refusal(request).empty() && !request[http::field::origin].empty())
-            return std::make_shared<Socket>(server_, std::move(stream_))->open(request);
-        response_ = server_.answer(request);
+        if (!server_.asks_for_socket(request))
+            response_ = server_.answer(request);
+        else if (server_.pages_ >= server_.limits_.pages)
+            response_ = refuse(request, http::status::service_unavailable, "too many pages are open; close one");
+        else if (const Token token = server_.token_of(request); token == Token::None)
+            response_ = refuse(request, http::status::forbidden,
+                               "the token is missing; open the address that rapid view has printed");
+        else
+            return std::make_shared<Socket>(server_, std::move(stream_))
+                ->open(request, token == Token::Once ? server_.lasting_token() : "");
+        stream_.expires_after(answer_time);
         http::async_write(stream_, response_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
             if (error) return;
             if (self->response_.keep_alive()) return self->read();
@@ -338,6 +470,7 @@ private:
 
     Impl& server_;
     beast::tcp_stream stream_;
+    std::optional<std::list<Connection*>::iterator> place_;  // among those of the server, while it is one
     beast::flat_buffer buffer_;
     std::optional<http::request_parser<http::string_body>> parser_;
     HttpResponse response_;
@@ -353,6 +486,8 @@ void ViewServer::Impl::accept()
         beast::error_code none;
         socket.set_option(Tcp::no_delay(true), none);
         close_on_exec(socket.native_handle());
+        // Of too many the first one goes, whoever it is: a page needs few, and for a short time.
+        if (strangers_.size() >= limits_.strangers) strangers_.front()->close();
         std::make_shared<Connection>(*this, std::move(socket))->read();
         accept();
     });

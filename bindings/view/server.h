@@ -1,9 +1,13 @@
 // The viewer's server: the files of the page by HTTP, and requests by WebSocket, on this machine alone.
 //
-// Closed: it listens on the loopback device; a request needs the token of the address that the command prints (the page
-// keeps it as a cookie), a Host of this machine and, where it has one, that host as its Origin. Names of files in
-// requests are looked up among those of the page; none is opened by what a request says. A page that asks for more than
-// is answered waits, and one that is closed leaves nothing behind.
+// It listens on the loopback device. All requests need a Host of this machine and, if they have an Origin, that host
+// in it. The page's own files are served to anybody: they are the same in all views. Everything else goes over the
+// WebSocket, which needs the token of the address that the command prints. The page offers the token as a subprotocol
+// and not as a cookie, which a browser would send to every port of this machine.
+//
+// Names of files in requests are looked up among those of the page. A page that sends more requests than are answered
+// waits, and a closed one leaves nothing behind. The number of connections is limited, those without a token in time,
+// too, so that the simulation always has descriptors.
 #pragma once
 
 #include <filesystem>
@@ -32,7 +36,8 @@ public:
     ~ViewServer();
 
     std::string address() const;  // with the token
-    // The same with another token, which one request may have: arguments of a browser are no secret on this machine.
+    // The same with another token, which opens one socket: arguments of a browser are no secret on this machine. The
+    // page gets the lasting token through that socket.
     std::string address_to_open() const;
     // Calls f from the handler's thread: soon, or every so many milliseconds.
     void post(std::function<void()> f);

@@ -177,11 +177,13 @@ class Browser:
 class View:
     """A `rapid view`, and its address."""
 
-    def __init__(self, rapid, *arguments, cwd=None):
+    def __init__(self, rapid, *arguments, cwd=None, prefix=(), environment=None):
+        """prefix: words before the command; environment: variables besides those of this process."""
         # A shell's background jobs ignore it, and so would a view that is to end by it.
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        words = ["setpriv", "--pdeathsig", "KILL", rapid, "view", *arguments, "--no-open"]
-        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd)
+        words = ["setpriv", "--pdeathsig", "KILL", *prefix, rapid, "view", *arguments, "--no-open"]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd,
+                                        env={**os.environ, **(environment or {})})
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{32})", self.address)
         if not match:
@@ -192,6 +194,9 @@ class View:
         """Resident bytes."""
         with open(f"/proc/{self.process.pid}/statm", encoding="ascii") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.process.pid}/fd"))
 
     def close(self):
         self.process.send_signal(signal.SIGINT)

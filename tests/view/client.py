@@ -6,21 +6,30 @@ import time
 from browser import PATIENCE
 
 
+def upgrade(view, token=None):
+    """The headers of a request for the socket."""
+    return {"Origin": f"http://127.0.0.1:{view.port}", "Connection": "Upgrade", "Upgrade": "websocket",
+            "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+            "Sec-WebSocket-Protocol": f"rapid, rapid.token.{token or view.token}"}
+
+
 def open_socket(view):
     """The socket behind the answer to the upgrade."""
     raw = socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE)
-    raw.sendall((f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nOrigin: http://127.0.0.1:{view.port}\r\n"
-                 f"Cookie: rapid_{view.port}={view.token}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
-                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n").encode())
+    headers = {"Host": f"127.0.0.1:{view.port}", **upgrade(view)}
+    raw.sendall(("GET /socket HTTP/1.1\r\n" + "".join(f"{name}: {value}\r\n" for name, value in headers.items()) +
+                 "\r\n").encode())
     head = b""
     while b"\r\n\r\n" not in head:
-        head += raw.recv(1)
+        byte = raw.recv(1)
+        assert byte, f"closed after {head}"
+        head += byte
     assert b" 101 " in head.split(b"\r\n")[0], head
     return raw
 
 
 def frame_of(text, opcode=1):
-    data, mask = text.encode(), b"\0\0\0\0"
+    data, mask = text.encode() if isinstance(text, str) else text, b"\0\0\0\0"
     size = len(data)
     length = bytes([0x80 | size]) if size < 126 else bytes([0xfe]) + size.to_bytes(2, "big") if size < 65536 else (
         bytes([0xff]) + size.to_bytes(8, "big"))
@@ -37,11 +46,17 @@ class Client:
     def ask(self, what, **given):
         """The answer: an object, or the bytes of a frame."""
         self.raw.sendall(frame_of(json.dumps({"re": 1, "do": what, **given})))
-        opcode, size = self.file.read(2)
+        opcode, data = self.receive()
+        return json.loads(data) if opcode == 0x81 else data
+
+    def receive(self):
+        """The next frame: its first byte, and its data."""
+        head = self.file.read(2)
+        assert len(head) == 2, "the connection is closed"
+        opcode, size = head
         if size >= 126:
             size = int.from_bytes(self.file.read(2 if size == 126 else 8), "big")
-        data = self.file.read(size)
-        return json.loads(data) if opcode == 0x81 else data
+        return opcode, self.file.read(size)
 
     def until_done(self, run=1, pulls=False):
         """The status of a run that is done. pulls: its newest frames, shapes and figures, as the page does."""

@@ -1,5 +1,6 @@
 """What the server refuses, hostile names, the sandbox."""
 import http.client
+import http.server
 import json
 import os
 import pathlib
@@ -8,11 +9,13 @@ import signal
 import socket
 import subprocess
 import tempfile
+import threading
 import time
+import types
 
 from bench import choose, SCENE, go, set_parameter, test, wait_for_run
 from browser import PATIENCE, View, wait_for
-from client import frame_of, open_socket
+from client import Client, frame_of, open_socket, upgrade
 
 
 def request(view, target, headers=None, method="GET"):
@@ -97,38 +100,40 @@ def hostile_names_are_text(bench):
 def refuses_strangers(bench):
     bench.ready()
     view = bench.view
-    cookie = {"Cookie": f"rapid_{view.port}={view.token}"}
-    assert request(view, f"/?token={view.token}")[0] == 200
-    assert request(view, "/page.js", cookie)[0] == 200
-    assert request(view, "/three.module.js", cookie)[0] == 200
-    # Among the cookies of as many views as a browser keeps.
-    others = "; ".join(f"rapid_{port}={'0' * 32}" for port in range(20000, 20179))
-    assert request(view, "/page.js", {"Cookie": f"{others}; {cookie['Cookie']}"})[0] == 200
+    # The page's own files are for anybody, but not for pages of others; and they have no token.
+    for target in ("/", f"/?token={view.token}", "/page.js", "/three.module.js"):
+        status, text, answer = request(view, target)
+        assert status == 200 and view.token.encode() not in text + bytes(answer.headers), target
+        assert answer.getheader("Set-Cookie") is None
     wrong = view.token[:-1] + ("0" if view.token[-1] != "0" else "1")
-    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
-               "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
-    origin = {"Origin": f"http://127.0.0.1:{view.port}"}
+    right = upgrade(view)
+    nothing = {name: value for name, value in right.items() if name != "Sec-WebSocket-Protocol"}
     for target, headers in [
-            ("/", {}), ("/page.js", {}), (f"/?token={wrong}", {}), ("/?token=", {}),
-            ("/page.js", {"Cookie": f"rapid_{view.port}={wrong}"}),
-            (f"/?token={view.token}", {"Host": f"evil.example:{view.port}"}),
-            ("/page.js", {**cookie, "Host": "evil.example"}),
-            ("/page.js", {**cookie, "Host": "127.0.0.1.evil.example"}),
-            ("/page.js", {**cookie, "Origin": "http://evil.example"}),
-            ("/page.js", {**cookie, "Origin": "null"}),
-            ("/socket", upgrade), ("/socket", {**upgrade, **origin}),
-            ("/socket", {**upgrade, **cookie, "Origin": "http://evil.example"})]:
+            ("/", {"Host": f"evil.example:{view.port}"}), ("/page.js", {"Host": "evil.example"}),
+            ("/page.js", {"Host": "127.0.0.1.evil.example"}), ("/page.js", {"Origin": "http://evil.example"}),
+            ("/page.js", {"Origin": "null"}), ("/socket", nothing),
+            ("/socket", {**nothing, "Sec-WebSocket-Protocol": "rapid"}), ("/socket", upgrade(view, wrong)),
+            ("/socket", {**nothing, "Sec-WebSocket-Protocol": view.token}),
+            ("/socket", {**nothing, "Cookie": f"rapid_{view.port}={view.token}"}),
+            (f"/socket?token={view.token}", nothing), ("/socket", {**right, "Origin": "http://evil.example"}),
+            ("/socket", {**right, "Origin": f"http://127.0.0.1:{view.port + 1}"}),
+            ("/socket", {**right, "Host": f"evil.example:{view.port}"})]:
         status, text, _ = request(view, target, headers)
         assert status == 403, (target, headers, status)
         assert b"<" not in text
     for target in ("/../../../etc/passwd", "/..%2f..%2fetc/passwd", "/page/../../simulation.cpp", "//etc/passwd",
                    "/%2e%2e/server.cpp", "/scene.lua"):
-        status, text, _ = request(view, target, cookie)
+        status, text, _ = request(view, target)
         assert status in (400, 404), (target, status)
         assert b"root:" not in text and b"#include" not in text and b"rapid.create" not in text
-    assert request(view, "/socket", {**upgrade, **cookie})[0] == 404, "a socket without an Origin"
-    assert request(view, "/socket", {**upgrade, **cookie, **origin})[0] == 101
-    assert request(view, "/page.js", cookie, "POST")[0] == 405
+    without_origin = {name: value for name, value in right.items() if name != "Origin"}
+    assert request(view, "/socket", without_origin)[0] == 404
+    status, _, answer = request(view, "/socket", right)
+    assert status == 101 and answer.getheader("Sec-WebSocket-Protocol") == "rapid"
+    # A header with the cookies of as many servers as a browser keeps.
+    others = "; ".join(f"other_{port}={'0' * 32}" for port in range(20000, 20179))
+    assert request(view, "/socket", {**right, "Cookie": others})[0] == 101
+    assert request(view, "/page.js", method="POST")[0] == 405
     policy = request(view, f"/?token={view.token}")[2].getheader("Content-Security-Policy")
     assert "default-src 'none'" in policy and "unsafe" not in policy
     listening = subprocess.run(["grep", "-i", f":{view.port:04X} 00000000:0000 0A", "/proc/net/tcp"], check=True,
@@ -161,7 +166,40 @@ def an_untrusted_scene_is_shown_in_the_sandbox(bench):
     assert "secret.obj" in browser.run("return document.getElementById('error').innerText")
     (bench.path / "scene.lua").write_text(SCENE, encoding="utf-8")
     wait_for_run(browser, run + 1)
-    assert request(bench.view, "/page.js")[0] == 403
+    assert request(bench.view, "/socket", upgrade(bench.view, "0" * 32))[0] == 403
+
+
+@test
+def a_server_on_another_port_gets_no_token(bench):
+    browser = bench.ready()
+    got = []
+
+    class Other(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            got.append(f"{self.requestline}\n{self.headers}")
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<p>other</p>")
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Other)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        assert browser.run("return document.cookie") == ""
+        browser.open(f"http://127.0.0.1:{server.server_port}/")
+        assert browser.run("return sessionStorage.length + document.cookie.length") == 0
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+    assert got and bench.view.token not in "".join(got), got
+    # The tab has kept it for the view.
+    browser.open(f"http://127.0.0.1:{bench.view.port}/")
+    browser.wait("window.rapidView?.state.status?.state === 'done'")
 
 
 @test
@@ -178,7 +216,7 @@ def oversized_messages_end_their_connection_alone(bench):
             pass
         assert is_closed(raw)
     assert bench.view.memory() - before < 8 << 20
-    for target, size in ((f"/?{'x' * 20000}", 0), ("/", 1 << 20)):
+    for target, size in ((f"/?{'x' * 40000}", 0), ("/", 1 << 20)):
         connection = http.client.HTTPConnection("127.0.0.1", bench.view.port, timeout=PATIENCE)
         try:
             connection.putrequest("GET", target, skip_host=True)
@@ -230,7 +268,7 @@ def a_page_outlives_a_lost_connection(bench):
 def damaged_requests_end_nothing(bench):
     browser = bench.ready()
     for text in ("", "{", "[]", "null", '{"re": 1}', '{"re": -1, "do": "frame"}', '{"re": "x"}', "\\u0000" * 100):
-        browser.run("""const s = new WebSocket(`ws://${location.host}/socket`);
+        browser.run("""const s = new WebSocket(`ws://${location.host}/socket`, rapidView.connection.protocols());
           s.onopen = () => { s.send(arguments[0]); };""".replace("arguments[0]", json.dumps(text)))
     for wish in ("{frame: 1e300}", "{frame: 'x'}", "{}", "{frame: 5, colour: 'nothing'}", "{frame: 5, group: 'none'}",
                  "{frame: 5, after: 'nobody'}", "{frame: -5}", "{frame: 5, output: 'else'}"):
@@ -240,18 +278,50 @@ def damaged_requests_end_nothing(bench):
     assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
 
 
-def descriptors(view):
-    return len(os.listdir(f"/proc/{view.process.pid}/fd"))
-
-
 @test
 def closed_pages_leave_nothing_behind(bench):
     bench.ready()
-    before = descriptors(bench.view)
+    before = bench.view.descriptors()
     for k in range(400):
         with open_socket(bench.view) as raw:  # waits for what does not come
             raw.sendall(frame_of(json.dumps({"re": k, "do": "status", "since": 1 << 60})))
-    wait_for(lambda: descriptors(bench.view) < before + 20)
+        if k % 20 == 19:
+            wait_for(lambda: bench.view.descriptors() < before + 20)
+
+
+@test
+def idle_connections_leave_descriptors_to_the_simulation(bench):
+    bench.end()
+    (bench.path / "scene.lua").write_text(SCENE, encoding="utf-8")
+    view = View(bench.rapid, "scene.lua", "-f", "1-6", cwd=bench.path, prefix=("prlimit", "--nofile=64:64"))
+    client = Client(view)
+    client.until_done()
+    idle = [socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE) for _ in range(200)]
+    try:
+        for raw in idle[:100]:
+            raw.sendall(b"GET / HTTP/1.1\r\n")  # and no end
+    except ConnectionError:
+        pass
+    run = client.ask("set", values={"height": 3})["run"]
+    client.until_done(run)
+    assert view.descriptors() <= 40
+    assert request(view, "/page.js")[0] == 200
+    with open_socket(view):  # another page
+        pass
+    # The last ones are closed, too, when they have had their time.
+    assert all(is_closed(raw) for raw in idle)
+    for raw in idle:
+        raw.close()
+    # Pages with a token are limited, too.
+    sockets = [open_socket(view) for _ in range(7)]
+    wait_for(lambda: request(view, "/socket", upgrade(view))[0] == 503)
+    assert view.descriptors() <= 40
+    client.until_done(client.ask("set", values={"height": 4})["run"])
+    for raw in sockets:
+        raw.close()
+    wait_for(lambda: request(view, "/socket", upgrade(view))[0] == 101)
+    client.close()
+    assert view.close() == 130
 
 
 @test
@@ -282,7 +352,7 @@ def requests_nested_without_end_end_nothing(bench):
 
 @test
 def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
-    bench.ready()
+    browser = bench.ready()
     told = bench.path / "told"
     for folder, path in ((bench.path / "programs", str(bench.path / "programs")), (bench.path, ":.")):
         folder.mkdir(exist_ok=True)
@@ -307,16 +377,13 @@ def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
             assert "socket:" not in "".join(files), files
             another = re.fullmatch(rf"http://127\.0\.0\.1:{port}/\?token=(\w+)", address)[1]
             assert another != token
-            for status in (200, 403):
-                connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=PATIENCE)
-                connection.request("GET", f"/?token={another}")
-                answer = connection.getresponse()
-                assert answer.status == status, answer.status
-                connection.close()
-            cookie = {"Cookie": f"rapid_{port}={token}"}
-            connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=PATIENCE)
-            connection.request("GET", f"/?token={another}", headers=cookie)  # the page is loaded again
-            assert connection.getresponse().status == 200
+            browser.open(address)
+            browser.wait("window.rapidView?.state.status?.state === 'done'")
+            # The token of the address is used; the page has got the lasting one, and is loaded again.
+            assert socket_status(int(port), another) == 403
+            browser.open(f"http://127.0.0.1:{port}/")
+            browser.wait("window.rapidView?.state.status?.state === 'done'")
+            assert browser.run("return rapidView.connection.token") == token
         finally:
             view.send_signal(signal.SIGTERM)
             view.wait()
@@ -325,4 +392,9 @@ def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
 def answers(port):
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
     connection.request("GET", "/")
-    return connection.getresponse().status == 403
+    return connection.getresponse().status == 200
+
+
+def socket_status(port, token):
+    view = types.SimpleNamespace(port=port, token=token)
+    return request(view, "/socket", upgrade(view))[0]

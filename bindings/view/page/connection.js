@@ -1,4 +1,7 @@
 // The way to the server: requests, answered in any order.
+//
+// The token of the address is kept for this tab, in a storage that pages of other ports cannot read. Only the socket's
+// subprotocols carry it: a cookie would go to every server of this machine.
 
 const kinds = { u8: Uint8Array, u16: Uint16Array, i16: Int16Array, u32: Uint32Array, f32: Float32Array };
 
@@ -13,9 +16,21 @@ function decode(buffer) {
   return { re: head[0], ...header, arrays, bytes: buffer.byteLength };
 }
 
+function rememberToken(token) {
+  try { sessionStorage.setItem("token", token); } catch { /* a browser that keeps nothing */ }
+  return token;
+}
+
+function findToken() {
+  const given = new URLSearchParams(location.search).get("token");
+  if (given && /^[0-9a-f]+$/.test(given)) return rememberToken(given);
+  try { return sessionStorage.getItem("token") ?? ""; } catch { return ""; }
+}
+
 export class Connection {
   // lost: called when the server is gone, and found when it is there.
   constructor({ lost, found }) {
+    this.token = findToken();
     this.waiting = new Map();
     this.next = 1;
     this.lost = lost;
@@ -23,8 +38,10 @@ export class Connection {
     this.open();
   }
 
+  protocols() { return ["rapid", `rapid.token.${this.token}`]; }
+
   open() {
-    this.socket = new WebSocket(`ws://${location.host}/socket`);
+    this.socket = new WebSocket(`ws://${location.host}/socket`, this.protocols());
     this.socket.binaryType = "arraybuffer";
     let refuse;
     this.ready = new Promise((resolve, reject) => {
@@ -34,6 +51,7 @@ export class Connection {
     this.ready.catch(() => {}); // those that wait are told
     this.socket.onmessage = (event) => {
       const answer = typeof event.data === "string" ? JSON.parse(event.data) : decode(event.data);
+      if (answer.token) this.token = rememberToken(answer.token); // the address had one for the first time only
       const waiting = this.waiting.get(answer.re);
       this.waiting.delete(answer.re);
       if (!waiting) return;

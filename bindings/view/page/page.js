@@ -13,8 +13,6 @@ import { Panels } from "./panels.js";
 import { bindKeys, showKeys } from "./keys.js";
 import { element, by, brief, bytes, colour } from "./dom.js";
 
-history.replaceState(null, "", "/"); // the token is in a cookie by now
-
 const cacheBytes = 300e6, ahead = 4;
 const state = {
   status: null, frame: NaN, run: 0, follow: true, playing: false, output: "", colour: "", group: "", after: "",
@@ -24,9 +22,10 @@ const cache = new Map(); // messages of frames, by what they show
 let cached = 0;
 
 const connection = new Connection({
-  lost() { note("The server has gone; waiting for it."); },
+  lost() { note("The server has gone; waiting for it. Another one has another address, which rapid view prints."); },
   found() { note(""); },
 });
+history.replaceState(null, "", "/"); // the connection has the token
 const ask = (what, given) => connection.ask(what, given);
 
 function note(text) { by("note").textContent = text; }

@@ -10,9 +10,8 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
 #include "runtime/io/text_table.h"
-#include "runtime/memory_budget.h"
 #include "runtime/operators/rasterize.h"
-#include "runtime/picture/surfaces.h"
+#include "runtime/picture/picture_memory.h"
 
 namespace rapid {
 namespace {
@@ -142,17 +141,6 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
     return options;
 }
 
-// Each pattern of pictures keeps what it has drawn of the scene.
-void FrameFiles::require_picture_memory(std::size_t patterns) const
-{
-    constexpr double of_picture = 3, of_file = 6;  // rows, plain and compressed
-    const double bytes_a_pixel = surface_bytes_a_pixel(scene_->may_have_colliders()) + of_picture + of_file;
-    const double bytes = bytes_a_pixel * static_cast<double>(patterns) * picture_->width * picture_->height;
-    if (!fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("pictures of {}x{}", picture_->width, picture_->height), bytes,
-                            "give a smaller --size");
-}
-
 void FrameFiles::check_film(const Format& format, const std::string& pattern) const
 {
     if (FramePattern(pattern).has_frame())
@@ -172,7 +160,10 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
     const auto check = [&](const std::string& pattern) {
         check_part(pattern);
         const Format& format = format_of(pattern);
-        if (format.film || format.extension == ".png") require_picture_memory(++of_pictures);
+        // Each pattern of pictures keeps what it has drawn of the scene.
+        if (format.film || format.extension == ".png")
+            require_picture_memory(picture_->width, picture_->height, scene_->may_have_colliders(),
+                                   static_cast<double>(++of_pictures), "give a smaller --size");
         if (format.film)
             check_film(format, pattern);
         else if (several_frames && !FramePattern(pattern).has_frame())

@@ -106,7 +106,6 @@ private:
     void check_part(const std::string& pattern) const;
     void note_frame(const std::string& pattern, const std::string& output, const FrameInfo& info, std::uint64_t points);
     void write_part_records() const;
-    void require_picture_memory(std::size_t patterns) const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
     std::string how_of(const OutputTarget& to, const FrameSelection& frames) const;

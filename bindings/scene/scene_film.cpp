@@ -12,6 +12,7 @@
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/film.h"
 #include "runtime/io/frame_writer.h"
+#include "runtime/picture/picture_memory.h"
 
 namespace rapid {
 
@@ -52,6 +53,8 @@ Result<SceneFilm> SceneFilm::begin(const std::string& path, const FilmOptions& o
         const FramePattern pattern(path);
         if (pattern.has_frame() || pattern.has_output() || has_part(path))
             refuse(fmt::format("a film is one file; \"{}\" is a pattern of several", path));
+        constexpr bool may_have_colliders = true;
+        require_picture_memory(width, height, may_have_colliders, 1, "give a smaller size");
         require_ffmpeg();
         return SceneFilm(std::make_unique<Impl>(path, options));
     } catch (...) {

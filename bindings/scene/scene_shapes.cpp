@@ -9,6 +9,7 @@
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_impl.h"
 #include "runtime/picture/frame_picture.h"
+#include "runtime/picture/picture_memory.h"
 #include "runtime/picture/png_file.h"
 
 namespace rapid {
@@ -153,6 +154,8 @@ Result<SceneShapes> Scene::shapes(std::int64_t frame)
     return impl_->call(SceneError::FailedFrame, [&] { return impl_->shapes_at(frame); });
 }
 
+constexpr const char* smaller_size = "give a smaller size";
+
 std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size)
 {
     if (camera.fov && !(*camera.fov > 0 && *camera.fov < 180))
@@ -178,6 +181,7 @@ Result<std::string> SceneFrame::picture(const SceneShapes& shapes, const Picture
         FrameInfo info;
         info.picture = picture_options(camera, size);
         info.scene = shapes.data_ ? shapes.data_->scene : nullptr;
+        require_picture_memory(size.width, size.height, info.scene && !info.scene->bodies.empty(), 1, smaller_size);
         return encode_png(picture_of(data_->result.outputs.at(output_), info));
     } catch (...) {
         return caught_error(SceneError::WrongCall);
@@ -195,6 +199,7 @@ Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
         info.fps = frame.fps();
         info.picture = picture_options({}, size);
         info.scene = impl_->shapes_at(frame.number()).data_->scene;
+        require_picture_memory(size.width, size.height, !info.scene->bodies.empty(), 1, smaller_size);
         return encode_png(picture_of(data.result.outputs.at(frame.output_), info));
     });
 }

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "bindings/command/or_throw.h"
+#include "bindings/view/request_fields.h"
 
 namespace rapid {
 namespace {
@@ -20,7 +21,6 @@ constexpr std::size_t most_rows = 500;          // of the spreadsheet, at a time
 constexpr std::size_t most_figures = 500;       // frames, at a time
 constexpr std::size_t most_segments = 480'000;  // of trails
 constexpr std::size_t most_waiting = 1000;      // requests; a page has one
-constexpr int most_depth = 8;                   // of lists in a request: a copy of deeper ones would fill the stack
 
 Json json_of(const SceneValue& value)
 {
@@ -101,34 +101,10 @@ Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size
     return Eigen::Map<const Eigen::Vector3f>(column.at<float>(i));
 }
 
-// width and height, pixels.
-PictureSize size_of(const Json& json)
-{
-    return {std::clamp(json.value("width", 1280), 16, 16384), std::clamp(json.value("height", 720), 16, 16384)};
-}
-
-// camera: position, target, vertical angle in degrees.
-PictureCamera camera_of(const Json& json)
-{
-    const auto camera = json.value("camera", std::vector<double>());
-    if (camera.size() != 7) return {};
-    return {std::array{camera[0], camera[1], camera[2]}, std::array{camera[3], camera[4], camera[5]}, camera[6]};
-}
-
 // The output that a request names; the first one where it names none.
 Result<SceneFrame> chosen_output(const ViewFrame& frame, const Json& json)
 {
     return frame.points.output(json.value("output", frame.points.outputs().front()));
-}
-
-FrameWish wish_of(const Json& json)
-{
-    FrameWish wish;
-    wish.colour = json.value("colour", "");
-    wish.group = json.value("group", "");
-    wish.velocities = json.value("velocities", false);
-    wish.most = json.value("most", wish.most);
-    return wish;
 }
 
 }  // namespace
@@ -155,58 +131,82 @@ ViewRequests::ViewRequests(ViewSimulation& simulation, std::string title,
 {
 }
 
+// A request without a usable number is answered, too: "re" is then null.
 void ViewRequests::handle(const std::string& message, const Answer& answer)
 {
-    const auto is_flat = [](int depth, Json::parse_event_t, Json&) { return depth <= most_depth; };
-    const Json json = Json::parse(message, is_flat, false);  // what is deeper is left out
-    if (!json.is_object() || !json.contains("re") || !json["re"].is_number_unsigned()) return;
-    const Ask ask{json["re"].get<std::uint32_t>(), answer};
     try {
-        const std::string what = json.value("do", "");
-        if (what == "status") {
-            const std::uint64_t since = json.value("since", std::uint64_t{0});
-            const std::uint64_t graph = json.value("graph", std::uint64_t{0});
-            if (simulation_.status().version > since) return tell_status(ask, graph);
-            if (waiting_.size() == most_waiting) waiting_.erase(waiting_.begin());
-            waiting_.push_back({since, graph, ask});
-        } else if (what == "frame") {
-            tell_frame(json, ask);
-        } else if (what == "shapes") {
-            tell_shapes(json, ask);
-        } else if (what == "point") {
-            tell_point(json, ask);
-        } else if (what == "path") {
-            tell_path(json, ask);
-        } else if (what == "trails") {
-            tell_trails(json, ask);
-        } else if (what == "trace") {
-            tell_trace(json, ask);
-        } else if (what == "sheet") {
-            tell_sheet(json, ask);
-        } else if (what == "region") {
-            tell_region(json, ask);
-        } else if (what == "figures") {
-            tell_figures(json, ask);
-        } else if (what == "arguments") {
-            tell_arguments(json, ask);
-        } else if (what == "picture") {
-            tell_picture(json, ask);
-        } else if (what == "film") {
-            begin_film(json, ask);
-        } else if (what == "film_progress") {
-            tell_film(ask);
-        } else if (what == "film_data") {
-            send_film(ask);
-        } else if (what == "film_cancel") {
-            film_.reset();
-            ask.tell(Json::object());
-        } else if (what == "set") {
-            set_parameters(json, ask);
-        } else {
-            ask.fail(fmt::format("there is no request \"{}\"", what));
-        }
+        const Json json = parse_request(message);
+        const Ask ask{json.at("re").get<std::uint32_t>(), answer};
+        guard(ask, [&] { dispatch(json, ask); });
+    } catch (const std::exception& error) {
+        answer(Json({{"re", nullptr}, {"error", error.what()}}).dump(-1, ' ', false, Json::error_handler_t::replace),
+               false);
+    }
+}
+
+template <class F>
+void ViewRequests::guard(const Ask& ask, const F& answer)
+{
+    try {
+        answer();
     } catch (const std::exception& error) {
         ask.fail(error.what());
+    }
+}
+
+template <class F>
+void ViewRequests::answer_later(const Ask& ask, F answer)
+{
+    post_([ask, answer = std::move(answer)] { guard(ask, answer); });
+}
+
+void ViewRequests::dispatch(const Json& json, const Ask& ask)
+{
+    const std::string what = json.value("do", "");
+    if (what == "status") {
+        const std::uint64_t since = json.value("since", std::uint64_t{0});
+        const std::uint64_t graph = json.value("graph", std::uint64_t{0});
+        if (simulation_.status().version > since) return tell_status(ask, graph);
+        if (waiting_.size() == most_waiting) {
+            waiting_.front().ask.fail("too many requests wait for a change");
+            waiting_.erase(waiting_.begin());
+        }
+        waiting_.push_back({since, graph, ask});
+    } else if (what == "frame") {
+        tell_frame(json, ask);
+    } else if (what == "shapes") {
+        tell_shapes(json, ask);
+    } else if (what == "point") {
+        tell_point(json, ask);
+    } else if (what == "path") {
+        tell_path(json, ask);
+    } else if (what == "trails") {
+        tell_trails(json, ask);
+    } else if (what == "trace") {
+        tell_trace(json, ask);
+    } else if (what == "sheet") {
+        tell_sheet(json, ask);
+    } else if (what == "region") {
+        tell_region(json, ask);
+    } else if (what == "figures") {
+        tell_figures(json, ask);
+    } else if (what == "arguments") {
+        tell_arguments(json, ask);
+    } else if (what == "picture") {
+        tell_picture(json, ask);
+    } else if (what == "film") {
+        begin_film(json, ask);
+    } else if (what == "film_progress") {
+        tell_film(ask);
+    } else if (what == "film_data") {
+        send_film(ask);
+    } else if (what == "film_cancel") {
+        film_.reset();
+        ask.tell(Json::object());
+    } else if (what == "set") {
+        set_parameters(json, ask);
+    } else {
+        ask.fail(fmt::format("there is no request \"{}\"", what));
     }
 }
 
@@ -262,34 +262,32 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
     ask.tell(std::move(json));
 }
 
+std::int64_t ViewRequests::computable_frame(const Json& json, const char* name) const
+{
+    const ViewStatus status = simulation_.status();
+    return frame_of(json, name, status.first, status.last);
+}
+
 void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoints& use)
 {
-    const std::int64_t number = json.at("frame").get<std::int64_t>();
     const std::string node = json.value("after", "");
-    const auto guarded = [ask, use](const SceneFrame& points) {
-        try {
-            use(points);
-        } catch (const std::exception& error) {
-            ask.fail(error.what());
-        }
-    };
     if (!node.empty()) {
-        simulation_.inspect(number,
-                            [this, ask, node, guarded](const ViewSimulation::Results& all, const std::string& error) {
-                                post_([=] {
+        simulation_.inspect(computable_frame(json, "frame"),
+                            [=, this](const ViewSimulation::Results& all, const std::string& error) {
+                                answer_later(ask, [=] {
                                     if (!error.empty()) return ask.fail(error);
                                     const auto points = all.find(node);
                                     if (points == all.end()) return ask.fail("the node is not evaluated in this frame");
-                                    guarded(points->second);
+                                    use(points->second);
                                 });
                             });
         return;
     }
-    const ViewFramePtr frame = simulation_.frame(number);
+    const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return ask.fail("the frame is not computed");
     const Result<SceneFrame> points = chosen_output(*frame, json);
     if (!points) return ask.fail("the scene has no such output");
-    guarded(*points);
+    use(*points);
 }
 
 void ViewRequests::tell_frame(const Json& json, const Ask& ask)
@@ -361,8 +359,8 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
 // Where points of a frame were in the frames before, as line segments; of many points every so manieth by id.
 void ViewRequests::tell_trails(const Json& json, const Ask& ask)
 {
-    const std::int64_t last = json.at("frame").get<std::int64_t>();
-    const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", 12), 1, 1000);
+    const std::int64_t last = computable_frame(json, "frame");
+    const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", std::int64_t{12}), 1, 1000);
     FrameWish wish = wish_of(json);
     wish.most = std::min<std::size_t>(20000, most_segments / static_cast<std::size_t>(last - first));
     with_points(json, ask, [=, this](const SceneFrame& now) {
@@ -399,19 +397,18 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
 
 void ViewRequests::tell_trace(const Json& json, const Ask& ask)
 {
-    const auto last = json.at("last").get<std::int64_t>();
-    const std::string output = json.value("output", "main");
-    simulation_.origin(json.at("frame").get<std::int64_t>(), output, json.at("id").get<std::int64_t>(),
-                       [this, ask, last](const PointOrigin& point, const std::string& unknown) {
-                           post_([=, this] {
+    const std::int64_t last = computable_frame(json, "last");
+    const auto tell = [=, this](const std::string& lives, const std::string& error) {
+        answer_later(ask, [=] {
+            if (!error.empty()) return ask.fail(error);
+            ask.tell({{"lives", Json::parse(lives)}});
+        });
+    };
+    simulation_.origin(computable_frame(json, "frame"), json.value("output", "main"), json.at("id").get<std::int64_t>(),
+                       [=, this](const PointOrigin& point, const std::string& unknown) {
+                           answer_later(ask, [=, this] {
                                if (!unknown.empty()) return ask.fail(unknown);
-                               simulation_.trace(point, last,
-                                                 [this, ask](const std::string& lives, const std::string& error) {
-                                                     post_([=] {
-                                                         if (!error.empty()) return ask.fail(error);
-                                                         ask.tell({{"lives", Json::parse(lives)}});
-                                                     });
-                                                 });
+                               simulation_.trace(point, last, tell);
                            });
                        });
 }
@@ -433,8 +430,11 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
                              [&](auto a, auto b) { return down ? id(a) > id(b) : id(a) < id(b); });
         } else {
             const std::vector<float> values = numbers_of(points, sort);
+            const auto is_before = [down](float a, float b) {  // points without a value are last
+                return std::isnan(b) ? !std::isnan(a) : down ? a > b : a < b;
+            };
             std::stable_sort(order.begin(), order.end(),
-                             [&](auto a, auto b) { return down ? values[a] > values[b] : values[a] < values[b]; });
+                             [&](auto a, auto b) { return is_before(values[a], values[b]); });
         }
         const std::size_t from = std::min(json.value("from", std::size_t{0}), order.size());
         const std::size_t to = std::min(order.size(), from + std::min(json.value("count", most_rows), most_rows));
@@ -502,9 +502,9 @@ void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
 
 void ViewRequests::tell_arguments(const Json& json, const Ask& ask)
 {
-    simulation_.arguments(json.at("frame").get<std::int64_t>(),
-                          [this, ask](const ViewSimulation::Arguments& arguments, const std::string& error) {
-                              post_([=] {
+    simulation_.arguments(computable_frame(json, "frame"),
+                          [=, this](const ViewSimulation::Arguments& arguments, const std::string& error) {
+                              answer_later(ask, [=] {
                                   if (!error.empty()) return ask.fail(error);
                                   ask.tell({{"arguments", arguments}});
                               });
@@ -528,8 +528,8 @@ void ViewRequests::begin_film(const Json& json, const Ask& ask)
     const ViewStatus status = simulation_.status();
     ViewFilm::Wish wish;
     wish.extension = json.value("extension", "");
-    wish.first = json.at("first").get<std::int64_t>();
-    wish.last = json.at("last").get<std::int64_t>();
+    wish.first = frame_of(json, "first", status.first, status.last);
+    wish.last = frame_of(json, "last", status.first, status.last);
     wish.output = json.value("output", "main");
     wish.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
     wish.threads = simulation_.options().threads;

@@ -1,0 +1,66 @@
+#include "bindings/view/request_fields.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <vector>
+
+#include "runtime/error.h"
+
+namespace rapid {
+namespace {
+
+constexpr int most_depth = 8;  // of lists: a copy of deeper ones would fill the stack
+constexpr int least_edge = 16, most_edge = 16384;
+
+int edge_of(const CheckedJson& request, const char* name, int usual)
+{
+    const int edge = request.value(name, usual);
+    if (edge < least_edge || edge > most_edge)
+        throw Error(fmt::format("{} = {}; it must be from {} to {} pixels", name, edge, least_edge, most_edge));
+    return edge;
+}
+
+}  // namespace
+
+CheckedJson parse_request(const std::string& message)
+{
+    const auto is_shallow = [](int depth, CheckedJson::parse_event_t, CheckedJson&) { return depth <= most_depth; };
+    CheckedJson request = CheckedJson::parse(message, is_shallow, false);
+    if (!request.is_object()) throw Error("a request must be an object in JSON");
+    return request;
+}
+
+std::int64_t frame_of(const CheckedJson& request, const char* name, std::int64_t first, std::int64_t last)
+{
+    const auto frame = request.at(name).get<std::int64_t>();
+    if (frame < first || frame > last)
+        throw Error(fmt::format("{} = {}; it must be a frame from {} to {}", name, frame, first, last));
+    return frame;
+}
+
+PictureSize size_of(const CheckedJson& request)
+{
+    return {edge_of(request, "width", 1280), edge_of(request, "height", 720)};
+}
+
+PictureCamera camera_of(const CheckedJson& request)
+{
+    if (!request.contains("camera")) return {};
+    const auto camera = request["camera"].get<std::vector<double>>();
+    if (camera.size() != 7)
+        throw Error(fmt::format("camera has {} numbers; it must have 7: position, target, angle", camera.size()));
+    return {std::array{camera[0], camera[1], camera[2]}, std::array{camera[3], camera[4], camera[5]}, camera[6]};
+}
+
+FrameWish wish_of(const CheckedJson& request)
+{
+    FrameWish wish;
+    wish.colour = request.value("colour", "");
+    wish.group = request.value("group", "");
+    wish.velocities = request.value("velocities", false);
+    wish.most = request.value("most", wish.most);
+    return wish;
+}
+
+}  // namespace rapid

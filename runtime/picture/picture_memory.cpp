@@ -1,0 +1,17 @@
+#include "runtime/picture/picture_memory.h"
+
+#include <fmt/format.h>
+
+#include "runtime/memory_budget.h"
+#include "runtime/picture/surfaces.h"
+
+namespace rapid {
+
+void require_picture_memory(int width, int height, bool colliders, double count, const char* remedy)
+{
+    constexpr double of_picture = 3, of_file = 6;  // bytes a pixel: rows, plain and compressed
+    const double bytes = (surface_bytes_a_pixel(colliders) + of_picture + of_file) * count * width * height;
+    if (!fits_in_memory(bytes)) throw beyond_memory(fmt::format("pictures of {}x{}", width, height), bytes, remedy);
+}
+
+}  // namespace rapid

@@ -111,6 +111,7 @@ std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
             add_look(*scene, picture, now, simulation.fps);
             emitters = emitters && picture.emitters;
             colliders = colliders && picture.colliders;
+            scene->grid = scene->grid && picture.grid;
             moves = moves || picture.camera.keys.size() > 1 || has_functions(*planned.node);
             continue;
         }

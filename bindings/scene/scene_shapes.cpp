@@ -71,7 +71,7 @@ struct KeptScene {
         }
         for (PictureScene::Plane& plane : rest.planes) keep(plane.normal, plane.offset);
         for (PointStyle& style : rest.styles) keep(style.group, style.additive, style.shutter);
-        keep(rest.camera.position, rest.camera.target, rest.camera.fov, rest.camera.group);
+        keep(rest.camera.position, rest.camera.target, rest.camera.fov, rest.camera.group, rest.grid);
     }
 
 private:

@@ -81,7 +81,9 @@ NodeType PictureNode::declare()
         .param(&PictureNode::camera, "camera", Value(), any_number(), "",
                "rapid.camera, a function of the frame that returns one, or keys; without it, fitted to the scene")
         .param(&PictureNode::emitters, "emitters", true, any_number(), "", "whether shapes that bear points are shown")
-        .param(&PictureNode::colliders, "colliders", true, any_number(), "", "whether colliders and planes are shown");
+        .param(&PictureNode::colliders, "colliders", true, any_number(), "", "whether colliders and planes are shown")
+        .param(&PictureNode::grid, "grid", true, any_number(), "",
+               "whether lines are drawn on the ground, unless a plane is the ground");
 }
 
 RAPID_NODE(PictureNode);

@@ -39,7 +39,7 @@ void read_value(const Param& param, const Value& value, CameraTrack& field);
 struct PictureNode {
     std::string blend, group;
     double shutter;
-    bool emitters, colliders;
+    bool emitters, colliders, grid;
     CameraTrack camera;
 
     static NodeType declare();

@@ -15,8 +15,9 @@ Ground::Ground(const PictureScene::Plane& plane, const PictureView& view, bool i
     : normal(plane.normal.normalized().cast<float>()),
       offset(static_cast<float>(plane.offset / plane.normal.norm())),
       spacing(static_cast<float>(view.line_spacing)),
-      center(view.bounds.center().cast<float>()),
-      extent(static_cast<float>(1.2 * std::max(1e-6, view.bounds.diagonal().norm()))),
+      scene_center(view.bounds.center().cast<float>()),
+      center(view.ground.value_or(view.bounds).center().cast<float>()),
+      extent(static_cast<float>(1.2 * std::max(1e-6, view.ground.value_or(view.bounds).diagonal().norm()))),
       solid(is_solid)
 {
     u = std::abs(normal.y()) > 0.99f ? Vec3f::UnitX().eval() : any_tangent(normal);

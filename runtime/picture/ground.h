@@ -19,8 +19,9 @@ struct Ground {
     Vec3f normal, u, v;
     float offset;
     float spacing;  // m
-    Vec3f center;
-    float extent;  // m, where lines have faded to 1/e
+    Vec3f scene_center;
+    Vec3f center;  // of the part that is seen
+    float extent;  // m from there, where lines have faded to 1/e
     bool solid;
 
     Ground(const PictureScene::Plane& plane, const PictureView& view, bool is_solid);
@@ -34,7 +35,10 @@ struct Ground {
     }
 
     // Whether it is a wall between the eye and the scene, seen from behind: then it is transparent.
-    bool stands_before(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(center) >= offset; }
+    bool stands_before(const Vec3f& eye) const
+    {
+        return normal.dot(eye) < offset && normal.dot(scene_center) >= offset;
+    }
 
     // At P, at depth t on the ray, over the colour `behind` it.
     ShadedSample shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,

@@ -151,6 +151,14 @@ Camera fitted(const Box3d& bounds, const PictureOptions& options, const SceneCam
     return camera;
 }
 
+// The cube at the target that fills the picture's height, or one that reaches down to the ground if that is farther.
+Box3d seen_by(const Camera& camera)
+{
+    const double distance = std::max((camera.target - camera.position).norm(), std::abs(camera.position.y()));
+    const Vec3d half = Vec3d::Constant(distance * std::tan(0.5 * camera.fov));
+    return Box3d(camera.target - half, camera.target + half);
+}
+
 // Whether there is one, which a snapshot may say otherwise.
 bool is_view(const std::optional<PictureView>& view)
 {
@@ -207,7 +215,6 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     if (first) {
         view_.emplace();
         view_->bounds = goal_ = all;
-        view_->line_spacing = spacing_of_lines(all);
     } else if (!group.empty()) {
         // Its middle is followed at once, its size as a camera zooms.
         view_->bounds.translate(all.center() - goal_.center());
@@ -219,6 +226,9 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
         approach(1 - std::exp(-passed / glide));
     }
     view_->camera = fitted(view_->bounds, options, scene.camera);
+    view_->ground.reset();
+    if (options.position || scene.camera.position) view_->ground = seen_by(view_->camera);
+    if (first) view_->line_spacing = spacing_of_lines(view_->ground.value_or(all));
 
     const double fall = std::sqrt(gravity * view_->bounds.diagonal().norm());
     view_->full_speed = std::max({first ? 0.0 : view_->full_speed, fast_speed(points), 0.7 * fall, 1e-6});

@@ -2,7 +2,8 @@
 //
 // The later frames are unknown when the first is drawn, and a camera that jumps or drifts makes a sequence useless. So
 // the first frame with points is framed with room for where they go, and the camera holds still until something leaves
-// its view; then it glides back far enough to hold still again. The lines on the ground keep the first frame's scale.
+// its view; then it glides back far enough to hold still again. The lines on the ground keep the first frame's scale;
+// under a camera that is given, the ground does not depend on the points.
 #pragma once
 
 #include <cstddef>

@@ -47,6 +47,7 @@ struct PictureScene {
     std::vector<Plane> planes;
     std::vector<PointStyle> styles;  // of two that a point has, the later one counts
     SceneCamera camera;
+    bool grid = true;  // lines on the ground, unless a plane is the ground
 };
 
 struct Camera {
@@ -64,6 +65,9 @@ struct PictureView {
     double full_speed = 1;    // m/s, the upper end of the colour ramp
     double least_radius = 1;  // pixels
     Box3d bounds;             // what the camera is fitted to, m
+    // The part of the world that a given camera looks at, m. The ground is drawn there, wherever points go. Without it,
+    // the ground is drawn at the bounds.
+    std::optional<Box3d> ground = {};
     double line_spacing = 1;  // m, of the lines on the ground
 };
 

@@ -110,7 +110,8 @@ public:
             const Ground ground(plane, view, true);
             if (!ground.stands_before(lens_.origin)) grounds_.push_back(ground);
         }
-        if (scene.planes.empty() && options.grid) grounds_.emplace_back(PictureScene::Plane(), view, false);
+        if (scene.planes.empty() && options.grid && scene.grid)
+            grounds_.emplace_back(PictureScene::Plane(), view, false);
     }
 
     SurfaceTile draw(int tile) const { return has_body(tile) ? draw_bodies(tile) : draw_open(tile); }

@@ -101,6 +101,13 @@ Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size
     return Eigen::Map<const Eigen::Vector3f>(column.at<float>(i));
 }
 
+// A frame of the request that the run may compute.
+std::int64_t computable_frame(const ViewSimulation& simulation, const Json& json, const char* name)
+{
+    const ViewStatus status = simulation.status();
+    return frame_of(json, name, status.first, status.last);
+}
+
 // The output that a request names; the first one where it names none.
 Result<SceneFrame> chosen_output(const ViewFrame& frame, const Json& json)
 {
@@ -137,7 +144,7 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
     try {
         const Json json = parse_request(message);
         const Ask ask{json.at("re").get<std::uint32_t>(), answer};
-        guard(ask, [&] { dispatch(json, ask); });
+        ask.guard([&] { dispatch(json, ask); });
     } catch (const std::exception& error) {
         answer(Json({{"re", nullptr}, {"error", error.what()}}).dump(-1, ' ', false, Json::error_handler_t::replace),
                false);
@@ -145,19 +152,19 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
 }
 
 template <class F>
-void ViewRequests::guard(const Ask& ask, const F& answer)
+void ViewRequests::Ask::guard(const F& answer_it) const
 {
     try {
-        answer();
+        answer_it();
     } catch (const std::exception& error) {
-        ask.fail(error.what());
+        fail(error.what());
     }
 }
 
 template <class F>
 void ViewRequests::answer_later(const Ask& ask, F answer)
 {
-    post_([ask, answer = std::move(answer)] { guard(ask, answer); });
+    post_([ask, answer = std::move(answer)] { ask.guard(answer); });
 }
 
 void ViewRequests::dispatch(const Json& json, const Ask& ask)
@@ -262,17 +269,11 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
     ask.tell(std::move(json));
 }
 
-std::int64_t ViewRequests::computable_frame(const Json& json, const char* name) const
-{
-    const ViewStatus status = simulation_.status();
-    return frame_of(json, name, status.first, status.last);
-}
-
 void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoints& use)
 {
     const std::string node = json.value("after", "");
     if (!node.empty()) {
-        simulation_.inspect(computable_frame(json, "frame"),
+        simulation_.inspect(computable_frame(simulation_, json, "frame"),
                             [=, this](const ViewSimulation::Results& all, const std::string& error) {
                                 answer_later(ask, [=] {
                                     if (!error.empty()) return ask.fail(error);
@@ -359,7 +360,7 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
 // Where points of a frame were in the frames before, as line segments; of many points every so manieth by id.
 void ViewRequests::tell_trails(const Json& json, const Ask& ask)
 {
-    const std::int64_t last = computable_frame(json, "frame");
+    const std::int64_t last = computable_frame(simulation_, json, "frame");
     const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", std::int64_t{12}), 1, 1000);
     FrameWish wish = wish_of(json);
     wish.most = std::min<std::size_t>(20000, most_segments / static_cast<std::size_t>(last - first));
@@ -397,14 +398,15 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
 
 void ViewRequests::tell_trace(const Json& json, const Ask& ask)
 {
-    const std::int64_t last = computable_frame(json, "last");
+    const std::int64_t last = computable_frame(simulation_, json, "last");
     const auto tell = [=, this](const std::string& lives, const std::string& error) {
         answer_later(ask, [=] {
             if (!error.empty()) return ask.fail(error);
             ask.tell({{"lives", Json::parse(lives)}});
         });
     };
-    simulation_.origin(computable_frame(json, "frame"), json.value("output", "main"), json.at("id").get<std::int64_t>(),
+    simulation_.origin(computable_frame(simulation_, json, "frame"), json.value("output", "main"),
+                       json.at("id").get<std::int64_t>(),
                        [=, this](const PointOrigin& point, const std::string& unknown) {
                            answer_later(ask, [=, this] {
                                if (!unknown.empty()) return ask.fail(unknown);
@@ -502,7 +504,7 @@ void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
 
 void ViewRequests::tell_arguments(const Json& json, const Ask& ask)
 {
-    simulation_.arguments(computable_frame(json, "frame"),
+    simulation_.arguments(computable_frame(simulation_, json, "frame"),
                           [=, this](const ViewSimulation::Arguments& arguments, const std::string& error) {
                               answer_later(ask, [=] {
                                   if (!error.empty()) return ask.fail(error);
@@ -528,8 +530,8 @@ void ViewRequests::begin_film(const Json& json, const Ask& ask)
     const ViewStatus status = simulation_.status();
     ViewFilm::Wish wish;
     wish.extension = json.value("extension", "");
-    wish.first = frame_of(json, "first", status.first, status.last);
-    wish.last = frame_of(json, "last", status.first, status.last);
+    wish.first = computable_frame(simulation_, json, "first");
+    wish.last = computable_frame(simulation_, json, "last");
     wish.output = json.value("output", "main");
     wish.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
     wish.threads = simulation_.options().threads;

@@ -36,20 +36,18 @@ private:
         void tell(Json json) const;
         void send(const std::string& data) const;  // a file
         void fail(const std::string& why) const;
+        // Calls answer_it(); an exception of it is the answer.
+        template <class F>
+        void guard(const F& answer_it) const;
     };
     // Points that requests name: of an output of a frame, or after a node.
     using WithPoints = std::function<void(const SceneFrame& points)>;
 
     // Answers a request whose number is known.
     void dispatch(const Json& json, const Ask& ask);
-    // Calls answer(); an exception of it is the answer.
-    template <class F>
-    static void guard(const Ask& ask, const F& answer);
-    // Likewise from the server's handler, for functions that other threads call.
+    // Calls answer() from the server's handler, for functions that other threads call.
     template <class F>
     void answer_later(const Ask& ask, F answer);
-    // A frame of the request that the run may compute.
-    std::int64_t computable_frame(const Json& json, const char* name) const;
     void with_points(const Json& json, const Ask& ask, const WithPoints& use);
 
     // graph: the number of the picture of the graph that the page has; of another one it is told.

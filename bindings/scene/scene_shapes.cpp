@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_impl.h"
 #include "runtime/picture/frame_picture.h"
+#include "runtime/picture/picture_fit.h"
 #include "runtime/picture/picture_memory.h"
 #include "runtime/picture/png_file.h"
 
@@ -173,6 +176,27 @@ std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camer
     if (camera.target) options->target = Vec3d(camera.target->data());
     if (camera.fov) options->fov = *camera.fov * M_PI / 180;
     return options;
+}
+
+bool SceneShapes::has_camera() const
+{
+    if (!data_) return false;
+    const SceneCamera& camera = data_->scene->camera;
+    return camera.position || camera.target || camera.fov || !camera.group.empty();
+}
+
+Result<PictureCamera> SceneFrame::camera(const SceneShapes& shapes, const PictureCamera& camera, PictureSize size) const
+{
+    try {
+        FrameInfo info;
+        info.picture = picture_options(camera, size);
+        info.scene = shapes.data_ ? shapes.data_->scene : nullptr;
+        const Camera fitted = PictureFit().next(data_->result.outputs.at(output_), info).camera;
+        const auto numbers = [](const Vec3d& x) { return std::array{x.x(), x.y(), x.z()}; };
+        return PictureCamera{numbers(fitted.position), numbers(fitted.target), fitted.fov * 180 / M_PI};
+    } catch (...) {
+        return caught_error(SceneError::WrongCall);
+    }
 }
 
 Result<std::string> SceneFrame::picture(const SceneShapes& shapes, const PictureCamera& camera, PictureSize size) const

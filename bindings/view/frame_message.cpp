@@ -13,6 +13,7 @@
 
 #include "bindings/command/or_throw.h"
 #include "runtime/error.h"
+#include "runtime/picture/tone.h"
 
 namespace rapid {
 namespace {
@@ -191,6 +192,28 @@ void add_values(Message& message, const char* name, std::vector<float> values, b
     });
 }
 
+// Linear light as pictures encode it (runtime/picture/tone.h): bytes at even steps of its root, finer than a byte.
+class DisplayBytes {
+public:
+    DisplayBytes()
+    {
+        for (std::size_t i = 0; i < bytes_.size(); ++i) {
+            const float root = static_cast<float>(i) / steps_a_unit;
+            bytes_[i] = display_byte(root * root);
+        }
+    }
+    std::uint8_t operator()(float light) const
+    {
+        const float bounded = light > 0 ? std::min(light, most) : 0;  // not a number: 0
+        return bytes_[static_cast<std::size_t>(static_cast<std::int32_t>(steps_a_unit * std::sqrt(bounded) + 0.5f))];
+    }
+
+private:
+    static constexpr int steps_a_unit = 8192;
+    static constexpr float most = 4;  // its root is 2
+    std::array<std::uint8_t, 2 * steps_a_unit + 1> bytes_;
+};
+
 void add_colours(Message& message, const SceneFrame& points, const FrameWish& wish, const Places* places)
 {
     const std::optional<SceneColumn> Cd = find_column(points, "Cd", ColumnType::Vec3);
@@ -200,11 +223,8 @@ void add_colours(Message& message, const SceneFrame& points, const FrameWish& wi
         message.add<std::uint8_t>("colour", "u8", 3 * from.size(), [from](std::span<std::uint8_t> to) {
             const float* const values = from[0];
             const std::size_t same = from.is_one() ? 3 : to.size();  // values that are not repeated
-            // Over single numbers, without branches: the loop is vectorised.
-            for (std::size_t j = 0; j < std::min(same, to.size()); ++j) {
-                const float bounded = values[j] > 0 ? std::min(values[j], 1.0f) : 0;  // not a number: 0
-                to[j] = static_cast<std::uint8_t>(static_cast<std::int32_t>(255 * bounded + 0.5f));
-            }
+            static const DisplayBytes display;
+            for (std::size_t j = 0; j < std::min(same, to.size()); ++j) to[j] = display(values[j]);
             for (std::size_t j = same; j < to.size(); ++j) to[j] = to[j - 3];
         });
         return;
@@ -331,9 +351,9 @@ std::string trails_message(std::uint32_t request, const std::vector<float>& ends
 }
 
 std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
-                           const std::vector<std::uint64_t>& numbers)
+                           const std::vector<std::uint64_t>& numbers, const std::string& head)
 {
-    Message message(ordered_json::object());
+    Message message(ordered_json::parse(head));
     ordered_json bodies = ordered_json::array(), planes = ordered_json::array();
     for (const ShapePlane& plane : shapes.planes())
         planes.push_back({{"normal", plane.normal}, {"offset", plane.offset}});

@@ -37,9 +37,9 @@ ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish);
 std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish,
                           const std::string& head);
 
-// The shapes of a frame: planes, and meshes by their numbers, without those that the page has.
+// The shapes of a frame: planes, and meshes by their numbers, without those that the page has. head: as above.
 std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
-                           const std::vector<std::uint64_t>& numbers);
+                           const std::vector<std::uint64_t>& numbers, const std::string& head);
 
 // Ends of line segments, x y z and how old they are, from 0 to 1; every: as of ShownPoints.
 std::string trails_message(std::uint32_t request, const std::vector<float>& ends, std::uint64_t every);

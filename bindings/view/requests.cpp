@@ -114,6 +114,16 @@ Result<SceneFrame> chosen_output(const ViewFrame& frame, const Json& json)
     return frame.points.output(json.value("output", frame.points.outputs().front()));
 }
 
+// As the page gives one: position, target, angle in degrees. Null if the scene has none.
+Json camera_of_scene(const ViewFrame& frame, const Json& json)
+{
+    const Result<SceneFrame> points = chosen_output(frame, json);
+    if (!frame.shapes.has_camera() || !points) return nullptr;
+    const PictureCamera camera = or_throw(points->camera(frame.shapes, {}, size_of(json)));
+    const auto &from = *camera.position, &to = *camera.target;
+    return {from[0], from[1], from[2], to[0], to[1], to[2], *camera.fov};
+}
+
 }  // namespace
 
 void ViewRequests::Ask::tell(Json json) const
@@ -318,7 +328,8 @@ void ViewRequests::tell_shapes(const Json& json, const Ask& ask)
     std::vector<std::uint64_t> numbers;
     for (const ShapeMesh& mesh : frame->shapes.meshes()) numbers.push_back(number_of(mesh));
     const auto known = json.value("known", std::vector<std::uint64_t>());
-    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers), true);
+    const Json head = {{"camera", camera_of_scene(*frame, json)}};
+    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers, head.dump()), true);
 }
 
 void ViewRequests::tell_point(const Json& json, const Ask& ask)

@@ -253,6 +253,9 @@ public:
     // size or an angle of view that no picture has.
     Result<std::string> picture(const SceneShapes& shapes, const PictureCamera& camera = {},
                                 PictureSize size = {}) const;
+    // The camera of this picture, with all that `camera` leaves open. Error: as picture().
+    Result<PictureCamera> camera(const SceneShapes& shapes, const PictureCamera& camera = {},
+                                 PictureSize size = {}) const;
 
     // How many points there are, their bounds, the range of each attribute, the groups: as `rapid info` prints it.
     Result<SceneReport> describe() const;

@@ -51,6 +51,8 @@ public:
     // In the order of the nodes; infinite shapes other than planes are in neither.
     std::vector<ShapeMesh> meshes() const;
     std::vector<ShapePlane> planes() const;
+    // Whether the scene says from where its pictures are seen; SceneFrame::camera() has the camera.
+    bool has_camera() const;
     // What was warned of when they were made, such as a mesh with holes.
     std::vector<std::string> warnings() const;
 

@@ -20,14 +20,14 @@ float tone(float light) { return light < 0.8f ? light : 1 - 0.2f * std::exp(-(li
 // 255 srgb(tone(t²)) at even steps of t up to 2, where it is 255 to rounding. Between them it is interpolated, which is
 // off by less than a fiftieth of a step of the dither.
 constexpr int steps = 4096;
-constexpr float most = 2;
+constexpr float most_root = 2;
 
 const std::vector<float>& curve()
 {
     static const std::vector<float> values = [] {
         std::vector<float> table(steps + 2);
         for (int i = 0; i < steps + 2; ++i) {
-            const float t = most * static_cast<float>(i) / steps;
+            const float t = most_root * static_cast<float>(i) / steps;
             table[static_cast<std::size_t>(i)] = 255 * srgb(tone(t * t));
         }
         return table;
@@ -67,7 +67,8 @@ void write_block(const float* light, const DitherRow& dither, const float* table
         Floats root, low, high;
         for (std::uint32_t l = 0; l < lanes; ++l) root[l] = std::sqrt(given[l]);
         // Written so that NaN becomes 0.
-        const Floats at = (given > 0 ? (root > most ? Floats{} + most : root) : Floats{}) * (steps / most);
+        const Floats at =
+            (given > 0 ? (root > most_root ? Floats{} + most_root : root) : Floats{}) * (steps / most_root);
         const FloatFlags step = __builtin_convertvector(at, FloatFlags);
         for (std::uint32_t l = 0; l < lanes; ++l) low[l] = table[step[l]], high[l] = table[step[l] + 1];
         const Floats wanted = low + (at - __builtin_convertvector(step, Floats)) * (high - low);
@@ -79,6 +80,14 @@ void write_block(const float* light, const DitherRow& dither, const float* table
 }
 
 }  // namespace
+
+std::uint8_t display_byte(float light)
+{
+    const float at = (light > 0 ? std::min(std::sqrt(light), most_root) : 0.0f) * (steps / most_root);
+    const auto step = static_cast<std::size_t>(at);
+    const float low = curve()[step], high = curve()[step + 1];
+    return static_cast<std::uint8_t>(low + (at - static_cast<float>(step)) * (high - low) + 0.5f);
+}
 
 void write_pixels(std::span<const Vec3f> light, int x, int y, std::uint8_t* rgb)
 {

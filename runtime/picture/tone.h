@@ -12,4 +12,7 @@ namespace rapid {
 // Light up to 0.8 keeps its value; brighter light is compressed below 1 instead of being cut off. NaN is black.
 void write_pixels(std::span<const Vec3f> light, int x, int y, std::uint8_t* rgb);
 
+// The byte of one channel, without the dither.
+std::uint8_t display_byte(float light);
+
 }  // namespace rapid

@@ -40,6 +40,17 @@ TEST_CASE("a light up to 0.8 is in the mean its value in sRGB, to a step of the 
     });
 }
 
+TEST_CASE("the byte of a light up to 0.8 without the dither is the nearest to sRGB", "[picture][tone]")
+{
+    rc::prop("", [] {
+        const auto light = static_cast<float>(*rc::gen::inRange(0, 800'001)) * 1e-6f;
+        RC_ASSERT(std::abs(display_byte(light) - 255 * srgb(light)) <= 0.5 + 0.6 / 64);
+    });
+    CHECK(display_byte(-1) == 0);
+    CHECK(display_byte(std::numeric_limits<float>::quiet_NaN()) == 0);
+    CHECK(display_byte(std::numeric_limits<float>::infinity()) == 255);
+}
+
 TEST_CASE("brighter light is compressed, and what is no light is black", "[picture][tone]")
 {
     CHECK(mean_of(0.8f) < mean_of(0.9f));

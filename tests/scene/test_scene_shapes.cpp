@@ -165,4 +165,29 @@ TEST_CASE("a picture needs no scene, and is seen from where the program says", "
     }
 }
 
+TEST_CASE("a frame has the camera of its picture: the scene's, the program's, or a fitted one", "[shapes]")
+{
+    const std::string points = "return rapid.create { points = rapid.points.from { P = {{1, 2, 3}} } } :solve {}";
+    Scene plain = opened(points);
+    const SceneFrame alone = good(plain.advance());
+    CHECK_FALSE(good(plain.shapes(1)).has_camera());
+    const PictureCamera fitted = good(alone.camera(good(plain.shapes(1))));
+    CHECK(std::hypot((*fitted.target)[0] - 1, (*fitted.target)[1] - 2, (*fitted.target)[2] - 3) < 1e-6);
+    CHECK((*fitted.position)[1] > 2);  // from above
+
+    Scene scene = opened(points + ":picture { camera = rapid.camera { position = {0, 8, 1}, target = {0, 1, 0} } }");
+    const SceneFrame frame = good(scene.advance());
+    const SceneShapes shapes = good(scene.shapes(1));
+    CHECK(shapes.has_camera());
+    const PictureCamera of_scene = good(frame.camera(shapes));
+    CHECK(*of_scene.position == std::array{0.0, 8.0, 1.0});
+    CHECK(*of_scene.target == std::array{0.0, 1.0, 0.0});
+    CHECK(std::abs(*of_scene.fov - 35) < 0.1);
+    PictureCamera other;
+    other.position = {3, 3, 3};
+    CHECK(*good(frame.camera(shapes, other)).position == *other.position);
+    other.fov = 180;
+    CHECK_FALSE(frame.camera(shapes, other));
+}
+
 }  // namespace rapid

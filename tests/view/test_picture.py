@@ -359,13 +359,14 @@ def panels_are_moved_and_kept(bench):
 
 @test
 def colours_are_those_of_the_points_within_what_a_screen_shows(bench):
+    # As pictures encode linear light: sRGB up to 0.8, compressed above.
     points = "{ P = {{0, 0, 0}, {1, 0, 0}}, Cd = %s }"
-    for Cd, expected in (("{{-0.5, 0.25, 7}, {1, 0, 0.5}}", [0, 64, 255, 255, 0, 128]),
-                         ("{{0.2, 0.4, 3}, {0.2, 0.4, 3}}", [51, 102, 255] * 2)):
+    for Cd, expected in (("{{-0.5, 0.25, 7}, {1, 0, 0.5}}", [0, 137, 255, 247, 0, 188]),
+                         ("{{0.2, 0.4, 3}, {0.2, 0.4, 3}}", [124, 170, 255] * 2)):
         browser = bench.ready(f"""local rapid = require "rapid"
 return rapid.create {{ points = rapid.points.from {points % Cd} }} :solve {{}}""", "-f", "1-2")
         assert browser.promise("rapidView.ask('frame', {frame: 2}).then((m) => [...m.arrays.colour])") == expected
     browser = bench.ready("""local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} } } :attribute { Cd = {0.2, 0.4, 3} } :solve {}""",
                           "-f", "1-2")
-    assert browser.promise("rapidView.ask('frame', {frame: 2}).then((m) => [...m.arrays.colour])") == [51, 102, 255] * 2
+    assert browser.promise("rapidView.ask('frame', {frame: 2}).then((m) => [...m.arrays.colour])") == [124, 170, 255] * 2

@@ -8,6 +8,7 @@ import { Inspector } from "./point.js";
 import { Figures } from "./figures.js";
 import { Sheet } from "./sheet.js";
 import { Out } from "./out.js";
+import { Rendered } from "./rendered.js";
 import { ramp } from "./ramp.js";
 import { Panels } from "./panels.js";
 import { bindKeys, showKeys } from "./keys.js";
@@ -49,7 +50,7 @@ by("side").append(parameterPart);
 const parameters = new Parameters(parameterPart, { change: (values) => ask("set", { values }).catch(tell), copy });
 const out = new Out(by("side"), {
   ask, tell: flash, close: () => openOut(false),
-  shown: () => ({ ...shown(), camera: picture.cameraText().split(",").map(Number) }),
+  shown: () => ({ ...shown(), camera: cameraNumbers() }),
   size: () => [by("canvas").width, by("canvas").height],
   title: () => state.status.title.replace(/^.*\//, "").replace(/\.\w+$/, "").replace(/[#.]+$/, ""),
 });
@@ -62,6 +63,17 @@ const inspector = new Inspector(by("side"), {
     else inspector.hide(what);
   },
 });
+
+// Marks of the page alone would be covered, and so would colours and groups that are chosen.
+const rendered = new Rendered(by("rendered"), {
+  ask: (wish) => ask("picture", wish), tell,
+  wish() {
+    const { width, height } = by("canvas"), isMarked = state.point !== null || state.trails || state.colour || state.group;
+    if (state.style !== "picture" || isMarked || state.playing || !isThere(state.frame)) return null;
+    return Math.min(width, height) < 16 ? null : { ...shown(), camera: cameraNumbers(), width, height };
+  },
+});
+picture.onchange = () => rendered.change();
 
 const panels = new Panels(by("work"), by("side"), by("dock"));
 const tabs = {};
@@ -104,7 +116,7 @@ const bar = {
   colour: element("select", { id: "colour", title: "colour by an attribute (C)", onchange: () => { state.colour = bar.colour.value; change(); } }),
   group: element("select", { id: "group", title: "only the points of a group", onchange: () => { state.group = bar.group.value; change(); } }),
   style: element("select", { id: "style", title: "how points look (D)", onchange: () => { state.style = bar.style.value; change(); } },
-    ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"]])),
+    ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"], ["picture", "in pictures"]])),
   shapes: element("button", { id: "shapes", title: "colliders and emitters (S)", "aria-pressed": true, onclick: () => toggle("shapes") }, "shapes"),
   ground: element("button", { id: "ground", title: "grid and axes (G)", "aria-pressed": true, onclick: () => toggle("ground") }, "grid"),
   trails: element("select", { id: "trails", title: "where points were in the frames before (T)", onchange: () => { state.trails = Number(bar.trails.value); showTrails(); } },
@@ -146,6 +158,8 @@ function tell(error) { flash(error.message ?? String(error)); }
 
 // ---- frames ----
 
+// Of the page; none while it looks through the scene's, which the server knows.
+const cameraNumbers = () => (picture.isSceneCamera ? undefined : picture.cameraText().split(",").map(Number));
 const shown = () => ({ frame: state.frame, output: state.output || undefined, group: state.group, after: state.after });
 const wishes = (frame) => ({ frame, output: state.output || undefined, colour: state.colour, group: state.group, velocities: state.style === "streaks", after: state.after });
 const isReady = (frame) => state.status.ready.some(([a, b]) => frame >= a && frame <= b);
@@ -191,7 +205,7 @@ async function show(frame, fresh = false) {
     return;
   }
   if (serial !== wanted) return;
-  picture.style = state.style;
+  picture.style = state.style === "picture" ? "discs" : state.style;
   picture.shutter = 0.5 / state.status.fps;
   picture.show(message);
   state.shownRun = message.run;
@@ -202,10 +216,17 @@ async function show(frame, fresh = false) {
   document.body.dataset.shown = message.shown;
   showLegend(message);
   note(`${brief(message.total)} points${message.shown < message.total ? `, ${brief(message.shown)} shown${message.every > 1 ? ` (ids that are multiples of ${message.every})` : ""}` : ""}${state.after ? ` after ${state.after}` : ""}`);
-  ask("shapes", { frame, known: picture.knownMeshes() }).then((shapes) => {
+  ask("shapes", { ...shown(), known: picture.knownMeshes(), ...picture.size() }).then((shapes) => {
     if (serial !== wanted) return;
     picture.showShapes(shapes);
-    if (!state.fitted && (message.shown > 0 || shapes.bodies.length)) { state.fitted = message.shown > 0; picture.fit(); }
+    picture.sceneCamera = shapes.camera ?? null;
+    if (!state.fitted && (message.shown > 0 || shapes.bodies.length)) {
+      state.fitted = message.shown > 0;
+      if (shapes.camera) picture.followScene();
+      else picture.fit();
+    } else if (picture.isSceneCamera) {
+      picture.followScene();
+    }
   }, () => {});
   if (first || fresh || !state.playing) refreshDetails();
   drawFigures();
@@ -418,6 +439,7 @@ function openCamera() {
   field.addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); use(); } });
   dialog.replaceChildren(element("h2", {}, "Camera"), field, element("p", { class: "quiet" }, "Position x,y,z, target x,y,z and the vertical angle, as --camera of pictures takes them."),
     element("div", { class: "fields" }, element("button", { id: "camera-use", title: "look from there (Enter)", onclick: use }, "look from there"),
+      element("button", { id: "camera-scene", title: "look through the scene's camera (0)", disabled: !picture.sceneCamera, onclick: () => { picture.followScene(); dialog.close(); } }, "the scene's"),
       element("button", { id: "camera-copy", title: "for rapid run", onclick: () => { copy(`--camera=${field.value}`); dialog.close(); } }, "copy --camera"),
       element("button", { title: "close (Esc)", onclick: () => dialog.close() }, "close"), say));
   dialog.showModal();
@@ -553,7 +575,7 @@ async function take(status, hasGraph) {
 
 bindKeys({
   play, step: (n) => go(state.frame + n), first: () => go(state.status.first), last: () => go(newest()),
-  fit: () => picture.fit(), centre: () => picture.centre(), alone: () => panels.toggle(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
+  fit: () => picture.fit(), sceneCamera: () => (picture.sceneCamera ? picture.followScene() : flash("the scene has no camera")), centre: () => picture.centre(), alone: () => panels.toggle(), look: (turn, tilt) => picture.look(turn, tilt), openTab,
   press: (id) => by(id).click(), save: () => out.picture(), find: () => { if (!by("graph-tab").hidden) { openTab("graph"); graph.search.focus(); } }, next: (id) => { const s = by(id); s.selectedIndex = (s.selectedIndex + 1) % s.options.length; s.dispatchEvent(new Event("change")); },
   trace: () => { if (state.point !== null) trace(state.point); },
   escape: () => { if (state.after) graph.toggle(graph.chosen); choosePoint(null); inspector.hide("region"); },

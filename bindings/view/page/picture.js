@@ -5,16 +5,19 @@ import { rampBytes } from "./ramp.js";
 const pointVertex = `
   uniform vec3 low, size;
   uniform vec2 radii;
-  uniform float pixels, least, dots, gaps;
+  uniform float pixels, least, dots, gaps, far, largest;
   uniform sampler2D ramp;
   attribute float value, radius;
   attribute vec3 rgb;
   varying vec3 tint;
+  varying float pixelRadius, fog;
   void main() {
     vec4 at = modelViewMatrix * vec4(low + position * size, 1.0);
     gl_Position = projectionMatrix * at;
     float wide = 2.0 * mix(radii.x, radii.y, radius) * pixels / max(1e-6, -at.z);
-    gl_PointSize = dots > 0.0 ? dots : clamp(wide, least, 256.0);
+    gl_PointSize = dots > 0.0 ? dots : clamp(wide, least, largest);
+    pixelRadius = 0.5 * gl_PointSize;
+    fog = exp(-0.35 * max(0.0, -at.z / far - 1.0));
     #ifdef RGB
       tint = rgb;
     #else
@@ -26,17 +29,32 @@ const pointVertex = `
       }
     #endif
   }`;
+// The light of pictures (runtime/picture/marks.cpp) without its shadows: colours are encoded as in tone.cpp.
+const pictureLight = `
+  vec3 decoded(vec3 c) {
+    vec3 light = mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+    return mix(light, 0.8 - 0.2 * log(max((1.0 - light) / 0.2, 1e-3)), step(0.8, light));
+  }
+  vec3 encoded(vec3 light) {
+    light = mix(light, 1.0 - 0.2 * exp((0.8 - light) / 0.2), step(0.8, light));
+    return mix(12.92 * light, 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, light));
+  }`;
 const pointFragment = `
   uniform float dots;
   varying vec3 tint;
+  varying float pixelRadius, fog;
+  ${pictureLight}
   void main() {
     vec2 p = 2.0 * gl_PointCoord - 1.0;
     float square = dot(p, p);
     if (dots > 0.0) { gl_FragColor = vec4(tint, 1.0); return; }
     if (square > 1.0) discard;
     vec3 n = vec3(p.x, -p.y, sqrt(1.0 - square));
-    float light = 0.45 + 0.6 * max(0.0, dot(n, normalize(vec3(-0.35, 0.7, 0.6))));
-    gl_FragColor = vec4(tint * light, 1.0);
+    vec3 lamp = normalize(vec3(-0.45, 0.0, 0.35) + 0.85 * viewMatrix[1].xyz);
+    float facing = 0.5 + 0.5 * dot(n, lamp);
+    float roundness = clamp((pixelRadius - 1.2) / 2.5, 0.0, 1.0);
+    float shade = mix(0.85, 0.25 + 0.95 * facing * facing, roundness);
+    gl_FragColor = vec4(encoded(decoded(tint) * 1.1 * fog * shade), 1.0);
   }`;
 
 // A streak has a vertex at the point and one where it was.
@@ -69,7 +87,8 @@ export class Picture {
     texture.needsUpdate = true;
     this.uniforms = {
       low: { value: new THREE.Vector3() }, size: { value: new THREE.Vector3(1, 1, 1) },
-      radii: { value: new THREE.Vector2(0, 0) }, pixels: { value: 1 }, least: { value: 3 }, dots: { value: 0 }, gaps: { value: 0 },
+      radii: { value: new THREE.Vector2(0, 0) }, pixels: { value: 1 }, least: { value: 3 }, dots: { value: 0 }, gaps: { value: 0 }, far: { value: 1 },
+      largest: { value: this.renderer.getContext().getParameter(this.renderer.getContext().ALIASED_POINT_SIZE_RANGE)[1] },
       shutter: { value: 1 / 48 }, ramp: { value: texture },
     };
     const surface = (colour, given) => new THREE.MeshLambertMaterial({ color: colour, side: THREE.DoubleSide, ...given });
@@ -230,6 +249,19 @@ export class Picture {
 
   // ---- the camera ----
 
+  // Pixels, as pictures may have them.
+  size() {
+    const edge = (x) => Math.min(Math.max(x, 16), 16384);
+    return { width: edge(this.canvas.width), height: edge(this.canvas.height) };
+  }
+
+  // Looks through the scene's camera until it is moved.
+  followScene() {
+    if (!this.sceneCamera) return;
+    this.setCamera(this.sceneCamera);
+    this.isSceneCamera = true;
+  }
+
   // Everything that there is.
   fit() {
     const box = new THREE.Box3();
@@ -237,6 +269,9 @@ export class Picture {
       box.expandByPoint(new THREE.Vector3(...this.message.box[0])).expandByPoint(new THREE.Vector3(...this.message.box[1]));
     if (this.shapes.visible) for (const shape of this.shapes.children) if (!shape.userData.plane) box.expandByObject(shape);
     if (box.isEmpty()) return;
+    const largest = Math.max(this.uniforms.radii.value.x, this.uniforms.radii.value.y);
+    if (this.message?.shown > 0) box.expandByScalar(largest);
+    this.isSceneCamera = false;
     box.getCenter(this.target);
     // So near that each corner is still in the picture, from where it is looked at now.
     this.place();
@@ -255,6 +290,7 @@ export class Picture {
   // The marked point in the middle.
   centre() {
     if (!this.marked) return;
+    this.isSceneCamera = false;
     this.target.set(...this.marked);
     this.draw();
   }
@@ -276,6 +312,7 @@ export class Picture {
   }
 
   setCamera(numbers) {
+    this.isSceneCamera = false;
     const from = new THREE.Vector3(...numbers.slice(0, 3));
     this.target.set(...numbers.slice(3, 6));
     if (numbers.length > 6) this.camera.fov = numbers[6];
@@ -286,7 +323,7 @@ export class Picture {
     this.draw();
   }
 
-  look(turn, tilt) { this.turn = turn; this.tilt = tilt; this.draw(); }
+  look(turn, tilt) { this.isSceneCamera = false; this.turn = turn; this.tilt = tilt; this.draw(); }
 
   control() {
     const held = { button: -1 };
@@ -303,6 +340,7 @@ export class Picture {
       held.x = event.clientX;
       held.y = event.clientY;
       held.moved += Math.abs(dx) + Math.abs(dy);
+      if (!held.region) this.isSceneCamera = false;
       if (held.region) return this.onregion?.([...held.from, held.x, held.y], false);
       if (held.button === 0 && !event.ctrlKey) {
         this.turn -= (dx / tall) * 4;
@@ -325,6 +363,7 @@ export class Picture {
     });
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
+      this.isSceneCamera = false;
       this.distance *= Math.exp(Math.sign(event.deltaY) * 0.12);
       this.draw();
     }, { passive: false });
@@ -360,6 +399,7 @@ export class Picture {
   }
 
   draw() {
+    this.onchange?.();
     if (this.due) return;
     this.due = requestAnimationFrame(() => {
       this.due = 0;
@@ -371,6 +411,7 @@ export class Picture {
       this.place();
       this.camera.updateProjectionMatrix();
       this.uniforms.pixels.value = (height * this.renderer.getPixelRatio()) / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
+      this.uniforms.far.value = this.distance;
       this.uniforms.least.value = 3 * this.renderer.getPixelRatio();
       this.sun.position.copy(this.camera.position).add(up);
       this.renderer.render(this.scene, this.camera);

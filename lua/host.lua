@@ -11,6 +11,7 @@ local describe = require "describe"
 local detail = require "detail"
 local engine_errors = require "engine_errors"
 local kernel = require "kernel"
+local power_operator = require "power_operator"
 local sandbox = require "sandbox"
 local language = require "rapid"
 local numeric = require "numeric"
@@ -173,7 +174,8 @@ function entry.watch_traces()
   local vmdef = require "jit.vmdef"
   local info = require("jit.util").funcinfo
   jit.attach(function(what, _, f, pc, reason, argument)
-    if what ~= "abort" then return end
+    -- A text that is loaded ends a trace that is being recorded. The trace is not one of a kernel.
+    if what ~= "abort" or f == power_operator.rewrite then return end
     local place = info(f, pc)
     if type(reason) == "number" then
       if type(argument) == "function" then argument = info(argument).loc or "a native function" end

@@ -1122,6 +1122,7 @@ function Node:merge(...) end
 ---@field camera? rapid.Camera|table<integer, rapid.Camera>|fun(frame: rapid.Frame): rapid.Camera|table<integer, rapid.Camera>  rapid.camera, a function of the frame that returns one, or keys; without it, fitted to the scene [camera]
 ---@field emitters? boolean|fun(frame: rapid.Frame): boolean  whether shapes that bear points are shown [boolean, default true]
 ---@field colliders? boolean|fun(frame: rapid.Frame): boolean  whether colliders and planes are shown [boolean, default true]
+---@field grid? boolean|fun(frame: rapid.Frame): boolean  whether lines are drawn on the ground, unless a plane is the ground [boolean, default true]
 ---@field name? string  what the node is called in messages [string]
 
 ---Says how points look in pictures; they stay as they are.

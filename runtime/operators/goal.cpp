@@ -30,6 +30,7 @@ struct Goal {
     static NodeType declare()
     {
         return node<Goal>("goal", "Takes points to places of their own in a given time.")
+            .varies()  // with the time since its start
             .reads("P")
             .writes("v")
             .takes("mass")

@@ -2,13 +2,22 @@
 
 #include <fmt/format.h>
 
+#include "runtime/error.h"
 #include "runtime/memory_budget.h"
 #include "runtime/picture/surfaces.h"
 
 namespace rapid {
 
+void require_picture_size(int width, int height)
+{
+    if (width < 1 || height < 1 || width > 16384 || height > 16384)
+        throw Error(
+            fmt::format("a picture of {} x {} can't be made; each side must be from 1 to 16384 pixels", width, height));
+}
+
 void require_picture_memory(int width, int height, bool colliders, double count, const char* remedy)
 {
+    require_picture_size(width, height);
     constexpr double of_picture = 3, of_file = 6;  // bytes a pixel: rows, plain and compressed
     const double bytes = (surface_bytes_a_pixel(colliders) + of_picture + of_file) * count * width * height;
     if (!fits_in_memory(bytes)) throw beyond_memory(fmt::format("pictures of {}x{}", width, height), bytes, remedy);

@@ -276,4 +276,12 @@ return rapid.create { seed = 4 } :emit { source = rapid.mesh.sphere { radius = 2
     local command = require "testing.command"
     assert.equal(0, command.shell("cmp whole.0008.bgeo part.0008.bgeo", { cwd = scene.folder.path }).status)
   end)
+
+  it("follows the clock in a chain without a solve, too", function()
+    local result = scene.run([[
+return rapid.create { fps = 20, points = rapid.points.from { P = {{0, 0, 0}}, v = {{1, 0, 0}}, goal = {{0, 1, 0}} } }
+  :goal { to = rapid.attr "goal", time = 0.2, hold = false }]], { frames = {1, 8} })
+    assert.is_true((result[2][1].v - vec3(1, 0, 0)):length() > 0.1)
+    assert.near({1, 0, 0}, result[8][1].v, 0)
+  end)
 end)

@@ -24,6 +24,9 @@ local function is_error_of_node(message)
   return message:match '^%S+:%d+: node "[%w_]+": .' ~= nil
 end
 
+-- Without how much memory is free, which differs from run to run.
+local function comparable(message) return (message:gsub(", and %S+ %wiB are free of %S+ %wiB", "")) end
+
 local function outcome_of(way)
   local log = folder:read("ways/" .. way.name .. ".log")
   return {
@@ -38,7 +41,7 @@ local function fault_of(way, outcome, first_way, first)
     return ("%s: an error without its place: %s"):format(way.name, outcome.log)
   end
   if way.is_part and outcome.status == 2 then return nil end
-  local same_message = outcome.status == 0 or way.is_part or outcome.message == first.message
+  local same_message = outcome.status == 0 or way.is_part or comparable(outcome.message) == comparable(first.message)
   if (outcome.status > 0) ~= (first.status > 0) or not same_message then
     return ("%s ended with %d: %s\nand %s with %d: %s"):format(way.name, outcome.status, outcome.log, first_way.name,
       first.status, first.log)

@@ -13,8 +13,8 @@ local seed = tonumber(os.getenv "CHAINS_SEED") or 1
 local first = tonumber(os.getenv "CHAINS_FIRST") or 1
 
 local function ways_of(outputs)
-  local run = "rapid run $SCENE -o {output}.####.csv --quiet "
-  local part = "rapid run $SCENE -f 1-6 -o {output}.####.csv --quiet --part "
+  local run = "rapid run $SCENE -o {output}.####.csv --quiet --memory 1G "
+  local part = "rapid run $SCENE -f 1-6 -o {output}.####.csv --quiet --memory 1G --part "
   local merges = ""
   for _, output in ipairs(outputs) do
     merges = merges .. ("\nrapid merge -o %s.####.csv 'aside/%s_part{part}.####.csv' --quiet"):format(output, output)

@@ -119,7 +119,8 @@ void ScriptHost::apply_arguments()
     if (arguments.empty()) return;
     try {
         graph = with_arguments(graph, arguments);
-    } catch (Error& error) {
+    } catch (const Error& error) {
+        if (!error.node().empty()) throw;
         throw Error(fmt::format("--set {}", error.what())).at({graph.file, 0});
     }
 }

@@ -61,6 +61,12 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
 
 }  // namespace
 
+void require_param(const NodeType& type, const std::string& name)
+{
+    const Param* param = type.find(name);
+    if (param ? param->internal : !type.rest) throw Error(unknown(type, name));
+}
+
 void bind_arguments(const Node& node, Operator& op, const FrameClock& clock, const Frame& frame, bool only_changing)
 {
     for (const auto& [name, value] : node.arguments) {

@@ -14,6 +14,9 @@ namespace rapid {
 // argument that is unknown, missing or illegal.
 void bind_arguments(const Node& node, Operator& op, const FrameClock& clock, const Frame& frame, bool only_changing);
 
+// Throws Error if nodes of this type take no argument of that name; the message names the nearest.
+void require_param(const NodeType& type, const std::string& name);
+
 // A number that is never a function: the argument, or the parameter's default.
 double constant_argument(const Node& node, std::string_view param);
 

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 
+#include "runtime/at_node.h"
+#include "runtime/graph/arguments.h"
 #include "runtime/graph/make_node.h"
+#include "runtime/graph/node_handle.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {
@@ -39,15 +42,21 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
         if (dot == std::string::npos || dot == 0 || dot + 1 == path.size())
             throw Error(
                 fmt::format("\"{}\" is no parameter of a node; it must be NODE.PARAM, as solve.substeps", path));
-        changes[&find_node(graph, path, path.substr(0, dot))][path.substr(dot + 1)] = value;
+        const Node& node = find_node(graph, path, path.substr(0, dot));
+        const std::string param = path.substr(dot + 1);
+        name_errors(node.name, node.location, [&] { require_param(*node.type, param); });
+        changes[&node][param] = value;
     }
 
     Graph result;
     result.file = graph.file;
     std::map<const Node*, NodePtr> replaced;
-    for (const NodePtr& node : graph.nodes) {  // inputs come before their consumers
+    for (const NodePtr& node : graph.nodes) {  // inputs and sources come before their consumers
         auto copy = make_node(*node);
         for (NodePtr& input : copy->inputs) input = replaced.at(input.get());
+        for (auto& [name, argument] : copy->arguments)
+            if (const auto source = argument.object<NodeHandle>())
+                argument = Value(std::make_shared<NodeHandle>(replaced.at(source->node.get())));
         if (const auto found = changes.find(node.get()); found != changes.end())
             for (const auto& [name, value] : found->second) copy->arguments[name] = value;
         replaced[node.get()] = copy;

@@ -8,9 +8,10 @@
 
 namespace rapid {
 
-// values: by NODE.PARAM, where NODE is the name of a node, or its type if no other node has it. Nodes are immutable:
-// the result has copies. The plan checks whether the node has the parameter. Error: no such node (with the nearest
-// name), several nodes of the type, no dot.
+// values: by NODE.PARAM, where NODE is the name of a node, or its type if no other node has it. Nodes are immutable, so
+// the result has copies, which are the inputs and sources of one another. Throws Error if the graph has no such node or
+// the node no such parameter (with the nearest name), if several nodes are of the type, or if there is no dot. The plan
+// checks the values.
 Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& values);
 
 }  // namespace rapid

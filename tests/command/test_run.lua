@@ -2,6 +2,7 @@
 local command = require "testing.command"
 local json = require "dkjson"
 local csv_rows = require "tests.csv_rows"
+local scene = require "testing.scene"
 
 -- Three points that fall from 10 m. Frame f is (f - 1) / 24 s after the start.
 local falling = [[
@@ -301,6 +302,28 @@ return rapid.create { points = rapid.points.from { P = {{x, up and 1 or 0, 0}} }
     local result = new_folder():run "-f 1 --set hieght=3"
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find('no parameter "hieght"; did you mean "height"?', 1, true), result.stderr)
+  end)
+
+  -- Drops fall from 1 m and burst where they land; each piece bursts again where it dies, 0.2 s later.
+  local bursts = [[
+local drops = rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+  :gravity {} :collide { shape = rapid.shape.plane {}, record = true } :solve {}
+local pieces = rapid.create {} :emit { source = drops, on = "hittotal >= 1", count = 2, life = 0.2 } :solve {}
+return rapid.create {} :emit { source = pieces, on = "death", count = 3 } :solve {}
+]]
+
+  it("reaches the chains whose points bear others, and their parents in turn", function()
+    for _, g in ipairs { 1, 3, 9 } do
+      local lands = math.sqrt(2 / g) + 0.2
+      local result = scene.run(bursts, { frames = {1, 40}, set = { ["gravity1.g"] = {0, -g, 0} } })
+      for frame, points in result:frames() do assert.equal((frame - 1) / 24 >= lands and 6 or 0, #points) end
+    end
+  end)
+
+  it("refuses a parameter that the node has not, with the nearest, wherever the node is", function()
+    local result = scene.command("run", bursts, "-f 1 --set gravity1.G=1")
+    assert.equal(2, result.status)
+    assert.equal('scene.lua:2: node "gravity1": unknown parameter "G"; did you mean "g"?\n', result.stderr)
   end)
 end)
 

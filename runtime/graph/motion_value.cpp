@@ -3,6 +3,7 @@
 
 #include "runtime/graph/located.h"
 #include "runtime/graph/param.h"
+#include "runtime/shapes/motion/turns.h"
 
 namespace rapid {
 namespace {
@@ -42,15 +43,15 @@ private:
     std::shared_ptr<const FrameFunction> function_;
 };
 
-Pose key(const Param& param, std::int64_t frame, const Value& value)
+MotionPtr key(const Param& param, std::int64_t frame, const Value& value)
 {
-    const auto motion = value.object<Motion>();
+    MotionPtr motion = value.object<Motion>();
     if (!motion || motion->varies())
         throw Error(
             fmt::format("{}[{}] = {} is no place to be at a frame; keys are constant motions: rapid.translate, "
                         "rapid.rotate, rapid.scale, or a product",
                         param.name, frame, motion ? "a motion that varies" : describe(value)));
-    return motion->at({});
+    return motion;
 }
 
 }  // namespace
@@ -70,12 +71,15 @@ void read_value(const Param& param, const Value& value, MotionPtr& field)
     }
     if (!table->named.empty()) wrong_type(param, value);
     std::map<std::int64_t, Pose> keys;
-    for (std::size_t i = 0; i < table->list.size(); ++i) {
-        const auto frame = static_cast<std::int64_t>(i) + 1;
-        keys[frame] = key(param, frame, table->list[i]);
-    }
-    for (const auto& [frame, given] : table->numbered) keys[frame] = key(param, frame, given);
-    field = keyed_motion(std::move(keys));
+    std::map<std::int64_t, Turns> turns;
+    const auto add = [&](std::int64_t frame, const Value& given) {
+        const MotionPtr motion = key(param, frame, given);
+        keys[frame] = motion->at({});
+        if (const std::optional<Turns> known = turns_of(*motion)) turns[frame] = *known;
+    };
+    for (std::size_t i = 0; i < table->list.size(); ++i) add(static_cast<std::int64_t>(i) + 1, table->list[i]);
+    for (const auto& [frame, given] : table->numbered) add(frame, given);
+    field = keyed_motion(std::move(keys), std::move(turns));
 }
 
 }  // namespace rapid

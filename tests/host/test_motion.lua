@@ -27,6 +27,19 @@ describe("a motion", function()
     end
   end)
 
+  -- A speck 2 m from the axis, born at the ends of frames.
+  it("by keys turns by the angle between them, whole turns included", function()
+    for _, degrees in ipairs { 90, 200, 360, -720 } do
+      local keys = (":transform { [1] = rapid.rotate({0, 0, 1}, 0), [11] = rapid.rotate({0, 0, -1}, %d) }")
+        :format(-degrees)
+      local result = births_of(speck .. ":transform(rapid.translate(2, 0, 0))" .. keys)
+      for frame = 2, 11 do
+        local angle = math.rad(degrees) * (frame - 1) / 10
+        close(vec3(2 * math.cos(angle), 2 * math.sin(angle), 0), result[frame]:by_id(4 * frame - 5).P)
+      end
+    end
+  end)
+
   it("may be a function of the frame, which is asked between frames and for the frames around", function()
     local result = births_of(speck .. [[:transform(function(frame)
       return rapid.translate(frame.time * 24, 0, 0) * rapid.rotate({0, 0, 1}, 30 * frame.number)

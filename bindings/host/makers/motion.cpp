@@ -9,6 +9,7 @@
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/motion/curves.h"
 #include "runtime/shapes/motion/deforming.h"
+#include "runtime/shapes/motion/turns.h"
 
 namespace rapid {
 namespace {
@@ -41,7 +42,8 @@ struct Rotate {
     ObjectPtr make(MakeContext&) const
     {
         if (axis.norm() == 0) throw Error("the axis has length 0; it needs a direction");
-        return constant_motion({Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()))});
+        const Turn turn{axis.normalized(), angle};
+        return constant_motion({Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn.axis))}, Turns{turn});
     }
 };
 RAPID_MAKER(Rotate);

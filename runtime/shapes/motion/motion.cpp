@@ -7,6 +7,7 @@
 
 #include "runtime/elementary.h"
 #include "runtime/error.h"
+#include "runtime/shapes/motion/turns.h"
 
 namespace rapid {
 namespace {
@@ -17,13 +18,38 @@ constexpr double least_piece = 1.0 / 64;  // of the interval
 
 class ConstantMotion final : public Motion {
 public:
-    explicit ConstantMotion(const Pose& pose) : pose_(pose) {}
+    ConstantMotion(const Pose& pose, std::optional<Turns> turns) : pose_(pose), turns_(std::move(turns)) {}
     Pose at(const Frame&) const override { return pose_; }
     FrameRange range() const override { return {}; }
+    const std::optional<Turns>& turns() const { return turns_; }
 
 private:
     Pose pose_;
+    std::optional<Turns> turns_;
 };
+
+// 1 if two axes are the same, -1 if they are opposite, 0 if they are neither.
+int sense(const Vec3d& a, const Vec3d& b)
+{
+    constexpr double rounding = 1e-12;  // of the product of two unit vectors
+    const double along = a.dot(b);
+    return along > 1 - rounding ? 1 : along < rounding - 1 ? -1 : 0;
+}
+
+// Nothing if one of them is unknown, or if there are more than anybody writes: a product in a loop.
+std::optional<Turns> in_turn(std::optional<Turns> first, const std::optional<Turns>& second)
+{
+    constexpr std::size_t most = 8;
+    if (!first || !second || first->size() + second->size() > most) return std::nullopt;
+    for (const Turn& turn : *second) {
+        const int same = first->empty() ? 0 : sense(first->back().axis, turn.axis);
+        if (same == 0)
+            first->push_back(turn);
+        else
+            first->back().angle += same * turn.angle;
+    }
+    return first;
+}
 
 class ProductMotion final : public Motion {
 public:
@@ -80,7 +106,10 @@ private:
 
 class KeyedMotion final : public Motion {
 public:
-    explicit KeyedMotion(std::map<std::int64_t, Pose> keys) : keys_(std::move(keys)) {}
+    KeyedMotion(std::map<std::int64_t, Pose> keys, std::map<std::int64_t, Turns> turns)
+        : keys_(std::move(keys)), turns_(std::move(turns))
+    {
+    }
 
     Pose at(const Frame& frame) const override
     {
@@ -90,7 +119,10 @@ public:
         const auto before = std::prev(after);
         if (after == keys_.end()) return before->second;
         const auto from = static_cast<double>(before->first), to = static_cast<double>(after->first);
-        return interpolate(before->second, after->second, (frame.number - from) / (to - from));
+        const double t = (frame.number - from) / (to - from);
+        Pose pose = interpolate(before->second, after->second, t);
+        if (const auto turned = turned_far(before->first, after->first, t)) pose.rotation = *turned;
+        return pose;
     }
     FrameRange range() const override
     {
@@ -98,7 +130,30 @@ public:
     }
 
 private:
+    // The rotation between two keys that turn about the same axes, by half a turn or more about one of them. Nothing
+    // between others, which the shorter way joins.
+    std::optional<Eigen::Quaterniond> turned_far(std::int64_t before, std::int64_t after, double t) const
+    {
+        const auto from = turns_.find(before), to = turns_.find(after);
+        if (from == turns_.end() || to == turns_.end()) return std::nullopt;
+        const Turns &a = from->second, &b = to->second;
+        if (a.size() != b.size() && !a.empty() && !b.empty()) return std::nullopt;
+        constexpr double half = EIGEN_PI - 1e-9;  // rad; at half a turn both ways are as short
+        bool far = false;
+        Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+        for (std::size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
+            const Vec3d& axis = a.empty() ? b[i].axis : a[i].axis;
+            const int same = a.empty() || b.empty() ? 1 : sense(axis, b[i].axis);
+            if (same == 0) return std::nullopt;
+            const double first = a.empty() ? 0 : a[i].angle, last = b.empty() ? 0 : same * b[i].angle;
+            far = far || std::abs(last - first) > half;
+            rotation = rotation * Eigen::AngleAxisd(first + t * (last - first), axis);
+        }
+        return far ? std::optional(rotation.normalized()) : std::nullopt;
+    }
+
     std::map<std::int64_t, Pose> keys_;
+    std::map<std::int64_t, Turns> turns_;
 };
 
 // The rotation vector from a to b, the shorter way round, rad.
@@ -184,11 +239,30 @@ private:
 
 }  // namespace
 
-MotionPtr constant_motion(const Pose& pose) { return std::make_shared<ConstantMotion>(pose); }
+MotionPtr constant_motion(const Pose& pose)
+{
+    const bool is_turned = pose.rotation.coeffs() != Eigen::Quaterniond::Identity().coeffs();
+    return std::make_shared<ConstantMotion>(pose, is_turned ? std::nullopt : std::optional(Turns()));
+}
+
+MotionPtr constant_motion(const Pose& pose, Turns turns)
+{
+    return std::make_shared<ConstantMotion>(pose, std::move(turns));
+}
+
+std::optional<Turns> turns_of(const Motion& motion)
+{
+    const auto* constant = dynamic_cast<const ConstantMotion*>(&motion);
+    return constant ? constant->turns() : std::nullopt;
+}
 
 MotionPtr product(const MotionPtr& first, const MotionPtr& second)
 {
-    if (!first->varies() && !second->varies()) return constant_motion(first->at({}) * second->at({}));
+    if (!first->varies() && !second->varies()) {
+        const Pose pose = first->at({}) * second->at({});
+        const std::optional<Turns> turns = in_turn(turns_of(*first), turns_of(*second));
+        return turns ? constant_motion(pose, *turns) : std::make_shared<ConstantMotion>(pose, std::nullopt);
+    }
     return std::make_shared<ProductMotion>(first, second);
 }
 
@@ -198,11 +272,13 @@ MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double fr
     return std::make_shared<BackwardMotion>(motion, clock, frame);
 }
 
-MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys)
+MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys) { return keyed_motion(std::move(keys), {}); }
+
+MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys, std::map<std::int64_t, Turns> turns)
 {
     if (keys.empty()) throw Error("a motion by keys has none; give a motion at one frame at least, {[1] = ...}");
     if (keys.size() == 1) return constant_motion(keys.begin()->second);
-    return std::make_shared<KeyedMotion>(std::move(keys));
+    return std::make_shared<KeyedMotion>(std::move(keys), std::move(turns));
 }
 
 Pose MotionTrack::Piece::at(double s) const

@@ -8,6 +8,7 @@
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/placed.h"
+#include "runtime/shapes/motion/turns.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -37,6 +38,20 @@ private:
 };
 
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return a.angularDistance(b); }
+
+// As a script writes it: the pose, and how it is turned.
+MotionPtr rotation_by(const Vec3d& axis, double angle)
+{
+    return constant_motion({{0, 0, 0}, about(axis, angle)}, Turns{{axis.normalized(), angle}});
+}
+
+MotionPtr keyed_from(const MotionPtr& first, const MotionPtr& last)
+{
+    std::map<std::int64_t, Turns> turns;
+    if (turns_of(*first)) turns[1] = *turns_of(*first);
+    if (turns_of(*last)) turns[11] = *turns_of(*last);
+    return keyed_motion({{1, first->at({})}, {11, last->at({})}}, turns);
+}
 
 }  // namespace
 
@@ -71,6 +86,50 @@ TEST_CASE("between keys translation and scale are linear and rotation is slerp; 
     CHECK(motion->at(clock_24.at(100)).translation == Vec3d(4, 8, -4));
     CHECK_FALSE(keyed_motion({{3, {{1, 2, 3}}}})->varies());
     CHECK_THROWS_AS(keyed_motion({}), Error);
+}
+
+TEST_CASE("keys that turn about one axis are joined by their angles, whole turns included", "[motion]")
+{
+    const Vec3d axis = Vec3d(1, -2, 0.5).normalized();
+    const double angle = GENERATE(0.5, 2.0, 1.0001 * pi, 200 * pi / 180, -1.5 * pi, 2 * pi, 4 * pi, -9 * pi);
+    const MotionPtr start = rotation_by(axis, 0.3), end = rotation_by(axis, 0.3 + angle);
+    const MotionPtr placed = constant_motion({{3, 1, -2}, Eigen::Quaterniond::Identity(), 2});
+    const MotionPtr tilt = rotation_by({0, 0, 1}, 0.7);  // about an axis of its own, in each key alike
+    for (int step = 0; step <= 10; ++step) {
+        CAPTURE(angle, step);
+        const double now = angle * step / 10;
+        const auto turn_of = [&](const MotionPtr& motion) { return motion->at(clock_24.at(1 + step)).rotation; };
+        CHECK(angle_between(turn_of(keyed_from(start, end)), about(axis, 0.3 + now)) < 1e-9);
+        CHECK(angle_between(turn_of(keyed_from(start, rotation_by(-axis, -0.3 - angle))), about(axis, 0.3 + now)) <
+              1e-9);
+        CHECK(angle_between(turn_of(keyed_from(constant_motion({}), rotation_by(axis, angle))), about(axis, now)) <
+              1e-9);
+        CHECK(angle_between(turn_of(keyed_from(rotation_by(axis, angle), placed)), about(axis, angle - now)) < 1e-9);
+        const MotionPtr twice =
+            product(placed, product(rotation_by(axis, 0.5 * angle), rotation_by(axis, 0.5 * angle)));
+        CHECK(angle_between(turn_of(keyed_from(placed, twice)), about(axis, now)) < 1e-9);
+        const MotionPtr spinning = keyed_from(product(start, tilt), product(end, tilt));
+        CHECK(angle_between(turn_of(spinning), about(axis, 0.3 + now) * about({0, 0, 1}, 0.7)) < 1e-9);
+    }
+}
+
+TEST_CASE("keys that turn about different axes are joined by the shorter way", "[motion]")
+{
+    const MotionPtr motion = keyed_from(rotation_by({1, 0, 0}, 1.5 * pi), rotation_by({0, 1, 0}, 1.75 * pi));
+    const Eigen::Quaterniond middle = about({1, 0, 0}, -pi / 2).slerp(0.5, about({0, 1, 0}, -pi / 4));
+    CHECK(angle_between(motion->at(clock_24.at(6)).rotation, middle) < 1e-9);
+}
+
+TEST_CASE("a track goes with keys through several turns in a frame", "[motion]")
+{
+    const Vec3d axis = Vec3d(0, 1, 2).normalized();
+    const MotionPtr motion = keyed_from(rotation_by(axis, 0), rotation_by(axis, 30 * pi));
+    const MotionTrack track(*motion, clock_24, 4, 5);
+    for (const double u : {0.0, 0.1, 0.45, 0.75, 1.0}) {
+        CAPTURE(u);
+        CHECK(angle_between(track.at(u / 24).rotation, about(axis, 3 * pi * (3 + u))) < 1e-4);
+        CHECK_THAT(track.velocity_at(u / 24).angular, close_to(Vec3d(3 * pi * 24 * axis), 1e-3 * 3 * pi * 24));
+    }
 }
 
 TEST_CASE("a product of constants is a constant, and moves first by its right factor", "[motion]")

@@ -56,9 +56,12 @@ void keep_name(const Param& param, void* fields, const Value& value)
     if constexpr (access == Access::Joins) {
         arguments.joins.insert(name);
     } else {
-        if (access == Access::Writes && is_own_column(name) && is_read_only(name))
+        if (access == Access::Writes && is_read_only(name))
             throw Error(fmt::format("{} = \"{}\"; that attribute is read only", param.name, name));
-        (access == Access::Writes ? arguments.writes : arguments.reads).insert(name);
+        if (access == Access::Reads && name == "nage")
+            arguments.reads.insert({"age", "life"});  // from which the kernel computes it
+        else
+            (access == Access::Writes ? arguments.writes : arguments.reads).insert(name);
     }
 }
 

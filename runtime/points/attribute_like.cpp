@@ -7,6 +7,7 @@
 #include "runtime/error.h"
 
 namespace rapid {
+#include "runtime/points/point_names.h"
 
 const AttributeSpec* conventional_attribute(std::string_view name)
 {
@@ -49,6 +50,28 @@ std::string no_attribute(const std::string& name, const std::vector<std::string>
     return near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
                         : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} before it)",
                                       name, near, made);
+    static const std::map<std::string_view, std::string_view> names = {
+        {"alpha", "Alpha"},     {"col", "Cd"},      {"color", "Cd"},   {"colour", "Cd"},     {"normal", "N"},
+        {"opacity", "Alpha"},   {"pos", "P"},       {"position", "P"}, {"radius", "pscale"}, {"rgb", "Cd"},
+        {"rotation", "orient"}, {"size", "pscale"}, {"vel", "v"},      {"velocity", "v"},
+    };
+    const auto found = names.find(word);
+    return found == names.end() ? std::string_view() : found->second;
+}
+
+std::string no_attribute(const std::string& name, const std::vector<std::string>& names, int numbers)
+{
+    if (const PointName* computed = find_point_name(name); computed && computed->role == PointName::Field)
+        return fmt::format(
+            "\"{0}\" is no attribute but computed where a kernel asks for p.{0}; give an attribute its "
+            "value by :points(\"NAME\", function(p) p.heat = p.{0} end)",
+            name);
+    if (const std::string known(name_of_synonym(name)); !known.empty()) {
+        const bool is_there = std::find(names.begin(), names.end(), known) != names.end();
+        const std::string remedy =
+            is_there ? "" : fmt::format(": add :attribute{{ {} }} before it", text_of_making(known));
+        return fmt::format("no attribute \"{}\"; the {} of points is {}{}", name, name, known, remedy);
+    }
 }
 
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like)

@@ -21,6 +21,27 @@ describe("ramp", function()
     assert.near(14, found[2].heat, 1e-6)
   end)
 
+  it("looks up the age as a part of the life", function()
+    local result = scene.run([[
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, life = {1, 4, math.huge} } }
+  :attribute { heat = -1 } :solve {} :ramp { from = "nage", to = "heat", keys = {{0, 0}, {1, 10}} }]],
+      { frames = {1, 20} })
+    for f = 2, 20 do
+      local age = (f - 1) / 24
+      assert.near(10 * age, result[f]:by_id(0).heat, 1e-5)
+      assert.near(10 * age / 4, result[f]:by_id(1).heat, 1e-5)
+      assert.equal(0, result[f]:by_id(2).heat) -- it lives for ever
+    end
+  end)
+
+  it("says that what kernels compute is read only, and no attribute of other nodes", function()
+    local chain = "return rapid.create { points = two } :attribute { heat = 0 } %s :solve {}"
+    local function fault(node) return scene.error(chain:format(node)) end
+    assert.truthy(fault(":ramp { to = 'nage' }"):find('to = "nage"; that attribute is read only', 1, true))
+    assert.truthy(fault(":collide { shape = rapid.shape.plane {}, bounce = rapid.attr 'nage' }"):find(
+      '"nage" is no attribute but computed where a kernel asks for p.nage', 1, true))
+  end)
+
   it("refuses keys of another type than the attribute", function()
     local message = scene.error [[
 return rapid.create { points = two } :attribute { heat = 0 } :ramp { from = "age", to = "heat" } :solve {}]]

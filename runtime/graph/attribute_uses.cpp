@@ -26,6 +26,17 @@ Location place_of(const Node& node, const std::string& attribute)
     return {};
 }
 
+// How many numbers a value of the attribute has that the node takes; 1 where it does not tell.
+int numbers_in(const Node& node, const std::string& attribute)
+{
+    for (const auto& [name, value] : node.arguments) {
+        const auto* reference = value.get<AttributeRef>();
+        const Param* param = reference && reference->name == attribute ? node.type->find(name) : nullptr;
+        if (param && param->type == "vec3") return 3;
+    }
+    return 1;
+}
+
 // Errors of check() are at the line, inside of a function of the node's, that names the attribute.
 template <class F>
 void at_mention(const Node& node, const std::string& attribute, const F& check)
@@ -61,13 +72,13 @@ struct MadeNames {
         }
     }
 
-    void check_attribute(const std::string& name) const
+    void check_attribute(const std::string& name, int numbers) const
     {
         if (is_own_column(name) || attributes.count(name) || known_attribute(name)) return;
         std::vector<std::string> names = point_names_of(PointName::OwnColumn);
         for (const auto& [made, maker] : attributes) names.push_back(made);
         for (const AttributeSpec& known : known_attributes()) names.push_back(known.name);
-        throw Error(no_attribute(name, names));
+        throw Error(no_attribute(name, names, numbers));
     }
 
     void check_group(const std::string& name) const
@@ -232,7 +243,8 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
             name_errors(planned.node->name, planned.node->location, [&] {
                 const Uses uses = uses_of(planned);
                 for (const std::string& name : uses.reads_of_source)
-                    at_mention(*planned.node, name, [&] { made.check_attribute(name); });
+                    at_mention(*planned.node, name,
+                               [&] { made.check_attribute(name, numbers_in(*planned.node, name)); });
                 for (const std::string& name : uses.reads_groups_of_source) made.check_group(name);
             });
         }
@@ -247,14 +259,15 @@ void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std
                      std::size_t node, const std::string& name)
 {
     // Points of other simulations, which come through a merge, bring names of their own.
-    if (nodes[node].carries.size() == 1) made.check_attribute(name);
+    const int numbers = numbers_in(*nodes[node].node, name);
+    if (nodes[node].carries.size() == 1) made.check_attribute(name, numbers);
     if (flow.has(node, name) || is_own_column(name) || known_attribute(name)) return;
     if (const auto later = made.attributes.find(name); later != made.attributes.end())
         throw Error(
             fmt::format("no attribute \"{}\" here; node \"{}\" at line {} makes it, which comes later: move "
                         "it before this one",
                         name, later->second.node->name, later->second.node->location.line));
-    throw Error(no_attribute(name, flow.names_at(node)));
+    throw Error(no_attribute(name, flow.names_at(node), numbers));
 }
 
 }  // namespace

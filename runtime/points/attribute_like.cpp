@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "runtime/error.h"
+#include "runtime/points/point_names.h"
 
 namespace rapid {
-#include "runtime/points/point_names.h"
 
 const AttributeSpec* conventional_attribute(std::string_view name)
 {
@@ -15,6 +17,7 @@ const AttributeSpec* conventional_attribute(std::string_view name)
         {"Alpha", 1.0f},
         {"Cd", Vec3f(Vec3f::Ones())},
         {"N", Vec3f(Vec3f::Zero())},
+        {"curve", std::int32_t{-1}},
         {"instance", std::int32_t{0}},
         {"name", Token()},
         {"orient", Quatf(Quatf::Identity())},
@@ -25,11 +28,11 @@ const AttributeSpec* conventional_attribute(std::string_view name)
     return nullptr;
 }
 
-std::string text_of_making(const std::string& name)
+std::string text_of_making(const std::string& name, int numbers)
 {
     const AttributeSpec* usual = conventional_attribute(name);
     if (!usual) usual = known_attribute(name);
-    if (!usual) return name + " = 0";
+    if (!usual) return name + (numbers == 3 ? " = {0, 0, 0}" : numbers == 4 ? " = {0, 0, 0, 1}" : " = 0");
     // A parameter of every node has this name, too.
     if (type_of(usual->fallback) == AttributeType::String) return fmt::format("attributes = {{ {} = \"\" }}", name);
     const auto list = [&](const auto& value, auto... k) {
@@ -39,17 +42,14 @@ std::string text_of_making(const std::string& name)
     };
     if (const auto* vector = std::get_if<Vec3f>(&usual->fallback)) return list(*vector, 0, 1, 2);
     if (const auto* turn = std::get_if<Quatf>(&usual->fallback)) return list(turn->coeffs(), 0, 1, 2, 3);
+    if (const auto* whole = std::get_if<std::int32_t>(&usual->fallback)) return fmt::format("{} = {}", name, *whole);
     const auto* number = std::get_if<float>(&usual->fallback);
     return fmt::format("{} = {:g}", name, !number ? 0 : std::isfinite(*number) ? *number : 1);
 }
 
-std::string no_attribute(const std::string& name, const std::vector<std::string>& names)
+// The name by which points have what other programs, and people, call otherwise; empty for any other word.
+std::string_view name_of_synonym(std::string_view word)
 {
-    const std::string near = conventional_attribute(name) || known_attribute(name) ? "" : nearest_name(name, names);
-    const std::string made = text_of_making(name);
-    return near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
-                        : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} before it)",
-                                      name, near, made);
     static const std::map<std::string_view, std::string_view> names = {
         {"alpha", "Alpha"},     {"col", "Cd"},      {"color", "Cd"},   {"colour", "Cd"},     {"normal", "N"},
         {"opacity", "Alpha"},   {"pos", "P"},       {"position", "P"}, {"radius", "pscale"}, {"rgb", "Cd"},
@@ -72,6 +72,11 @@ std::string no_attribute(const std::string& name, const std::vector<std::string>
             is_there ? "" : fmt::format(": add :attribute{{ {} }} before it", text_of_making(known));
         return fmt::format("no attribute \"{}\"; the {} of points is {}{}", name, name, known, remedy);
     }
+    const std::string near = conventional_attribute(name) || known_attribute(name) ? "" : nearest_name(name, names);
+    const std::string made = text_of_making(name, numbers);
+    return near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
+                        : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} before it)",
+                                      name, near, made);
 }
 
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like)

@@ -29,6 +29,31 @@ describe("a message", function()
     expect("add :attribute{ Cd = {1, 1, 1} } before it", kernel_fault 'local name = "C" .. "d" p[name] = vec3(1, 0, 0)')
   end)
 
+  it("makes an attribute with the type of the parameter that asks for it", function()
+    expect("add :attribute{ goal = {0, 0, 0} } before it",
+      fault 'return rapid.create { points = POINTS } :attract { center = rapid.attr "goal" } :solve {}')
+    expect("add :attribute{ pull = 0 } before it",
+      fault 'return rapid.create { points = POINTS } :attract { strength = rapid.attr "pull" } :solve {}')
+  end)
+
+  it("that follows is one with which the scene runs", function()
+    for attribute, body in pairs { Cd = "p.Cd = vec3(1, 0, 0)", orient = "p.orient = quat(0, 1, 0, 0)",
+                                   heat = "p.heat = 3", curve = "p.curve = 2" } do
+      local advice = kernel_fault(body):match "add (:attribute%b{}) before it"
+      assert.truthy(advice, attribute)
+      local text = ('return rapid.create { points = POINTS } %s :points("k", function(p) %s end) :solve {}')
+        :format(advice, body):gsub("POINTS", points)
+      assert.truthy(scene.run(text, { frames = {1, 2} })[2][1][attribute])
+    end
+  end)
+
+  it("knows what points have by another name", function()
+    expect('no attribute "colour"; the colour of points is Cd: add :attribute{ Cd = {1, 1, 1} } before it',
+      kernel_fault "p.colour = vec3(1, 0, 0)")
+    expect('no attribute "position"; the position of points is P', kernel_fault "p.v = p.position")
+    expect('no attribute "radius"; the radius of points is pscale', kernel_fault "p.v = p.v * p.radius")
+  end)
+
   it("names frame.time where the frame stands for a number", function()
     local number = "the frame is no number; compute with what it has, by name: frame.time"
     local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function(frame) %s end } "

@@ -8,6 +8,7 @@
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/attribute_uses.h"
+#include "runtime/graph/doubts.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/solver/collision/hits.h"
@@ -106,6 +107,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
         for (const PlannedAttribute& attribute : simulation.attributes)
             if (!attribute.kept && attribute.name != "dt") simulation.left_out.insert(attribute.name);
     for (const std::string& warning : reads_of_no_hits(nodes, simulations)) warnings.push_back(warning);
+    for (const std::string& warning : doubts_about(graph, *this)) warnings.push_back(warning);
 }
 
 // The nodes that are reached from the outputs, in the order in which they were made: inputs come first.

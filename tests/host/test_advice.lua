@@ -126,6 +126,40 @@ describe("a warning", function()
       :merge(rapid.create { points = POINTS }) :solve {}]])
   end)
 
+  it("names a node whose result is dropped", function()
+    local dropped = "local c = rapid.create { points = POINTS } :gravity {} c:wind {} %s return c:solve {}"
+    expect('node "wind1": leads to no output, as its result is dropped; keep it: chain = chain:wind { ... }',
+      warnings(dropped:format ""))
+    expect('node "k": leads to no output', warnings [[local c = rapid.create { points = POINTS } :gravity {} :solve {}
+      c:points("k", function(p) p.v = p.P end) return c]])
+    -- What is left out on purpose.
+    for _, text in ipairs {
+      "local c = rapid.create { points = POINTS } :gravity {} local other = c:wind {} :solve {} return c:solve {}",
+      "local other = rapid.create { points = POINTS } :wind {} return rapid.create { points = POINTS } :solve {}",
+    } do assert.equal("", warnings(text)) end
+  end)
+
+  it("names a script that waits for the end of lives which have none", function()
+    local chain = "return rapid.create {} :emit { source = POINTS, rate = 9, %s attributes = { Alpha = 1 } } %s "
+      .. ":solve {}"
+    for name, node in pairs { fade_by_age1 = ":fade_by_age { attribute = 'Alpha' }",
+                              ramp1 = ":ramp { from = 'nage', to = 'Alpha', keys = {{0, 1}, {1, 0}} }",
+                              k = ":points('k', function(p) p.Alpha = p.nage end)" } do
+      expect(('node "%s": its points live for ever, so their age is no part of a life; give emit a life'):format(name),
+        warnings(chain:format("", node)))
+      assert.equal("", warnings(chain:format("life = 2,", node)))
+    end
+  end)
+
+  it("names what makes angular velocities by which nothing turns", function()
+    local chain = "return rapid.create {} :emit { source = POINTS, rate = 9, attributes = { w = {0, 1, 0} } } %s "
+      .. ":solve {}"
+    expect('node "emit1": makes w, by which nothing turns; add :tumble {}, or give :contact spin = true',
+      warnings(chain:format ""))
+    assert.equal("", warnings(chain:format ":tumble {}"))
+    assert.equal("", warnings(chain:format ":contact { radius = 0.01, spin = true }"))
+  end)
+
   it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()
     expect('node "emit1": its points are gone after the frame of their birth: no :solve comes after it',
       warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")

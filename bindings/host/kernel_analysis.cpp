@@ -60,6 +60,11 @@ void check_calls(lua_State* L, const Location& location)
 {
     const std::vector<std::string> methods = point_names_of(PointName::Method);
     for (const std::string& name : keys_of(L, "calls")) {
+        if (name == "neighbours")
+            throw Error(
+                "p has no method \"neighbours\", as a kernel sees one point; a :detail sees all of them: "
+                "points:neighbours(i, radius)")
+                .at({location.file, line_of(L, "calls", name)});
         const std::string near = did_you_mean(name, methods);
         const std::string remedy =
             fmt::format("; it has {} and {}", fmt::join(methods.begin(), methods.end() - 1, ", "), methods.back());

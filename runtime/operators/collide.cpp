@@ -8,6 +8,7 @@
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
+#include "runtime/shapes/mesh/open_mesh.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/solver/collision/hits.h"
@@ -39,6 +40,19 @@ struct ColliderShape {
     MotionPtr motion;
 };
 
+[[noreturn]] void refuse_mesh(const Param& param, const Value& value, const Mesh& mesh)
+{
+    const std::size_t open = mesh.openness().boundary_edges;
+    if (open == 0)
+        throw Error(
+            fmt::format("{} = {} has no inside to keep out of; take rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
+                        param.name, describe(value)));
+    throw Error(
+        fmt::format("{} = {} has no inside to keep out of, as it is open: {} of its edges have one face; {}, then take "
+                    "rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
+                    param.name, describe(value), open, how_to_close_a_mesh));
+}
+
 void read_value(const Param& param, const Value& value, ColliderShape& shape)
 {
     shape = {};
@@ -47,10 +61,10 @@ void read_value(const Param& param, const Value& value, ColliderShape& shape)
         shape = {animated->rest(), nullptr, animated->motion()};
     else if (const auto deforming = value.object<DeformingLevelSet>())
         shape.deforming = deforming;
-    else if (value.object<AnimatedMesh>() || value.object<Mesh>())
-        throw Error(
-            fmt::format("{} = {} has no inside to keep out of; take rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
-                        param.name, describe(value)));
+    else if (const auto moving = value.object<AnimatedMesh>())
+        refuse_mesh(param, value, *moving->rest());
+    else if (const auto mesh = value.object<Mesh>())
+        refuse_mesh(param, value, *mesh);
     else
         rapid::read_value(param, value, shape.rest);
 }

@@ -54,6 +54,22 @@ describe("a message", function()
     expect('no attribute "radius"; the radius of points is pscale', kernel_fault "p.v = p.v * p.radius")
   end)
 
+  it("says who sees the neighbours of a point", function()
+    expect('p has no method "neighbours", as a kernel sees one point; a :detail sees all of them: '
+      .. "points:neighbours(i, radius)", kernel_fault "for _, k in ipairs(p:neighbours(1)) do p.v = p.v * k end")
+  end)
+
+  it("closes an open ground before a level set is made of it", function()
+    local ground = "local g = rapid.mesh.grid { size = {2, 2} } return rapid.create { points = POINTS } "
+      .. ":collide { shape = %s } :solve {}"
+    local remedy = "close it: a ground, by a copy of its outer edge lower down, faces between the two, and a bottom"
+    expect("it is open: ", fault(ground:format "g"))
+    expect(remedy, fault(ground:format "g"))
+    expect(remedy, fault(ground:format "rapid.levelset.from_mesh(g, { voxel = 0.1 })"))
+    expect("has no inside to keep out of; take rapid.levelset.from_mesh", fault(
+      "return rapid.create { points = POINTS } :collide { shape = rapid.mesh.box {} } :solve {}"))
+  end)
+
   it("names frame.time where the frame stands for a number", function()
     local number = "the frame is no number; compute with what it has, by name: frame.time"
     local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function(frame) %s end } "

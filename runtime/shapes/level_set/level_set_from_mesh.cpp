@@ -8,6 +8,7 @@
 #include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/mesh_blocks.h"
+#include "runtime/shapes/mesh/open_mesh.h"
 
 namespace rapid {
 namespace {
@@ -100,8 +101,8 @@ LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& 
         if (!balanced)
             throw Error(
                 fmt::format("mesh \"{}\" encloses nothing with voxel = {:g} m: {} of its edges have one face, and "
-                            "outside reaches its inside through them; close it",
-                            mesh->name, options.voxel, open.boundary_edges));
+                            "outside reaches its inside through them; {}",
+                            mesh->name, options.voxel, open.boundary_edges, how_to_close_a_mesh));
         const Vec3f size = mesh->bounds().sizes();
         if (size.minCoeff() == 0)
             throw Error(

@@ -317,7 +317,8 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
                    level_set_from_mesh(make_grid(2, 2, 4, {0, 0.02, 0}), {0.1, 3}, w);
                }),
                Equals("mesh \"grid\" encloses nothing with voxel = 0.1 m: 16 of its edges have one face, and outside "
-                      "reaches its inside through them; close it"));
+                      "reaches its inside through them; close it: a ground, by a copy of its outer edge lower down, "
+                      "faces between the two, and a bottom"));
 }
 
 TEST_CASE("a wider band is the same surface with exact distances farther out", "[level set]")

@@ -27,7 +27,7 @@ NodeType Rasterize::declare()
         .param(&Rasterize::voxel, "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
         .constant()
         .param(&Rasterize::radius, "radius", Value(), above(0), "m",
-               "over which a point is spread, of at least a voxel; 1.5 voxels when not given")
+               "over which a point is spread, at least a voxel; 1.5 voxels when not given")
         .constant()
         .param(&Rasterize::weight, "weight", 1.0, at_least(0), "",
                "what a point counts: the sum of density times volume is that of the weights")
@@ -46,9 +46,6 @@ void Rasterize::check() const
             fmt::format("file = \"{}\": volumes are written as .vdb; give a pattern such as "
                         "\"smoke.####.vdb\"",
                         file));
-    if (radius && radius->attribute.empty() && radius->constant / voxel < 1)
-        throw Error(fmt::format("radius = {:g} is smaller than voxel = {:g}; it must be at least that",
-                                radius->constant, voxel));
     for (const std::string& name : attributes)
         if (name == "density") throw Error("attributes: \"density\" is the grid of the points themselves");
 }

@@ -108,6 +108,26 @@ found = { sum }]], 1)[1]
     assert.matches("its volumes are of all points", result.stderr, 1, true)
   end)
 
+  it("takes a voxel where a radius is below it", function()
+    local coarse = drift:gsub("voxel = 0.1", "voxel = 0.3"):gsub('radius = rapid.attr "pscale"', "radius = %%s")
+    local files = {}
+    for _, radius in ipairs { "0.3", "0.001", 'rapid.attr "pscale"', "0.31" } do
+      run(coarse:format(radius, ""), "-f 2")
+      files[#files + 1] = scene.folder:read "smoke.0002.vdb"
+    end
+    local function density(k)
+      scene.folder:write("read.vdb", files[k])
+      return found('local f = rapid.fog.read "read.vdb" found[1] = f:sample(vec3(0, 0, -0.3)) ' ..
+        "found[2] = f:sample(vec3(1.2, 0, 0.3))", 2)
+    end
+    local voxel, small, own, larger = density(1), density(2), density(3), density(4)
+    -- A radius of 0.3 in single precision is a little above the voxel.
+    for k = 1, 2 do assert.near(voxel[k], small[k], 1e-6 * voxel[k]) end
+    assert.equal(small[1], own[1]) -- of the point whose pscale is 0.25
+    assert.truthy(math.abs(small[2] - own[2]) > 1e-3 * small[2]) -- of that whose pscale is 0.4
+    assert.truthy(math.abs(small[1] - larger[1]) > 1e-3 * small[1])
+  end)
+
   it("says what is wrong", function()
     local function says(expected, more)
       local text = drift:gsub("smoke.####.vdb", more.file or "smoke.####.vdb"):format(more.add or "")
@@ -119,12 +139,8 @@ found = { sum }]], 1)[1]
     says("several frames go to one file", { file = "smoke.vdb" })
     says('attributes: "load" is float; a grid has the mean of a vec3', { add = ", attributes = { 'load' }" })
     says('"density" is the grid of the points themselves', { add = ", attributes = { 'density' }" })
-    says("point 0 has the radius 0.25 m; it must be at least a voxel", { add = "} :rasterize { file = 'b.####.vdb'," ..
-      " voxel = 0.3, radius = rapid.attr 'pscale'" })
-    says('scene.lua:3: node "rasterize2": point 0 has the radius 0.25 m', { add = "} :rasterize { " ..
-      "file = 'b.####.vdb', voxel = 0.3, radius = rapid.attr 'pscale'" })
-    says("radius = 0.2 is smaller than voxel = 0.3; it must be at least that", { add = "} :rasterize { " ..
-      "file = 'b.####.vdb', voxel = 0.3, radius = 0.2" })
+    says('scene.lua:3: node "rasterize2": point 0 has the radius 0 m; it must be above 0, and finite', { add =
+      "} :attribute { none = 0 } :rasterize { file = 'b.####.vdb', voxel = 0.3, radius = rapid.attr 'none'" })
     assert.matches("writes nothing", scene.command("check", [[
 local a = rapid.create { points = two }
 local b = a:rasterize { file = "x.####.vdb" } return a:solve {}]]).stderr, 1, true)

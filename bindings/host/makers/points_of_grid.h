@@ -28,7 +28,7 @@ struct PointsOfGrid {
         declaration
             .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
             .param(static_cast<std::optional<PerPoint<float>> T::*>(&T::radius), "radius", Value(), above(0), "m",
-                   "over which a point is spread, of at least a voxel; 1.5 voxels when not given")
+                   "over which a point is spread, at least a voxel; 1.5 voxels when not given")
             .param(static_cast<PerPoint<float> T::*>(&T::weight), "weight", 1.0, at_least(0), "",
                    "what a point counts: the sum of density times volume is that of the weights");
     }

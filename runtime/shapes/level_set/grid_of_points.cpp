@@ -38,8 +38,8 @@ public:
 
     std::size_t size() const { return points_.P.size(); }
     float weight(std::size_t i) const { return points_.weight[points_.weight.size() == 1 ? 0 : i]; }
-    // In voxels.
-    double radius(std::size_t i) const { return points_.radius[points_.radius.size() == 1 ? 0 : i] / points_.voxel; }
+    // In voxels. A smaller one might reach no centre of a voxel.
+    double radius(std::size_t i) const { return std::max(1.0, given_radius(i) / points_.voxel); }
     Vec3d place(std::size_t i) const { return points_.P[i].cast<double>() / points_.voxel; }
 
     void check(std::size_t i) const
@@ -50,9 +50,9 @@ public:
                 fmt::format("point {} is at ({}, {}, {}); a place must be finite, and within 2^30 voxels of the "
                             "origin",
                             i, points_.P[i].x(), points_.P[i].y(), points_.P[i].z()));
-        if (!(r >= 1) || !std::isfinite(r))
-            throw Error(fmt::format("point {} has the radius {:g} m; it must be at least a voxel, {:g} m", i,
-                                    r * points_.voxel, points_.voxel));
+        if (!(given_radius(i) > 0) || !std::isfinite(r))
+            throw Error(
+                fmt::format("point {} has the radius {:g} m; it must be above 0, and finite", i, given_radius(i)));
         if (!(weight(i) >= 0) || !std::isfinite(weight(i)))
             throw Error(fmt::format("point {} has the weight {:g}; it must be at least 0, and finite", i, weight(i)));
     }
@@ -85,6 +85,8 @@ public:
     }
 
 private:
+    double given_radius(std::size_t i) const { return points_.radius[points_.radius.size() == 1 ? 0 : i]; }
+
     const SpreadPoints& points_;
 };
 

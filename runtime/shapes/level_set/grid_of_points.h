@@ -19,7 +19,7 @@ namespace rapid {
 
 struct SpreadPoints {
     std::span<const Vec3f> P;        // m, finite
-    std::span<const float> radius;   // m, of at least a voxel; one for all, or shape [P]
+    std::span<const float> radius;   // m, above 0, of which at least a voxel is taken; one for all, or shape [P]
     std::span<const float> weight;   // at least 0; likewise
     std::span<const Vec3f> vectors;  // shape [P]; empty for a density
     double voxel;                    // m

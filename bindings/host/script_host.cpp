@@ -72,6 +72,11 @@ void ScriptHost::run_graph()
         lua_pop(main_->lua(), 1);  // a study of which only the description is wanted: it made no scene
     else
         collect_outputs(*main_);
+    // A function that makes several chains gives the kernels of each one name.
+    graph = with_names_apart(graph, [](const Node& node) {
+        const Param* kernel = node.type->find("kernel");
+        return kernel && !kernel->internal;
+    });
     apply_arguments();
 
     const Watchdog::Section section(watchdog, fmt::format("{}: reading the kernels' bytecode", graph.file));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
@@ -32,6 +33,27 @@ const Node& find_node(const Graph& graph, const std::string& path, const std::st
     throw Error(fmt::format("{}: the graph has no node \"{}\"{}", path, wanted, did_you_mean(wanted, names)));
 }
 
+// The graph with copies of its nodes, which are the inputs and sources of one another. change(copy, node).
+template <class F>
+Graph copied(const Graph& graph, const F& change)
+{
+    Graph result;
+    result.file = graph.file;
+    std::map<const Node*, NodePtr> copies;
+    for (const NodePtr& node : graph.nodes) {  // inputs and sources come before their consumers
+        const std::shared_ptr<Node> copy = make_node(*node);
+        for (NodePtr& input : copy->inputs) input = copies.at(input.get());
+        for (std::pair<const std::string, Value>& argument : copy->arguments)
+            if (const auto source = argument.second.object<NodeHandle>())
+                argument.second = Value(std::make_shared<NodeHandle>(copies.at(source->node.get())));
+        change(*copy, *node);
+        copies[node.get()] = copy;
+        result.nodes.push_back(std::move(copy));
+    }
+    for (const auto& [name, node] : graph.outputs) result.outputs[name] = copies.at(node.get());
+    return result;
+}
+
 }  // namespace
 
 Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& values)
@@ -48,22 +70,39 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
         changes[&node][param] = value;
     }
 
-    Graph result;
-    result.file = graph.file;
-    std::map<const Node*, NodePtr> replaced;
-    for (const NodePtr& node : graph.nodes) {  // inputs and sources come before their consumers
-        auto copy = make_node(*node);
-        for (NodePtr& input : copy->inputs) input = replaced.at(input.get());
-        for (auto& [name, argument] : copy->arguments)
-            if (const auto source = argument.object<NodeHandle>())
-                argument = Value(std::make_shared<NodeHandle>(replaced.at(source->node.get())));
-        if (const auto found = changes.find(node.get()); found != changes.end())
-            for (const auto& [name, value] : found->second) copy->arguments[name] = value;
-        replaced[node.get()] = copy;
-        result.nodes.push_back(std::move(copy));
+    return copied(graph, [&](Node& copy, const Node& node) {
+        if (const auto found = changes.find(&node); found != changes.end())
+            for (const auto& [name, value] : found->second) copy.arguments[name] = value;
+    });
+}
+
+Graph with_names_apart(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed)
+{
+    std::set<const Node*> reached;
+    std::vector<const Node*> open;
+    for (const auto& [name, node] : graph.outputs) open.push_back(node.get());
+    while (!open.empty()) {
+        const Node* node = open.back();
+        open.pop_back();
+        if (!reached.insert(node).second) continue;
+        for (const NodePtr& input : node->inputs) open.push_back(input.get());
+        for (const auto& [name, argument] : node->arguments)
+            if (const auto source = argument.object<NodeHandle>()) open.push_back(source->node.get());
     }
-    for (const auto& [name, node] : graph.outputs) result.outputs[name] = replaced.at(node.get());
-    return result;
+
+    std::set<std::string> names, used;
+    for (const NodePtr& node : graph.nodes) names.insert(node->name);
+    std::map<const Node*, std::string> renamed;
+    for (const NodePtr& node : graph.nodes) {
+        if (!reached.count(node.get()) || used.insert(node->name).second || !may_be_renamed(*node)) continue;
+        int number = 2;
+        while (!names.insert(fmt::format("{}{}", node->name, number)).second) ++number;
+        renamed[node.get()] = fmt::format("{}{}", node->name, number);
+    }
+    if (renamed.empty()) return graph;
+    return copied(graph, [&](Node& copy, const Node& node) {
+        if (const auto found = renamed.find(&node); found != renamed.end()) copy.name = found->second;
+    });
 }
 
 }  // namespace rapid

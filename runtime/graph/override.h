@@ -1,6 +1,7 @@
-// A graph with some arguments replaced, as `--sweep solve.substeps=1,2,4` does.
+// Graphs with other arguments, as `--sweep solve.substeps=1,2,4` asks for, or with other names.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
@@ -13,5 +14,9 @@ namespace rapid {
 // the node no such parameter (with the nearest name), if several nodes are of the type, or if there is no dot. The plan
 // checks the values.
 Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& values);
+
+// Gives nodes for which `may_be_renamed` is true, and whose name an earlier node has that an output reaches, too, the
+// name with the next free number: k, k2, k3.
+Graph with_names_apart(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed);
 
 }  // namespace rapid

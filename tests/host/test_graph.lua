@@ -94,8 +94,34 @@ describe("a node", function()
   it("shares its name with no other", function()
     assert.equal('scene.lua:3: node "wind": the name is taken by the node at line 2; give each its own', scene.error [[
 return rapid.create { points = two }
-  :points("wind", function(p) p.v = p.v * 0.5 end)
-  :points("wind", function(p) p.v = p.v * 0.5 end)]])
+  :wind { name = "wind" }
+  :wind { name = "wind" } :solve {}]])
+  end)
+
+  it("has a number after its name if it is a kernel whose name is taken", function()
+    local text = [[
+local function chain(x, add)
+  return rapid.create { points = rapid.points.from { P = {{x, 0, 0}} } } :attribute { heat = 0 }
+    :points("heat", function(p) p.heat = p.heat + add + p:rand(1) end) :solve {}
+end
+return { a = chain(0, 10), b = chain(1, 20), c = chain(2, 30) }]]
+    local result = scene.run(text, { frames = {2, 2} })
+    local rand = {}
+    for name, add in pairs { a = 10, b = 20, c = 30 } do rand[name] = result:output(name)[2][1].heat - add end
+    assert.truthy(rand.a > 0 and rand.a < 1 and rand.a ~= rand.b and rand.b ~= rand.c) -- keyed by the node's name
+    local only = scene.run(text, { frames = {2, 2}, set = { ["heat2.group"] = "" } })
+    assert.equal(result:output "b"[2][1].heat, only:output "b"[2][1].heat)
+    assert.truthy(scene.error(text, { set = { ["heat4.group"] = "" } }):find('no node "heat4"', 1, true))
+  end)
+
+  it("keeps the name of a kernel if the other one of that name leads to no output", function()
+    local text = [[
+local c = rapid.create { points = two } :attribute { heat = 0 }
+local a = c:points("heat", function(p) p.heat = 1 end) :solve {}
+local b = c:points("heat", function(p) p.heat = p:rand(1) end) :solve {}
+return %s]]
+    local alone = scene.run(text:gsub("local a[^\n]*", ""):format "b", { frames = {2, 2} })
+    assert.same_points(alone[2], scene.run(text:format "b", { frames = {2, 2} })[2])
   end)
 
   it("takes a table of named parameters alone", function()

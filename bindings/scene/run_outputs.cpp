@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
+#include "bindings/host/kernel.h"
 #include "bindings/run/races.h"
 #include "bindings/scene/scene_impl.h"
 #include "runtime/io/format.h"
@@ -184,17 +187,42 @@ Result<std::string> check_outputs(Scene& scene, const FileOutputs& files)
     });
 }
 
+namespace {
+
+// Whether a kernel, which sees one point, has raised it: so it would in the run. A function of all points may fail for
+// want of points, and what runs into a limit may do so in the trial alone.
+bool is_of_kernel(const Plan& plan, const Error& error)
+{
+    if (error.message().find("memory") != std::string::npos) return false;
+    return std::any_of(plan.nodes.begin(), plan.nodes.end(), [&](const PlannedNode& planned) {
+        const auto& arguments = planned.node->arguments;
+        return planned.node->name == error.node() &&
+               std::any_of(arguments.begin(), arguments.end(), [](const auto& argument) {
+                   const auto kernel = argument.second.template object<Kernel>();
+                   return kernel && !kernel->source.of_the_set;
+               });
+    });
+}
+
+}  // namespace
+
 Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
         std::string text;
+        std::optional<Error> raised;
         try {
             const SceneInside::Impl::Running running(impl);
             const OutputPlan output(impl, files, plan_options(impl, files));
             impl.beside([&] {
-                const FrameFigures found = Evaluator(output.plan).examine();
-                text = advice(found.stiff) + text_of(found.resolution);
+                try {
+                    const FrameFigures found = Evaluator(output.plan).examine();
+                    text = advice(found.stiff) + text_of(found.resolution);
+                } catch (const Error& error) {
+                    if (impl.is_late || !is_of_kernel(output.plan, error)) throw;
+                    raised = error;
+                }
             });
         } catch (const Error& error) {
             if (error.message().find(Cancellation::text) != std::string::npos) throw;
@@ -202,6 +230,7 @@ Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
             if (!impl.evaluator) impl.start_again();  // without what a limit has stopped
             impl.cancellation.forget();               // of a limit of memory
         }
+        if (raised) throw *raised;
         return text;
     });
 }

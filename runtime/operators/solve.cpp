@@ -108,6 +108,7 @@ struct Solve {
         note_stiffness(flow, options, now);
         if (flow.simulation->trial) {
             now.figures.resolution = coarser(now.figures.resolution, resolution_of(flow.points, options.h));
+            try_actions(flow, options);
             flow.simulation->state = flow.points;
             return flow;
         }
@@ -328,6 +329,20 @@ private:
                                 collider->location.file, collider->location.line, collider->node));
                 return;
             }
+    }
+
+    // In a trial: actions, which are scripts, may fail.
+    static void try_actions(const Flow& flow, const SolveOptions& options)
+    {
+        if (flow.dynamics.actions().empty()) return;
+        Dynamics actions;
+        for (const auto& action : flow.dynamics.actions()) actions.add(action);
+        SolveOptions once;
+        once.time = options.time;
+        once.h = options.h;
+        once.frame = options.frame;
+        PointSet points = flow.points;
+        solve(points, actions, once);
     }
 
     // beyond: points, by the check of the tolerance.

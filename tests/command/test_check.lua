@@ -40,13 +40,33 @@ describe("rapid check", function()
     assert.equal(0, check(scene, "-o a.####.csv:age").status)
   end)
 
-  it("fails by no kernel: what is wrong in a frame is for the run to tell", function()
-    local result = check [[
+  it("finds what kernels do wrong with a few points of the first frame", function()
+    local chain = [[
 local rapid = require "rapid"
-return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
-  :points("fails", function(p) error "run" end) :solve {}
+local x = 1
+return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
+  :emit { source = rapid.mesh.sphere {}, rate = 1e6, %s }
+  :points("k", function(p) %s end)
+  :action("a", function(p) %s end)
+  :group { name = "g", where = function(p) %s end }
+  :detail("d", function(points) %s end)
+  :solve {}
 ]]
-    assert.equal(0, result.status, result.stderr)
+    local right = { "", "", "", "return p.id > 3", "" }
+    local function with(k, text)
+      local parts = { unpack(right) }
+      parts[k] = text
+      return check(chain:format(unpack(parts)))
+    end
+    assert.equal(0, with(2, "p.v = p.v * x").status)
+    for k, wrong in ipairs { "birth = function(p) p.v = p.P.x.y end", "p.v = p.v + x", "p.v = p.id",
+                                "return p.id + p.P > 3" } do
+      local result = with(k, wrong)
+      assert.not_equal(0, result.status, wrong)
+      assert.truthy(result.stderr:find(("^scene.lua:%d: node"):format(3 + k)), result.stderr)
+    end
+    -- It may want more points than there are here.
+    assert.equal(0, with(5, "points[5000].P = vec3(0, 0, 0)").status)
   end)
 
   it("warns of what is doubtful, and goes on", function()

@@ -421,6 +421,11 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
 
 
 class Interrupts(unittest.TestCase):
+    def setUp(self):
+        # A process that a shell starts in the background ignores Ctrl-C, and so would Python.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
+
     def press(self, *_):
         os.kill(os.getpid(), signal.SIGINT)
 

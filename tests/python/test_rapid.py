@@ -431,10 +431,12 @@ class Interrupts(unittest.TestCase):
 
     def test_ctrl_c_between_frames_ends_the_call(self):
         scene = fall(progress=lambda frame, last: frame != 3 or self.press() or True)
-        with self.assertRaises(KeyboardInterrupt):
-            scene.advance_to(10**6)
-        scene.restart()
-        self.assertEqual(scene.advance_to(2).number, 2)
+        for _ in range(100):  # nor does it end the next call, however late the watching thread wakes
+            with self.assertRaises(KeyboardInterrupt):
+                scene.advance_to(10**6)
+            scene.restart()
+            self.assertEqual(scene.advance_to(2).number, 2)
+            scene.restart()
 
     def test_ctrl_c_ends_a_frame_that_would_not_end(self):
         text = """local rapid = require "rapid"

@@ -23,12 +23,20 @@ class _Watcher:
 
     def _wait(self):
         while True:
-            numbers = self._read.recv(256)
+            self._read.recv(1, socket.MSG_PEEK)
             with self._lock:
-                if self._before != -1:
-                    os.write(self._before, numbers)
-                if signal.SIGINT in numbers and self._cancel:
+                if signal.SIGINT in self._take() and self._cancel:
                     self._cancel()
+
+    def _take(self):
+        """The numbers of the signals that came, which the descriptor of the program gets as well. The lock is held."""
+        try:
+            numbers = self._read.recv(256, socket.MSG_DONTWAIT)
+        except BlockingIOError:  # the call that they came in took them when it ended
+            return b""
+        if self._before != -1:
+            os.write(self._before, numbers)
+        return numbers
 
     @contextlib.contextmanager
     def cancelling(self, cancel):
@@ -40,6 +48,7 @@ class _Watcher:
         finally:
             with self._lock:
                 signal.set_wakeup_fd(self._before)
+                self._take()  # a signal of this call must not cancel the next one
                 self._cancel, self._before = None, -1
 
 

@@ -341,7 +341,7 @@ function rapid.curve.read(path, options) end
 
 ---@class rapid.options.fog_from_points
 ---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
----@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field radius? number|rapid.Attribute  over which a point is spread, at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 
 ---The density of points: their weights by volume.
@@ -375,7 +375,7 @@ function rapid.grid.from(options) end
 
 ---@class rapid.options.grid_from_points
 ---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
----@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field radius? number|rapid.Attribute  over which a point is spread, at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 ---@field attribute? string  a vec3 [string, default "v"]
 
@@ -1184,7 +1184,7 @@ function Node:randomize(params) end
 ---@field group? string|fun(frame: rapid.Frame): string  acts on this group only [string]
 ---@field file string  pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute [string, required]
 ---@field voxel? number  edge of a voxel [number, m, at least 2e-05, default 0.1]
----@field radius? number|rapid.Attribute  over which a point is spread, of at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
+---@field radius? number|rapid.Attribute  over which a point is spread, at least a voxel; 1.5 voxels when not given [number, m, above 0, takes rapid.attr]
 ---@field weight? number|rapid.Attribute  what a point counts: the sum of density times volume is that of the weights [number, at least 0, default 1, takes rapid.attr]
 ---@field attributes? string|string[]  vectors of which a grid has the mean of the points around, by their weights; {"v"} when not given [names]
 ---@field name? string  what the node is called in messages [string]

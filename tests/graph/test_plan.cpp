@@ -82,7 +82,9 @@ TEST_CASE("nodes that no output comes from are left out of the plan", "[plan]")
 
     CHECK(names_of(plan) == std::vector<std::string>{"source1", "kept", "post1"});
     CHECK(plan.simulations.size() == 1);
-    CHECK(plan.warnings.empty());
+    REQUIRE(plan.warnings.size() == 2);
+    CHECK_THAT(plan.warnings[0], Catch::Contains("node \"beside\": leads to no output"));
+    CHECK_THAT(plan.warnings[1], Catch::Contains("node \"behind\": leads to no output"));
 }
 
 TEST_CASE("wrong arguments of a node that is left out are no error", "[plan]")

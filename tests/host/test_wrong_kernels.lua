@@ -23,7 +23,7 @@ local before_the_first_frame = {
 -- Found by the plan.
 local by_the_plan = {
   ["p.haet = 1"] = 'no attribute "haet"; did you mean "heat"? (or add :attribute{ haet = 0 } before it)',
-  ["p.v = p.velocity"] = 'no attribute "velocity"; add :attribute{ velocity = 0 } before it',
+  ["p.v = p.velocity"] = 'no attribute "velocity"; the velocity of points is v',
 }
 
 -- Found at a point.

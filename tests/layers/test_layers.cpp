@@ -67,9 +67,10 @@ const std::map<std::string, std::set<std::string>> below = {
 // What files of the command include of the runtime besides the promised headers: small tools that know nothing of
 // points and scenes. All of runtime/files is of this kind.
 const std::set<std::string> small_tools = {
-    "runtime/cancellation.h",       "runtime/checked_json.h",    "runtime/error.h",     "runtime/first_error.h",
-    "runtime/memory_budget.h",      "runtime/memory_watch.h",    "runtime/path_list.h", "runtime/printable.h",
-    "runtime/picture/tone.h", "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/stopwatch.h", "runtime/threads.h"};
+    "runtime/cancellation.h",  "runtime/checked_json.h",       "runtime/error.h",           "runtime/first_error.h",
+    "runtime/memory_budget.h", "runtime/memory_watch.h",       "runtime/path_list.h",       "runtime/printable.h",
+    "runtime/picture/tone.h",  "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/stopwatch.h",
+    "runtime/threads.h"};
 
 // A folder of a program that `rapid` becomes.
 bool is_program(const std::string& folder) { return fs::exists(fs::path(RAPID_SOURCE_DIR) / folder / "program.txt"); }

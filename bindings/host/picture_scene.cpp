@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "runtime/graph/param.h"
+#include "runtime/graph/points_object.h"
 #include "runtime/operators/picture.h"
+#include "runtime/shapes/mesh/ray_crossings.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 
@@ -46,24 +49,39 @@ bool has_functions(const Node& node)
                        [](const auto& argument) { return argument.second.function() != nullptr; });
 }
 
-// fps: of the points, whose frame may have several steps.
-void add_look(PictureScene& scene, const PictureNode& picture, const Frame& now, double fps)
+bool gives(const Node& node, const char* param)
 {
-    scene.styles.push_back({picture.group, picture.blend == "add", picture.shutter / fps});
-    if (const CameraPtr camera = picture.camera.at(now.number))
-        scene.camera = {camera->position, camera->target, camera->fov, camera->group};
+    const auto given = node.arguments.find(param);
+    return given != node.arguments.end() && !given->second.is_nil();
+}
+
+// Whether the mesh encloses all of a sample of these points.
+bool encloses(const RayCrossings& mesh, std::span<const Vec3f> P)
+{
+    constexpr std::size_t sample_size = 63;
+    const std::size_t step = std::max<std::size_t>(1, P.size() / sample_size);
+    for (std::size_t i = 0; i < P.size(); i += step)
+        if (mesh.from(P[i].cast<double>()).faces % 2 == 0) return false;
+    return !P.empty();
+}
+
+PictureScene::Body::Role body_role_of(const PlannedNode& planned)
+{
+    // Shapes of dynamics are colliders; those of all other nodes emit points.
+    return planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
 }
 
 }  // namespace
 
-void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place,
-                      PictureScene::Body::Role role)
+void SceneOfPlan::add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& place, const Argument& given_by)
 {
     const bool moved = !place.matrix().isIdentity(0);
-    if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) {
-        scene.bodies.push_back({moved ? transformed(mesh, place) : mesh, role});
-        return;
-    }
+    const PictureScene::Body::Role role = body_role_of(plan_.nodes[given_by.first]);
+    const auto add_body = [&](const MeshPtr& mesh) {
+        to.scene->bodies.push_back({moved ? transformed(mesh, place) : mesh, role});
+        to.given_by.push_back(given_by);
+    };
+    if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) return add_body(mesh);
     const auto shape = std::dynamic_pointer_cast<const Shape>(object);
     if (!shape) return;
     const auto [entry, fresh] = surfaces_.try_emplace(object);
@@ -72,12 +90,12 @@ void SceneOfPlan::add(PictureScene& scene, const ObjectPtr& object, const Eigen:
         entry->second = before != surfaces_before_.end() ? before->second : shape->surface();
     }
     if (entry->second) {
-        scene.bodies.push_back({moved ? transformed(entry->second, place) : entry->second, role});
+        add_body(entry->second);
     } else if (std::optional<PictureScene::Plane> plane = plane_of(*shape)) {
         const Vec3d on = place * (plane->offset * plane->normal);
         plane->normal = (place.linear() * plane->normal).normalized();
         plane->offset = plane->normal.dot(on);
-        scene.planes.push_back(*plane);
+        to.scene->planes.push_back(*plane);
     }
 }
 
@@ -93,65 +111,114 @@ bool SceneOfPlan::may_have_colliders() const
     });
 }
 
+// Colliders that enclose a source of points, or initial points, where the scene begins: so they look the same in all
+// frames, whichever of them are drawn.
+std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
+{
+    std::set<Argument> vessels;
+    const Described first = describe(plan_.first_frame());
+    std::vector<std::span<const Vec3f>> sources;
+    for (const PictureScene::Body& body : first.scene->bodies)
+        if (body.role == PictureScene::Body::Emitter) sources.emplace_back(body.mesh->positions);
+    std::vector<std::vector<Vec3f>> places;  // of points, which may have one value for all
+    for (const PlannedNode& planned : plan_.nodes)
+        for (const auto& [name, value] : planned.node->arguments)
+            if (const auto given = value.object<PointsObject>();
+                given && body_role_of(planned) == PictureScene::Body::Emitter) {
+                std::vector<Vec3f>& P = places.emplace_back(given->points.size());
+                for (std::size_t i = 0; i < P.size(); ++i) P[i] = given->points.P()[i];
+            }
+    sources.insert(sources.end(), places.begin(), places.end());
+    for (std::size_t b = 0; b < first.given_by.size() && !sources.empty(); ++b) {
+        if (first.scene->bodies[b].role != PictureScene::Body::Collider) continue;
+        const RayCrossings mesh(first.scene->bodies[b].mesh);
+        if (std::any_of(sources.begin(), sources.end(), [&](const auto& P) { return encloses(mesh, P); }))
+            vessels.insert(first.given_by[b]);
+    }
+    return vessels;
+}
+
 std::shared_ptr<const PictureScene> SceneOfPlan::at(std::int64_t frame)
 {
     if (still_) return still_;
+    if (!vessels_) vessels_ = find_vessels();
+    Described described = describe(frame);
+    std::vector<PictureScene::Body> shown;
+    for (std::size_t b = 0; b < described.given_by.size(); ++b) {
+        PictureScene::Body& body = described.scene->bodies[b];
+        const bool collides = body.role == PictureScene::Body::Collider;
+        body.is_vessel = collides && vessels_->count(described.given_by[b]) > 0;
+        if (collides ? described.colliders : described.emitters) shown.push_back(std::move(body));
+    }
+    described.scene->bodies = std::move(shown);
+    if (!described.colliders) described.scene->planes.clear();
+    if (!described.moves) still_ = described.scene;
+    return described.scene;
+}
+
+SceneOfPlan::Described SceneOfPlan::describe(std::int64_t frame)
+{
     surfaces_before_ = std::exchange(surfaces_, {});
-    auto scene = std::make_shared<PictureScene>();
-    bool moves = false, emitters = true, colliders = true;
-    for (const PlannedNode& planned : plan_.nodes) {
-        // Shapes of dynamics are colliders; those of all other nodes emit points.
-        const auto role =
-            planned.node->type->kind == NodeKind::Dynamic ? PictureScene::Body::Collider : PictureScene::Body::Emitter;
-        const PlannedSimulation& simulation = plan_.simulations[planned.simulation];
+    Described result;
+    result.scene = std::make_shared<PictureScene>();
+    for (std::size_t n = 0; n < plan_.nodes.size(); ++n) {
+        const Node& node = *plan_.nodes[n].node;
+        const PlannedSimulation& simulation = plan_.simulations[plan_.nodes[n].simulation];
         const FrameClock clock{simulation.fps, simulation.start, simulation.subframes};
         const Frame now = clock.at(static_cast<double>(frame));
-        if (planned.node->type->name == "picture") {
-            const PictureNode picture = picture_at(*planned.node, now);
-            add_look(*scene, picture, now, simulation.fps);
-            emitters = emitters && picture.emitters;
-            colliders = colliders && picture.colliders;
-            scene->grid = scene->grid && picture.grid;
-            moves = moves || picture.camera.keys.size() > 1 || has_functions(*planned.node);
+        if (node.type->name == "picture") {
+            add_look(result, node, now, simulation.fps);
             continue;
         }
         Eigen::Affine3d place = Eigen::Affine3d::Identity();
-        if (const auto transform = planned.node->arguments.find("transform");
-            transform != planned.node->arguments.end()) {
+        if (const auto transform = node.arguments.find("transform"); transform != node.arguments.end()) {
             MotionPtr motion;
-            read_value(*planned.node->type->find("transform"), transform->second, motion);
+            read_value(*node.type->find("transform"), transform->second, motion);
             if (motion) place = motion->at(now).affine();
-            moves = moves || (motion && motion->varies());
+            result.moves = result.moves || (motion && motion->varies());
         }
-        for (const auto& [name, value] : planned.node->arguments) {
+        for (const auto& [name, value] : node.arguments) {
             if (name == "transform") continue;
             const FrameFunction* function = value.function();
             const Value given = function ? function->call(now) : value;
-            moves = moves || function;
+            result.moves = result.moves || function;
+            const Argument argument{n, name};
             if (const auto body = given.object<AnimatedMesh>()) {
-                moves = true;
-                add(*scene, body->at(clock, frame), place, role);
+                result.moves = true;
+                add(result, body->at(clock, frame), place, argument);
             } else if (const auto shape = given.object<AnimatedShape>()) {
-                moves = true;
-                add(*scene, shape->rest(), place * shape->motion()->at(now).affine(), role);
+                result.moves = true;
+                add(result, shape->rest(), place * shape->motion()->at(now).affine(), argument);
             } else if (const auto deforming = given.object<DeformingLevelSet>()) {
-                moves = true;
-                add(*scene, deforming->mesh().at(clock, frame), place, role);
+                result.moves = true;
+                add(result, deforming->mesh().at(clock, frame), place, argument);
             } else if (const auto sequence = given.object<LevelSetSequence>()) {
-                moves = true;
+                result.moves = true;
                 const auto number = static_cast<double>(frame);
-                add(*scene, sequence->over({clock.fps, clock.start}, number, number), place, role);
+                add(result, sequence->over({clock.fps, clock.start}, number, number), place, argument);
             } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
-                add(*scene, *object, place, role);
+                add(result, *object, place, argument);
             }
         }
     }
-    std::erase_if(scene->bodies, [&](const PictureScene::Body& body) {
-        return !(body.role == PictureScene::Body::Emitter ? emitters : colliders);
-    });
-    if (!colliders) scene->planes.clear();
-    if (!moves) still_ = scene;
-    return scene;
+    return result;
+}
+
+// What a `:picture` names takes the place of what those before it say. fps: of the points, whose frame may have several
+// steps.
+void SceneOfPlan::add_look(Described& to, const Node& node, const Frame& now, double fps)
+{
+    const PictureNode picture = picture_at(node, now);
+    PointStyle style{.group = picture.group};
+    if (gives(node, "blend")) style.additive = picture.blend == "add";
+    if (gives(node, "shutter")) style.shutter = picture.shutter / fps;
+    if (style.additive || style.shutter) to.scene->styles.push_back(style);
+    if (const CameraPtr camera = picture.camera.at(now.number))
+        to.scene->camera = {camera->position, camera->target, camera->fov, camera->group};
+    if (gives(node, "emitters")) to.emitters = picture.emitters;
+    if (gives(node, "colliders")) to.colliders = picture.colliders;
+    if (gives(node, "grid")) to.scene->grid = picture.grid;
+    to.moves = to.moves || picture.camera.keys.size() > 1 || has_functions(node);
 }
 
 }  // namespace rapid

@@ -3,6 +3,11 @@
 
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/graph/plan.h"
 #include "runtime/picture/scene.h"
@@ -20,11 +25,22 @@ public:
     bool may_have_colliders() const;
 
 private:
-    void add(PictureScene& scene, const ObjectPtr& object, const Eigen::Affine3d& place, PictureScene::Body::Role role);
+    using Argument = std::pair<std::size_t, std::string>;  // the place of a node in the plan, and a parameter
+    // All shapes of a frame, shown or not.
+    struct Described {
+        std::shared_ptr<PictureScene> scene;
+        std::vector<Argument> given_by;  // of each body
+        bool moves = false, emitters = true, colliders = true;
+    };
+    Described describe(std::int64_t frame);
+    std::set<Argument> find_vessels();
+    static void add_look(Described& to, const Node& node, const Frame& now, double fps);
+    void add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& place, const Argument& given_by);
 
     const Plan& plan_;
     std::map<ObjectPtr, MeshPtr> surfaces_, surfaces_before_;  // of this frame, and of the one before
     std::shared_ptr<const PictureScene> still_;                // if nothing moves
+    std::optional<std::set<Argument>> vessels_;
 };
 
 }  // namespace rapid

@@ -28,11 +28,12 @@ struct KeptScene {
         std::vector<Vec3f> positions;
         std::vector<Mesh::Triangle> triangles;
         std::int32_t role = 0;
+        bool is_vessel = false;
 
         template <class Archive>
         void serialize(Archive& keep)
         {
-            keep(positions, triangles, role);
+            keep(positions, triangles, role, is_vessel);
         }
     };
     std::vector<Body> bodies;
@@ -43,7 +44,7 @@ struct KeptScene {
     {
         rest.bodies.clear();
         for (const PictureScene::Body& body : scene.bodies)
-            bodies.push_back({body.mesh->positions, body.mesh->triangles, body.role});
+            bodies.push_back({body.mesh->positions, body.mesh->triangles, body.role, body.is_vessel});
     }
 
     std::shared_ptr<const PictureScene> scene() &&
@@ -55,8 +56,9 @@ struct KeptScene {
             const auto corners = static_cast<std::int32_t>(mesh->positions.size());
             for (const Mesh::Triangle& triangle : mesh->triangles)
                 if (triangle.minCoeff() < 0 || triangle.maxCoeff() >= corners) StateReader::fail();
-            rest.bodies.push_back({mesh, body.role == PictureScene::Body::Emitter ? PictureScene::Body::Emitter
-                                                                                  : PictureScene::Body::Collider});
+            const bool emits = body.role == PictureScene::Body::Emitter;
+            rest.bodies.push_back(
+                {mesh, emits ? PictureScene::Body::Emitter : PictureScene::Body::Collider, body.is_vessel});
         }
         return std::make_shared<PictureScene>(std::move(rest));
     }

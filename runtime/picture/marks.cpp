@@ -48,24 +48,38 @@ const std::vector<Vec3f>& speed_colours()
     return colours;
 }
 
-// The style of each point: an index into `styles`, the first of which is the usual one; empty: all have that.
-std::vector<std::uint8_t> styles_of(const PointSet& points, const PictureScene& scene)
-{
-    if (scene.styles.empty()) return {};
-    std::vector<std::uint8_t> result(points.size(), 0);
-    for (std::size_t k = 0; k < scene.styles.size(); ++k) {
-        const Strided<std::uint8_t> members = members_of(points, scene.styles[k].group);
-        for (std::size_t i = 0; i < result.size(); ++i)
-            if (members[i]) result[i] = static_cast<std::uint8_t>(k + 1);
+// What the styles of a scene come to for each point.
+class PointStyles {
+public:
+    PointStyles(const PointSet& points, const PictureScene& scene) : styles_(scene.styles)
+    {
+        for (std::size_t k = 0; k < styles_.size(); ++k) {
+            const Strided<std::uint8_t> members = members_of(points, styles_[k].group);
+            const auto apply_to = [&](std::vector<std::uint8_t>& of_points) {
+                of_points.resize(points.size(), 0);
+                for (std::size_t i = 0; i < of_points.size(); ++i)
+                    if (members[i]) of_points[i] = static_cast<std::uint8_t>(k + 1);
+            };
+            if (styles_[k].additive) apply_to(additive_);
+            if (styles_[k].shutter) apply_to(shutter_);
+        }
     }
-    return result;
-}
 
-const PointStyle& style(const PictureScene& scene, std::uint8_t index)
-{
-    static const PointStyle usual;
-    return index == 0 ? usual : scene.styles[index - 1];
-}
+    bool is_additive(std::size_t i) const
+    {
+        return !additive_.empty() && additive_[i] != 0 && *styles_[additive_[i] - 1].additive;
+    }
+    // s
+    double shutter(std::size_t i) const
+    {
+        return shutter_.empty() || shutter_[i] == 0 ? 0 : *styles_[shutter_[i] - 1].shutter;
+    }
+
+private:
+    const std::vector<PointStyle>& styles_;
+    // The style that counts for each point, by its place in styles_ from 1; 0: none. Empty: none for all points.
+    std::vector<std::uint8_t> additive_, shutter_;
+};
 
 // How much brighter than white a colour is, up to 1.
 float glow(const Vec3f& colour) { return std::clamp(colour.maxCoeff() - 1, 0.0f, 1.0f); }
@@ -79,13 +93,12 @@ float opacity_of(const Column<float>* Alpha, std::size_t i)
 
 // How points look in this picture.
 struct PointLook {
-    const PictureScene& scene;
     const PictureView& view;
     const Light& light;
     const TileGrid& tiles;
     Lens lens;
     float far;  // m, the depth at which colours have faded halfway to the background
-    std::vector<std::uint8_t> styles;
+    PointStyles styles;
     const Strided<Vec3f> P, v;
     const Column<Vec3f>* Cd;
     const Column<float>*Alpha, *pscale, *age;
@@ -93,13 +106,12 @@ struct PointLook {
 
     PointLook(const PointSet& drawn, const TileGrid& grid, const PictureScene& in, const PictureView& from,
               const Light& lit)
-        : scene(in),
-          view(from),
+        : view(from),
           light(lit),
           tiles(grid),
           lens(Lens::of_camera(from.camera, grid.width, grid.height)),
           far(static_cast<float>((from.camera.target - from.camera.position).norm())),
-          styles(styles_of(drawn, in)),
+          styles(drawn, in),
           P(drawn.P().read()),
           v(drawn.v().read()),
           Cd(drawn.find<Vec3f>("Cd")),
@@ -156,10 +168,9 @@ struct PointLook {
     }
 
     // The way back to where the point was when the shutter opened, or was born after.
-    void expose(std::size_t i, const PointStyle& how, Mark& m) const
+    void expose(std::size_t i, float shutter, Mark& m) const
     {
-        const float open = std::min(static_cast<float>(how.shutter),
-                                    age ? std::max(0.0f, (*age)[i]) : static_cast<float>(how.shutter));
+        const float open = std::min(shutter, age ? std::max(0.0f, (*age)[i]) : shutter);
         const Vec3f before = lens.project(P[i] - open * v[i]);
         if (!before.allFinite() || before.z() < 1e-3f * far) return;
         const float dx = before.x() - m.x, dy = before.y() - m.y, length = std::hypot(dx, dy);
@@ -183,11 +194,10 @@ struct PointLook {
         m.y = s.y();
         m.depth = s.z();
         m.metres = pscale && (*pscale)[i] > 0 ? (*pscale)[i] : 0;
-        const PointStyle& how = style(scene, styles.empty() ? 0 : styles[i]);
-        if (how.shutter > 0) expose(i, how, m);
+        if (const double shutter = styles.shutter(i); shutter > 0) expose(i, static_cast<float>(shutter), m);
         size(m);
         if (m.radius == 0 && trails.count(i) == 0) return m;
-        m.additive = how.additive;
+        m.additive = styles.is_additive(i);
         const float fog = std::exp(-0.35f * std::max(0.0f, s.z() / far - 1));
         const Vec3f own = colour(i);
         m.colour = own * fog;
@@ -399,13 +409,12 @@ std::vector<float> shadow_opacity(const PointSet& points, const PictureScene& sc
     const auto* Cd = points.find<Vec3f>("Cd");
     const auto* Alpha = points.find<float>("Alpha");
     if (!Cd && !Alpha && scene.styles.empty()) return {};
-    const std::vector<std::uint8_t> styles = styles_of(points, scene);
+    const PointStyles styles(points, scene);
     std::vector<float> opacity(points.size());
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const bool shines = !styles.empty() && style(scene, styles[i]).additive;
             const float dark = Cd ? 1 - glow((*Cd)[i]) : 1;
-            opacity[i] = shines || !(dark > 0) ? 0 : dark * opacity_of(Alpha, i);
+            opacity[i] = styles.is_additive(i) || !(dark > 0) ? 0 : dark * opacity_of(Alpha, i);
         }
     });
     return opacity;

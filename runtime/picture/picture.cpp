@@ -18,30 +18,26 @@ struct Painter::StillLayer {
     Camera camera;
     Box3d bounds;
     double line_spacing;
-    std::vector<bool> vessels;
     Light light;
     std::vector<SurfaceTile> tiles;
 
-    StillLayer(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view,
-               std::vector<bool> which)
+    StillLayer(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view)
         : options(of),
           scene(in),
           camera(view.camera),
           bounds(view.bounds),
           line_spacing(view.line_spacing),
-          vessels(std::move(which)),
           light(*in, view),
-          tiles(draw_surfaces(of, *in, view, vessels, light))
+          tiles(draw_surfaces(of, *in, view, light))
     {
     }
 
-    bool is_of(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view,
-               const std::vector<bool>& which) const
+    bool is_of(const PictureOptions& of, const std::shared_ptr<const PictureScene>& in, const PictureView& view) const
     {
         return options.width == of.width && options.height == of.height && options.grid == of.grid && scene == in &&
                camera.position == view.camera.position && camera.target == view.camera.target &&
                camera.fov == view.camera.fov && bounds.min() == view.bounds.min() &&
-               bounds.max() == view.bounds.max() && line_spacing == view.line_spacing && vessels == which;
+               bounds.max() == view.bounds.max() && line_spacing == view.line_spacing;
     }
 };
 
@@ -51,12 +47,9 @@ Painter::~Painter() = default;
 Picture Painter::draw(const PointSet& points, const PictureOptions& options,
                       const std::shared_ptr<const PictureScene>& scene, const PictureView& view)
 {
-    std::vector<bool> vessels;
-    for (const PictureScene::Body& body : scene->bodies)
-        vessels.push_back(body.role == PictureScene::Body::Collider && holds_points(*body.mesh, points));
-    if (!still_ || !still_->is_of(options, scene, view, vessels)) {
+    if (!still_ || !still_->is_of(options, scene, view)) {
         still_.reset();  // first: a large picture's are gigabytes
-        still_ = std::make_unique<StillLayer>(options, scene, view, std::move(vessels));
+        still_ = std::make_unique<StillLayer>(options, scene, view);
     }
     Light& light = still_->light;
     const Lens lens = Lens::of_camera(view.camera, options.width, options.height);

@@ -19,11 +19,11 @@ struct PictureOptions {
     bool grid = true;                    // lines on the ground, unless a plane of the scene is the ground
 };
 
-// How points look.
+// How points look. What a style leaves open is as the styles before it say.
 struct PointStyle {
-    std::string group = {};  // whose points; empty: all
-    bool additive = false;   // they shine: they add light, and take none
-    double shutter = 0;      // s that the picture is exposed, up to the frame's time
+    std::string group = {};              // whose points; empty: all
+    std::optional<bool> additive = {};   // they shine: they add light, and take none
+    std::optional<double> shutter = {};  // s that the picture is exposed, up to the frame's time
 };
 
 // A camera as a scene gives it; what it leaves open is fitted.
@@ -38,6 +38,7 @@ struct PictureScene {
     struct Body {
         MeshPtr mesh;
         enum Role { Collider, Emitter } role = Collider;
+        bool is_vessel = false;  // a collider with points in it: the sides between them and the viewer are left out
     };
     struct Plane {
         Vec3d normal = Vec3d::UnitY();
@@ -45,7 +46,7 @@ struct PictureScene {
     };
     std::vector<Body> bodies;
     std::vector<Plane> planes;
-    std::vector<PointStyle> styles;  // of two that a point has, the later one counts
+    std::vector<PointStyle> styles;  // the later one counts
     SceneCamera camera;
     bool grid = true;  // lines on the ground, unless a plane is the ground
 };

@@ -46,12 +46,11 @@ Vec3f backdrop(int x, int y, const PictureOptions& options)
 // A body on the raster of samples, and which of its triangles may be in which tile.
 struct DrawnBody {
     const PictureScene::Body* body;
-    bool vessel;
     ScreenMesh mesh;
     std::vector<std::uint32_t> first, triangles;  // of each tile, in their order; and the end
 
-    DrawnBody(const PictureScene::Body& drawn, bool is_vessel, const Lens& lens, float near, const TileGrid& tiles)
-        : body(&drawn), vessel(is_vessel), mesh(*drawn.mesh, lens, near), first(tiles.count() + 1, 0)
+    DrawnBody(const PictureScene::Body& drawn, const Lens& lens, float near, const TileGrid& tiles)
+        : body(&drawn), mesh(*drawn.mesh, lens, near), first(tiles.count() + 1, 0)
     {
         constexpr float size = tile_size * surface_samples;
         const auto for_each_tile = [&](const ScreenTriangle& triangle, const auto& f) {
@@ -88,7 +87,7 @@ struct Sample {
 class SurfacePainter {
 public:
     SurfacePainter(const PictureOptions& options, const PictureScene& scene, const PictureView& view,
-                   const std::vector<bool>& vessels, const Light& light)
+                   const Light& light)
         : options_(options),
           light_(light),
           tiles_{options.width, options.height},
@@ -104,7 +103,7 @@ public:
         const float near = 1e-3f * static_cast<float>((view.camera.target - view.camera.position).norm());
         for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
             auto& drawn = scene.bodies[b].role == PictureScene::Body::Collider ? colliders_ : emitters_;
-            drawn.emplace_back(scene.bodies[b], vessels[b], lens_, near, tiles_);
+            drawn.emplace_back(scene.bodies[b], lens_, near, tiles_);
         }
         for (const PictureScene::Plane& plane : scene.planes) {
             const Ground ground(plane, view, true);
@@ -227,7 +226,8 @@ private:
     {
         for_each_sample(body, tile, part, sample,
                         [&](Sample& here, const Vec3f& weights, float depth, const ScreenTriangle& triangle) {
-                            if (body.vessel && face_of(triangle).dot(lens_.origin - triangle.corners[0].P) > 0) return;
+                            if (body.body->is_vessel && face_of(triangle).dot(lens_.origin - triangle.corners[0].P) > 0)
+                                return;
                             here.depth = depth;
                             here.triangle = &triangle;
                             here.weights = weights;
@@ -340,45 +340,10 @@ private:
 
 }  // namespace
 
-// A point is inside when a ray from it crosses the mesh an odd number of times.
-bool holds_points(const Mesh& mesh, const PointSet& points)
-{
-    constexpr std::size_t sample_size = 63;
-    const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
-    const Box3f bounds = mesh.bounds();
-    std::size_t sampled = 0, inside = 0;
-    for (std::size_t i = 0; i < points.size(); i += step, ++sampled) {
-        const Vec3d P = points.P()[i].cast<double>();
-        if (!bounds.contains(points.P()[i])) continue;
-        bool odd = false;
-        for (const Mesh::Triangle& triangle : mesh.triangles) {
-            // Along y, by the projection to x and z; each edge belongs to one of the triangles on its sides.
-            double height = 0, doubled = 0;
-            bool hit = false;
-            const Vec3f* corner[3];
-            for (int c = 0; c < 3; ++c) corner[c] = &mesh.positions[triangle[c]];
-            for (int c = 0; c < 3; ++c) {
-                const Vec3f &a = *corner[c], &b = *corner[(c + 1) % 3];
-                if ((a.z() > P.z()) != (b.z() > P.z())) {
-                    const double t = (P.z() - a.z()) / (static_cast<double>(b.z()) - a.z());
-                    if (P.x() < a.x() + t * (static_cast<double>(b.x()) - a.x())) hit = !hit;
-                }
-                const Vec3f& o = *corner[(c + 2) % 3];
-                const double weight = (b.x() - a.x()) * (P.z() - a.z()) - (b.z() - a.z()) * (P.x() - a.x());
-                height += weight * o.y();
-                doubled += weight;
-            }
-            if (hit && height / doubled > P.y()) odd = !odd;
-        }
-        inside += odd;
-    }
-    return sampled > 0 && 2 * inside > sampled;
-}
-
 std::vector<SurfaceTile> draw_surfaces(const PictureOptions& options, const PictureScene& scene,
-                                       const PictureView& view, const std::vector<bool>& vessels, const Light& light)
+                                       const PictureView& view, const Light& light)
 {
-    const SurfacePainter painter(options, scene, view, vessels, light);
+    const SurfacePainter painter(options, scene, view, light);
     std::vector<SurfaceTile> tiles(painter.tiles().count());
     tbb::parallel_for(0, painter.tiles().count(), [&](int tile) { tiles[tile] = painter.draw(tile); });
     return tiles;

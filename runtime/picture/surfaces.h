@@ -54,11 +54,8 @@ constexpr double surface_bytes_a_pixel(bool colliders)
     return colliders ? open + covered : open;
 }
 
-// Whether a mesh is a vessel: most points are inside, and the sides between them and the viewer are left out.
-bool holds_points(const Mesh& mesh, const PointSet& points);
-
-// The tiles of the picture. vessels: of each body, whether it is one.
+// The tiles of the picture.
 std::vector<SurfaceTile> draw_surfaces(const PictureOptions& options, const PictureScene& scene,
-                                       const PictureView& view, const std::vector<bool>& vessels, const Light& light);
+                                       const PictureView& view, const Light& light);
 
 }  // namespace rapid

@@ -2,6 +2,7 @@
 #include "bindings/host/picture_scene.h"
 
 #include <memory>
+#include <tuple>
 
 #include "bindings/host/session.h"
 #include "tests/files/temporary_folder.h"
@@ -9,6 +10,14 @@
 
 namespace rapid {
 namespace {
+
+std::shared_ptr<const PictureScene> described(const std::string& scene, std::int64_t frame)
+{
+    const test::TemporaryFolder folder;
+    const Session session(folder.write("scene.lua", "local rapid = require 'rapid'\nreturn " + scene), {});
+    const Plan plan(session.graph(), PlanOptions{});
+    return SceneOfPlan(plan).at(frame);
+}
 
 // The most surfaces that are alive at once while the pictures of so many frames are described, and how many there were.
 std::pair<std::size_t, std::size_t> surfaces(const std::string& shape, std::int64_t frames)
@@ -62,6 +71,63 @@ TEST_CASE("of surfaces of level sets, which keep their own, there are as many as
 TEST_CASE("a level set that stays has one surface for all frames", "[picture]")
 {
     CHECK(surfaces("ball", 100) == std::pair<std::size_t, std::size_t>(1, 1));
+}
+
+TEST_CASE("a collider is a vessel in all frames if it encloses a source where the scene begins", "[picture]")
+{
+    const std::string chain =
+        " :collide { shape = rapid.levelset.box { size = {1, 1, 1}, voxel = 0.05 }, name = 'box', transform = "
+        "function(frame) return rapid.translate(0.5 * (frame.number - 3), 0, 0) end } :solve {}";
+    const auto is_vessel = [&](const std::string& source, std::int64_t frame) {
+        const auto scene = described(source + chain, frame);
+        const PictureScene::Body& last = scene->bodies.back();
+        REQUIRE(last.role == PictureScene::Body::Collider);
+        return last.is_vessel;
+    };
+    const auto source_at = [](const char* x) {
+        return "rapid.create { start = 3 } :emit { rate = 9, source = rapid.mesh.sphere { radius = 0.2, center = {" +
+               std::string(x) + ", 0, 0} } }";
+    };
+    const auto points_at = [](const char* x) {
+        return "rapid.create { start = 3, points = rapid.points.from { P = {{0, 0, 0}, {" + std::string(x) +
+               ", 0, 0}} } }";
+    };
+    const std::int64_t frame = GENERATE(3, 4, 20);
+    CAPTURE(frame);
+    CHECK(is_vessel(source_at("0.1"), frame));
+    CHECK_FALSE(is_vessel(source_at("0.4"), frame));  // half in it
+    CHECK_FALSE(is_vessel(source_at("5"), frame));
+    CHECK(is_vessel(points_at("0.4"), frame));
+    CHECK_FALSE(is_vessel(points_at("0.6"), frame));
+    // What points are born from, and collide with, is no vessel of them.
+    CHECK_FALSE(
+        is_vessel("rapid.create { start = 3 } :emit { rate = 9, source = rapid.levelset.box { size = {1, 1, 1}, "
+                  "voxel = 0.05 } }",
+                  frame));
+}
+
+TEST_CASE("a second :picture changes only what it names", "[picture]")
+{
+    const std::string first =
+        "rapid.create {} :emit { rate = 9, source = rapid.mesh.box {} } :gravity {} :solve {} "
+        ":picture { blend = 'add', shutter = 0.5, emitters = false, camera = rapid.camera { position = {0, 1, 4} } }";
+    const auto look = [&](const std::string& later) {
+        const auto scene = described(first + later, 1);
+        bool additive = false;
+        double shutter = 0;
+        for (const PointStyle& style : scene->styles) {
+            additive = style.additive.value_or(additive);
+            shutter = style.shutter.value_or(shutter);
+        }
+        return std::tuple(additive, shutter * 24, scene->camera.position.value().z(), scene->bodies.size());
+    };
+    CHECK(look("") == std::tuple(true, 0.5, 4.0, 0));
+    CHECK(look(":picture {}") == look(""));
+    CHECK(look(":picture { blend = 'over' }") == std::tuple(false, 0.5, 4.0, 0));
+    CHECK(look(":picture { shutter = 0 }") == std::tuple(true, 0.0, 4.0, 0));
+    CHECK(look(":picture { emitters = true }") == std::tuple(true, 0.5, 4.0, 1));
+    CHECK(look(":picture { colliders = false }") == look(""));
+    CHECK(look(":picture { camera = rapid.camera { position = {0, 1, 9} } }") == std::tuple(true, 0.5, 9.0, 0));
 }
 
 }  // namespace rapid

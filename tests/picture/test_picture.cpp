@@ -120,10 +120,12 @@ TEST_CASE("a collider hides the points behind it and not those before it", "[io]
 TEST_CASE("a vessel does not hide the points in it", "[io][picture]")
 {
     PictureScene scene;
-    scene.bodies.push_back({make_box({4, 4, 4}, {0, 0, 0})});
+    scene.bodies.push_back({.mesh = make_box({4, 4, 4}, {0, 0, 0}), .is_vessel = true});
     const PointSet points = balls({{0, 0, 0}, {0.1f, 0, 0}}, {red, red}, 0.3f);
 
     CHECK(is_red(render(points, small, scene, front_view()).pixel(160, 100)));
+    scene.bodies[0].is_vessel = false;
+    CHECK_FALSE(is_red(render(points, small, scene, front_view()).pixel(160, 100)));
 }
 
 TEST_CASE("a plane of the scene hides the points under it", "[io][picture]")
@@ -331,15 +333,30 @@ TEST_CASE("a style is that of a group, and the later one counts", "[io][picture]
     };
     CHECK_FALSE(streaks(140));
     CHECK(streaks(180));
-    scene.styles.push_back({});
+    scene.styles.push_back({.additive = true});  // says nothing of the shutter
+    CHECK(streaks(180));
+    scene.styles.push_back({.shutter = 0});
     CHECK_FALSE(streaks(180));
+}
+
+TEST_CASE("of what a later style leaves open an earlier one counts", "[picture]")
+{
+    const PointSet points = balls({{0, 0, 0}}, {Vec3f(0.2f, 0.1f, 0.05f)}, 0.3f);
+    const PictureScene adding = styled({.additive = true});
+    PictureScene exposed = adding;
+    exposed.styles.push_back({.shutter = 0.02});
+    const Picture shining = render(points, small, adding, front_view());
+    CHECK(render(points, small, exposed, front_view()).rgb == shining.rgb);  // at rest
+    exposed.styles.push_back({.additive = false});
+    CHECK(render(points, small, exposed, front_view()).rgb == render(points, small, {}, front_view()).rgb);
+    CHECK(shining.rgb != render(points, small, {}, front_view()).rgb);
 }
 
 TEST_CASE("a painter draws what one for a single picture draws, whatever it has drawn before", "[io][picture]")
 {
     auto scene = std::make_shared<PictureScene>();
     scene->bodies.push_back({make_torus(1, 0.3, 24, {0, 0, 0})});
-    scene->bodies.push_back({make_box({5, 5, 5}, {0, 0, 0})});  // a vessel while the points are in it
+    scene->bodies.push_back({.mesh = make_box({5, 5, 5}, {0, 0, 0}), .is_vessel = true});
     scene->planes.push_back({Vec3d::UnitY(), -1});
     PointSet points = random_points({.size = 3000});
     PictureView view = PictureFit().next(points, {.scene = scene});

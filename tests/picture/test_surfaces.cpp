@@ -29,9 +29,7 @@ double bytes_a_pixel(const PictureScene& scene)
 {
     const PictureOptions options{.width = 20 * tile_size, .height = 15 * tile_size};
     const PictureView view = view_from_above();
-    const std::vector<bool> vessels(scene.bodies.size());
-    return allocated(draw_surfaces(options, scene, view, vessels, Light(scene, view))) /
-           (options.width * options.height);
+    return allocated(draw_surfaces(options, scene, view, Light(scene, view))) / (options.width * options.height);
 }
 
 PictureScene with_block()

@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-enum EventKind : std::int32_t { Birth, Hit, Death };
+enum EventKind : std::int32_t { Birth, Hit, Death, Break };
 
 struct Event {
     double time;  // s since the start
@@ -41,6 +41,8 @@ void add_events(const StepRecord& record, std::int32_t chain, std::vector<Event>
     for (const LoggedHit& hit : record.hits)
         events.push_back(
             {hit.time, chain, Hit, before.id()[hit.point], hit.P, hit.v1, hit.n, hit.speed, hit.impulse, hit.collider});
+    for (const LoggedBreak& end : record.breaks)
+        events.push_back({end.time, chain, Break, before.id()[end.point], end.P, end.v});
     const PointSet none;
     const ParentPaths paths(none, record, "");
     for (std::size_t i = 0; i < paths.size(); ++i) {

@@ -10,6 +10,7 @@ void FrameFigures::append(FrameFigures later)
     later.born += born;
     later.died += died;
     later.collisions += collisions;
+    later.broken += broken;
     later.contact_limit += contact_limit;
     later.beyond_tolerance = std::max(later.beyond_tolerance, beyond_tolerance);
     later.trapped = std::max(later.trapped, trapped);

@@ -37,6 +37,7 @@ struct FrameFigures {
     std::optional<Ledger> ledger;         // of constrained points
     std::uint64_t constraint_rows = 0;    // active at the end of the frame
     std::uint64_t loose_constraints = 0;  // of these, with an error above a tenth of their size
+    std::uint64_t broken = 0;             // rods and springs that broke in the frame
     std::uint64_t asleep = 0;             // sleeping points at the end of the frame
     std::optional<Residual::Search> contact_search;
     std::vector<BandFigures> bands;  // of the collide nodes with a level set

@@ -40,13 +40,14 @@ struct Tie {
     static constexpr int points = 2;
     static constexpr bool rests = true;
 
-    double rest = 0;                                        // m
-    double most = std::numeric_limits<double>::infinity();  // m, at which it breaks
+    double rest = 0;                                            // m
+    double most = std::numeric_limits<double>::infinity();      // m, of stretch; above it the pair breaks
+    double strength = std::numeric_limits<double>::infinity();  // N, of pull; above it the pair breaks
 
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(rest, most);
+        keep(rest, most, strength);
     }
 
     double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
@@ -69,7 +70,7 @@ struct Tie {
         gradient[0] = sum / lengths;
         gradient[1] = -gradient[0];
     }
-    bool breaks(double residual) const { return residual > most; }
+    bool breaks(double residual, double pull) const { return residual > most || pull > strength; }
 };
 
 class TieConstraint : public RememberingConstraint<TieConstraint, Rows<Tie>> {
@@ -83,7 +84,7 @@ public:
 
 struct Distance {
     std::vector<PointPair> pairs;
-    std::optional<double> within, rest, strain;
+    std::optional<double> within, rest, strain, strength;
     double compliance;
     std::string group;
 
@@ -104,7 +105,10 @@ struct Distance {
             .param(&Distance::compliance, "compliance", 0.0, at_least(0), "m/N", "stretch by force; 0: rigid")
             .constant()
             .param(&Distance::strain, "strain", Value(), above(0), "",
-                   "breaks a pair that is longer than its distance by more than this part of it")
+                   "breaks a pair that is longer than its distance by more than this part of it; a rigid one is only "
+                   "where others move both of its points")
+            .constant()
+            .param(&Distance::strength, "strength", Value(), above(0), "N", "breaks a pair that pulls with more")
             .constant();
     }
 
@@ -118,7 +122,14 @@ struct Distance {
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
     {
         Flow flow = std::move(inputs[0]);
-        if (!rows_ && !flow.points.empty()) rows_ = tie(flow.points);
+        if (!rows_ && !flow.points.empty()) {
+            if (strain && !strength && compliance == 0)
+                now.warnings.push_back(fmt::format(
+                    "node \"{}\": strain = {:g} breaks no rod, as no load stretches a rigid pair; give it a "
+                    "compliance, or the strength at which it breaks, N",
+                    now.node, *strain));
+            rows_ = tie(flow.points);
+        }
         if (!rows_) return flow;
         auto constraint = dynamic_of<TieConstraint>(now, group);
         constraint->memory = rows_;
@@ -146,6 +157,7 @@ private:
             Tie made;
             made.rest = rest ? *rest : (P[i].cast<double>() - P[j].cast<double>()).norm();
             if (strain) made.most = *strain * made.rest;
+            if (strength) made.strength = *strength;
             rows->add({points.id()[i], points.id()[j]}, made, compliance);
         };
         const int n = static_cast<int>(points.size());

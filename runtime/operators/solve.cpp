@@ -357,6 +357,7 @@ private:
         figures.trapped += result.trapped;
         figures.constraint_rows += result.residual.rows;
         figures.loose_constraints += result.residual.loose;
+        figures.broken += result.residual.broken;
         figures.asleep += result.asleep;
         if (result.residual.search) figures.contact_search = result.residual.search;
         figures.constraint_residual_max = std::max(figures.constraint_residual_max, result.residual.worst);

@@ -68,6 +68,7 @@ FrameStatistics statistics_of(const FrameResult& result)
     frame.penetration_max = result.figures.penetration_max;
     frame.constraint_rows = result.figures.constraint_rows;
     frame.loose_constraints = result.figures.loose_constraints;
+    frame.broken = result.figures.broken;
     frame.asleep = result.figures.asleep;
     frame.contact_search = result.figures.contact_search;
     frame.constraint_residual_max = result.figures.constraint_residual_max;
@@ -201,6 +202,7 @@ std::string to_json(const FrameStatistics& frame)
         json.member("constraint_rows", frame.constraint_rows);
         json.member("loose_constraints", frame.loose_constraints);
     }
+    if (frame.broken > 0) json.member("broken", frame.broken);
     json.member("asleep", frame.asleep);
     if (frame.contact_search) {
         json.key("contact_grids");

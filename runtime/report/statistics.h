@@ -50,6 +50,7 @@ struct FrameStatistics {
     double constraint_residual_max = 0;   // m; 0 where nothing is constrained
     std::uint64_t constraint_rows = 0;    // active at the frame's end
     std::uint64_t loose_constraints = 0;  // of these, with an error above a tenth of their size
+    std::uint64_t broken = 0;             // rods and springs that broke in the frame
     std::uint64_t asleep = 0;             // sleeping points at the frame's end
     std::optional<Residual::Search> contact_search;
     StageSeconds seconds;

@@ -55,6 +55,8 @@ void RunTotals::add(const FrameStatistics& frame)
     point_frames_ += frame.points;
     seconds_ += frame.seconds;
     contacts_ += frame.collisions;
+    if (broken_ == 0) first_broken_frame_ = frame.frame;
+    broken_ += frame.broken;
     deepest_ = std::max(deepest_, frame.penetration_max);
     contact_energy_ += frame.contact_energy;
     if (frame.ledger && ledger_)
@@ -189,9 +191,13 @@ std::string RunTotals::contact_text() const
 // The residual of the constraints, where there are any, and the grids of the contact search.
 std::string RunTotals::constraint_text() const
 {
-    if (!constrained_at_worst_) return "";
-    std::string text = fmt::format("residual of constraints: {:.1e} m at most (frame {}), {:.1e} m in the last\n",
-                                   worst_residual_, worst_residual_frame_, last_.constraint_residual_max);
+    std::string text;
+    if (broken_ > 0)
+        text += fmt::format("broken   {} {}, the first in frame {}\n", with_separators(broken_),
+                            broken_ == 1 ? "pair" : "pairs", first_broken_frame_);
+    if (!constrained_at_worst_) return text;
+    text += fmt::format("residual of constraints: {:.1e} m at most (frame {}), {:.1e} m in the last\n", worst_residual_,
+                        worst_residual_frame_, last_.constraint_residual_max);
     if (const auto& search = last_.contact_search)
         text += fmt::format("contacts in {} {} of {} points, cells {:.2g} times too large, searched in {:.3f} s\n",
                             search->grids.size(), search->grids.size() == 1 ? "grid" : "grids",

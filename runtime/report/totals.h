@@ -57,6 +57,8 @@ private:
     double worst_rounding_ = 0;                               // m
     std::int64_t worst_rounding_frame_ = 0;
     std::uint64_t contacts_ = 0;
+    std::uint64_t broken_ = 0;  // rods and springs
+    std::int64_t first_broken_frame_ = 0;
     double deepest_ = 0;  // m
     ContactEnergy contact_energy_;
     std::optional<Ledger> ledger_;  // of the frames together

@@ -1,4 +1,4 @@
-// What happens to points within one step: contacts and deaths, with their times.
+// What happens to points within one step: contacts, breaks and deaths, with their times.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -23,6 +23,13 @@ struct LoggedHit {
     bool recorded;          // in the hit attributes
 };
 
+// A rod or a spring that breaks is logged at each of its ends.
+struct LoggedBreak {
+    std::uint32_t point;  // place in the set before the step
+    double time;          // s since the start
+    Vec3f P, v;           // m, m/s
+};
+
 class StepLog {
 public:
     explicit StepLog(std::size_t points) : died_at_(points, std::numeric_limits<double>::quiet_NaN()) {}
@@ -30,16 +37,20 @@ public:
     // From the thread that advances the point.
     void add(const LoggedHit& hit) { hits_.local().push_back(hit); }
     void kill(std::size_t point, double time) { died_at_[point] = time; }
+    // From one thread.
+    void add(const LoggedBreak& end) { breaks_.push_back(end); }
     // The points whose mask is 1 are as they were when they died. Before they are removed.
     void take_dead(const PointSet& points, std::span<const std::uint8_t> dead);
 
     // By point, then by time.
     std::vector<LoggedHit> hits() const;
+    const std::vector<LoggedBreak>& breaks() const { return breaks_; }
     const PointSet& dead() const { return dead_; }
     const std::vector<double>& died_at() const { return dead_times_; }
 
 private:
     tbb::enumerable_thread_specific<std::vector<LoggedHit>> hits_;
+    std::vector<LoggedBreak> breaks_;
     std::vector<double> died_at_;  // by point; NaN of those that live
     PointSet dead_;
     std::vector<double> dead_times_;

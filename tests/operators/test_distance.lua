@@ -1,4 +1,5 @@
 -- distance and pin, as scenes use them: pairs by place and by nearness, rest, breaking, what holds; and wrong input.
+local csv_rows = require "tests.csv_rows"
 local scene = require "testing.scene"
 
 local function points_of(result, frame)
@@ -146,6 +147,65 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
     end
     assert.near(-1 - stretched, lowest(1.05 * stretched), 0.01)
     assert.truthy(lowest(0.5 * stretched) < -10)
+  end)
+
+  -- A weight on a rod of length L, let go where the rod is level: at the angle φ below, v² = 2 g L sin φ, and the rod
+  -- pulls with 3 m g sin φ.
+  local function swinging(arguments)
+    return ([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.5, 0, 0}}, mass = {1, 10} } }
+  :gravity {} :distance { pairs = {{1, 2}}, %s }
+  :group { name = "top", where = function(p) return p.id == 0 end } :pin { group = "top" }
+  :solve { substeps = 40 }]]):format(arguments)
+  end
+  local most = 3 * 10 * 9.81 -- N, at the lowest point
+
+  it("breaks a rod that pulls with more than its strength, at that moment", function()
+    for _, part in ipairs { 0.3, 0.8 } do
+      local result = scene.command("run", swinging("strength = " .. part * most),
+        "-f 1-20 --events e.csv --stats s.json")
+      assert.equal(0, result.status, result.stderr)
+      local ends = {}
+      for _, row in ipairs(csv_rows(scene.folder:read "e.csv")) do
+        if row.event == 3 then ends[#ends + 1] = row end
+      end
+      assert.equal(2, #ends)
+      assert.same({ 0, 1 }, { ends[1].id, ends[2].id })
+      assert.near(-part * 0.5, ends[2].Py, 0.01) -- a sub-step is a hundredth of the swing
+      assert.near(math.sqrt(2 * 9.81 * 0.5 * part), math.sqrt(ends[2].vx ^ 2 + ends[2].vy ^ 2), 0.02)
+      assert.matches("broken   1 pair, the first in frame %d", result.stderr .. result.stdout)
+      assert.matches('"broken":1', (scene.folder:read "s.json"):gsub("%s", ""), 1, true)
+    end
+  end)
+
+  it("holds a rod that never pulls with as much", function()
+    local result = scene.command("run", swinging("strength = " .. 1.02 * most), "-f 1-40 --events e.csv")
+    assert.equal(0, result.status)
+    assert.falsy((result.stderr .. result.stdout):find("broken", 1, true))
+    for _, row in ipairs(csv_rows(scene.folder:read "e.csv")) do assert.not_equal(3, row.event) end
+  end)
+
+  it("breaks a spring by its strength where a strain does that is as large", function()
+    local function frames(arguments) return scene.run(swinging("compliance = 1e-4, " .. arguments), { frames = {1, 24} }) end
+    -- 0.04 of 0.5 m by 1e-4 m/N
+    local by_strength, by_strain = frames "strength = 200", frames "strain = 0.04"
+    local function breaks_in(result)
+      for f = 1, 24 do
+        if (result[f][1].P - result[f][2].P):length() > 0.53 then return f end
+      end
+    end
+    assert.truthy(breaks_in(by_strain))
+    assert.near(breaks_in(by_strain), breaks_in(by_strength), 1)
+  end)
+
+  it("warns of a rod that is to break by a strain", function()
+    local text = "strain = 0.02 breaks no rod, as no load stretches a rigid pair; give it a compliance, or the strength"
+    local function warnings(arguments)
+      return table.concat(scene.run(swinging(arguments), { frames = {1, 3} }).warnings, "\n")
+    end
+    assert.truthy(warnings("strain = 0.02"):find(text, 1, true))
+    assert.equal("", warnings "strain = 0.02, compliance = 1e-4")
+    assert.equal("", warnings "strain = 0.02, strength = 500")
   end)
 
   it("follows its points by id when others die", function()

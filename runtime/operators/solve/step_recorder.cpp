@@ -28,6 +28,7 @@ void StepRecorder::end()
 {
     if (!log_) return;
     record_->hits = log_->hits();
+    record_->breaks = log_->breaks();
     record_->killed = log_->dead();
     record_->killed_at = log_->died_at();
 }

@@ -39,6 +39,7 @@ namespace rapid {
 class ContactForces;
 class EnergyIslands;
 class Sleep;
+class StepLog;
 struct ContactMaterial;
 struct Spin;
 
@@ -63,6 +64,7 @@ struct Substep {
     std::span<Vec3d> reaction;
     std::span<Spin> spins;               // empty where no point turns
     ContactForces* forces = nullptr;     // null where they are not recorded
+    StepLog* log = nullptr;              // null where nobody asks
     bool is_shared = false;              // contacts, shapes or other constraints act, too, beside a constraint
     double dt = 0;                       // s, of a point that lives through the whole frame
     double time = 0;                     // s since the start, at its end
@@ -87,9 +89,10 @@ struct Substep {
 
 // How well a frame's rows are satisfied; and of contacts, how their pairs were found.
 struct Residual {
-    double worst = 0;         // m
-    std::uint64_t rows = 0;   // that are active
-    std::uint64_t loose = 0;  // of them, those that are off by more than a tenth of their size
+    double worst = 0;          // m
+    std::uint64_t rows = 0;    // that are active
+    std::uint64_t loose = 0;   // of them, those that are off by more than a tenth of their size
+    std::uint64_t broken = 0;  // rows that broke in the frame
 
     struct Search {
         std::vector<std::size_t> grids;  // the points in each, from coarse to fine

@@ -370,6 +370,7 @@ Residual Projection::close(Substep& step, ShapeLoads* loads)
         all.worst = std::max(all.worst, residual.worst);
         all.rows += residual.rows;
         all.loose += residual.loose;
+        all.broken += residual.broken;
         if (residual.search) all.search = residual.search;
     });
     if (shapes_ && loads) shapes_->remember(*loads, errors_.ids(), step);

@@ -5,7 +5,8 @@
 //       double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const;   m, or a unit with a
 //                                                                                       compliance to match
 //       static constexpr bool one_sided = true;   where C >= 0 satisfies it (pushes only); false if not said
-//       bool breaks(double residual) const;       where it can: asked at the end of every sub-step
+//       bool breaks(double residual, double pull) const;   where it can: asked at the end of every sub-step; pull:
+//                                                          the force against the gradient, N
 //       static constexpr bool rests = true;       where its points may sleep (sleep.h): the residual depends on nothing
 //                                                 but their positions and its own members; false if not said
 //       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
@@ -32,6 +33,7 @@
 #include "runtime/solver/constraints/row_sleep.h"
 #include "runtime/solver/constraints/system_motion.h"
 #include "runtime/solver/constraints/tree_motion.h"
+#include "runtime/solver/step_log.h"
 
 namespace rapid {
 
@@ -244,18 +246,25 @@ public:
             schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].correct_position(step); });
             for (const Row& row : rows_) sleep_.wake_by_load(row, step);
         }
-        if constexpr (requires(const Function& function) { function.breaks(0.0); })
+        if constexpr (requires(const Function& function) { function.breaks(0.0, 0.0); })
             remove([&](const Row& row) {
+                if (!row.active || row.asleep) return false;
                 typename Row::Vectors gradient;
-                const bool breaks = row.active && !row.asleep && row.function.breaks(row.residual(step, gradient));
-                if (breaks) sleep_.release(row);
-                return breaks;
+                if (!row.function.breaks(row.residual(step, gradient), -row.impulse / step.dt)) return false;
+                sleep_.release(row);
+                ++broken_;
+                if (step.log)
+                    for (const std::uint32_t i : row.points)
+                        step.log->add(LoggedBreak{i, step.time, step.points[i].P.template cast<float>(),
+                                                  step.v[i].template cast<float>()});
+                return true;
             });
     }
 
     Residual close(Substep& step) override
     {
         Residual result;
+        result.broken = std::exchange(broken_, 0);
         typename Row::Vectors gradient;
         for (Row& row : rows_) {
             if (!row.active) continue;
@@ -324,6 +333,7 @@ private:
     std::vector<Ids> known_;          // sorted
     bool known_is_complete_ = false;  // all rows are in known_
     bool changed_ = true;             // since the schedule was made
+    std::uint64_t broken_ = 0;        // rows, in this frame
     double dt_ = 0;                   // s, of the last sub-step
     std::vector<std::uint8_t> fixed_;
     RowSchedule schedule_;

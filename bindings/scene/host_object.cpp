@@ -57,10 +57,10 @@ AnyColumn copied_column(const HostPoints::Column& from, std::size_t count)
 
 }  // namespace
 
-ObjectPtr make_mesh(const HostMesh& mesh)
+ObjectPtr make_mesh(const HostMesh& mesh, const std::string& name)
 {
     auto made = std::make_shared<Mesh>();
-    made->name = "the program's mesh";
+    made->name = name;
     if (mesh.triangles.empty()) throw Error("it has no triangles");
     for (const auto& [x, y, z] : mesh.positions) {
         if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z))
@@ -103,7 +103,7 @@ ObjectPtr make_points(const HostPoints& points)
 ObjectPtr make_object(const std::string& name, const HostObject& offered, bool guarded)
 {
     try {
-        if (const auto* mesh = std::get_if<HostMesh>(&offered)) return make_mesh(*mesh);
+        if (const auto* mesh = std::get_if<HostMesh>(&offered)) return make_mesh(*mesh, name);
         if (const auto* points = std::get_if<HostPoints>(&offered)) return make_points(*points);
         return make_shape(name, std::get<HostShape>(offered), guarded);
     } catch (const Error& error) {

@@ -7,7 +7,8 @@
 namespace rapid {
 
 ObjectPtr make_shape(const std::string& name, const HostShape& shape, bool guarded);
-ObjectPtr make_mesh(const HostMesh& mesh);
+// name: under which the program offers it.
+ObjectPtr make_mesh(const HostMesh& mesh, const std::string& name);
 ObjectPtr make_points(const HostPoints& points);
 
 }  // namespace rapid

@@ -15,6 +15,7 @@
 --   calls            names on the point itself that it calls like methods
 --   kills            whether `kill` is called or could be
 --   reads_points     of a function of the whole set: whether it may do more with its points than to name points.detail
+--   vectors          by name of an attribute to which vec3(...) or quat(...) is assigned: how many numbers it has
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
@@ -67,6 +68,9 @@ local function field(value, name, depth)
 end
 
 local analyse_function
+
+-- Results of the constructors of vectors, by their numbers.
+local vectors = { [3] = { kind = "vector", size = 3 }, [4] = { kind = "vector", size = 4 } }
 
 -- The value of a function's upvalue: { kind = "shared", value }, or nil where it is a local of the kernel around a
 -- closure. A closure that the kernel makes does not exist yet; its upvalues are told from the kernel's own by name.
@@ -274,6 +278,7 @@ function effects.TSETS(at)
   end
   if object == point then
     at:mention(found.writes, key)
+    if value and value.kind == "vector" then found.vectors[key] = value.size end
   elseif object == parameters then
     at:refuse(("params.%s can't be assigned; parameters are the graph's"):format(key))
   elseif object and object.kind == "shared" then
@@ -379,11 +384,16 @@ end
 
 local function call_function(at, arguments)
   local regs = at.regs
-  local result = call_value(at, regs[at.a], at.a + 2, arguments) -- two slots a frame
+  local callee = regs[at.a]
+  local made = callee and callee.kind == "shared" and callee.value ~= nil and at.found.constructors[callee.value]
+  local result = call_value(at, callee, at.a + 2, arguments) -- two slots a frame
   at:forget(at.a, at.a + 250)
   if result then
     for slot = at.a, at.a + math.max(at.b - 2, 0) do regs[slot] = shared end
     regs[at.a] = result
+  elseif made then
+    regs[at.a] = made
+    return made
   end
   return result
 end
@@ -547,8 +557,12 @@ local function nothing_found(env, remedy, subject, methods)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
     inside = {}, env = env, remedy = remedy, subject = subject, methods = {},
-    places = {},
+    places = {}, vectors = {}, constructors = {},
   }
+  for size, name in pairs { [3] = "vec3", [4] = "quat" } do
+    local constructor = rawget(env, name)
+    if constructor ~= nil then found.constructors[constructor] = vectors[size] end
+  end
   for _, name in ipairs(methods) do found.methods[name] = true end
   return found
 end
@@ -565,7 +579,7 @@ local function analyse(kernel, env, of_a_point, point_names)
   found.of_the_set = not of_a_point
   found.reads_points = found.of_the_set and util.funcinfo(kernel).isvararg or false
   analyse_function(kernel, found, { [0] = of_a_point and point or set, [2] = parameters })
-  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "subject", "methods", "of_the_set" } do
+  for _, own in ipairs { "calls_of", "inside", "env", "remedy", "subject", "methods", "of_the_set", "constructors" } do
     found[own] = nil
   end
   return found

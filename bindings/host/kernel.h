@@ -59,6 +59,11 @@ public:
     // As an action, where `force` is that of the sub-step and no attribute.
     void uses_in_action(Uses& uses, const KernelArguments& arguments) const;
 
+    int numbers_of(const std::string& attribute) const override
+    {
+        const auto known = analysis_.vectors.find(attribute);
+        return known == analysis_.vectors.end() ? 0 : known->second;
+    }
     Location place_of(const std::string& attribute) const override
     {
         const auto found = analysis_.places.find(attribute);

@@ -26,13 +26,16 @@ Location place_of(const Node& node, const std::string& attribute)
     return {};
 }
 
-// How many numbers a value of the attribute has that the node takes; 1 where it does not tell.
+// How many numbers the node takes or assigns as a value of the attribute; 1 where it does not tell.
 int numbers_in(const Node& node, const std::string& attribute)
 {
     for (const auto& [name, value] : node.arguments) {
         const auto* reference = value.get<AttributeRef>();
         const Param* param = reference && reference->name == attribute ? node.type->find(name) : nullptr;
         if (param && param->type == "vec3") return 3;
+        const ObjectPtr* object = value.get<ObjectPtr>();
+        const auto* function = object ? dynamic_cast<const AttributePlaces*>(object->get()) : nullptr;
+        if (const int numbers = function ? function->numbers_of(attribute) : 0; numbers > 0) return numbers;
     }
     return 1;
 }

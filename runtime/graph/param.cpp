@@ -118,8 +118,13 @@ void check_attribute_name(std::string_view name)
 void wrong_type(const Param& param, const Value& value)
 {
     if (value.is_nil()) throw Error(fmt::format("{} is nil; it must be {}", param.name, right_type(param)));
-    throw Error(
-        fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right_type(param)));
+    std::string right = right_type(param);
+    // Keys such as {[1] = 0, [24] = 100}.
+    const Table* keys = value.table();
+    const bool has_keys = keys && keys->named.empty() && (keys->list.size() == 1 || !keys->numbered.empty());
+    if (has_keys && param.of_the_frame && (param.type.starts_with("number") || param.type.starts_with("integer")))
+        right += ", or a function of the frame: function(frame) return ... end";
+    throw Error(fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right));
 }
 
 void out_of_range(const Param& param, double value)

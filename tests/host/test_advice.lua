@@ -29,7 +29,10 @@ describe("a message", function()
     expect("add :attribute{ Cd = {1, 1, 1} } before it", kernel_fault 'local name = "C" .. "d" p[name] = vec3(1, 0, 0)')
   end)
 
-  it("makes an attribute with the type of the parameter that asks for it", function()
+  it("makes an attribute with the type of what is assigned, or asked for", function()
+    expect('no attribute "flow"; add :attribute{ flow = {0, 0, 0} } before it', kernel_fault "p.flow = vec3(1, 0, 0)")
+    expect("add :attribute{ turn = {0, 0, 0, 1} } before it",
+      kernel_fault "local q = quat(0, 0, 0, 1) if p.id > 3 then q = quat(1, 0, 0, 0) end p.turn = quat(0, 1, 0, 0)")
     expect("add :attribute{ goal = {0, 0, 0} } before it",
       fault 'return rapid.create { points = POINTS } :attract { center = rapid.attr "goal" } :solve {}')
     expect("add :attribute{ pull = 0 } before it",
@@ -37,7 +40,7 @@ describe("a message", function()
   end)
 
   it("that follows is one with which the scene runs", function()
-    for attribute, body in pairs { Cd = "p.Cd = vec3(1, 0, 0)", orient = "p.orient = quat(0, 1, 0, 0)",
+    for attribute, body in pairs { flow = "p.flow = vec3(1, 0, 0)", turn = "p.turn = quat(0, 1, 0, 0)",
                                    heat = "p.heat = 3", curve = "p.curve = 2" } do
       local advice = kernel_fault(body):match "add (:attribute%b{}) before it"
       assert.truthy(advice, attribute)
@@ -57,6 +60,13 @@ describe("a message", function()
   it("says who sees the neighbours of a point", function()
     expect('p has no method "neighbours", as a kernel sees one point; a :detail sees all of them: '
       .. "points:neighbours(i, radius)", kernel_fault "for _, k in ipairs(p:neighbours(1)) do p.v = p.v * k end")
+  end)
+
+  it("says that a number that changes is a function of the frame", function()
+    expect("rate = {0} has the wrong type; it must be a number or rapid.attr, or a function of the frame: "
+      .. "function(frame) return ... end", fault "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0} } :solve {}")
+    expect("a function of the frame", fault
+      "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0, [24] = 100} } :solve {}")
   end)
 
   it("closes an open ground before a level set is made of it", function()
@@ -174,6 +184,21 @@ describe("a warning", function()
       warnings(chain:format ""))
     assert.equal("", warnings(chain:format ":tumble {}"))
     assert.equal("", warnings(chain:format ":contact { radius = 0.01, spin = true }"))
+  end)
+
+  it("of an open mesh that is made again in each frame comes once", function()
+    local text = [[
+local function box(frame)
+  local s = 1 + 0.01 * frame.number
+  local P = {}
+  for k = 0, 7 do P[k + 1] = vec3(s * (k % 2), s * (math.floor(k / 2) % 2), s * math.floor(k / 4)) end
+  local faces = {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}, {1, 3, 4}}
+  return rapid.levelset.from_mesh(rapid.mesh.from { points = P, faces = faces }, { voxel = 0.1 })
+end
+return rapid.create { points = POINTS } :collide { shape = box } :solve {}]]
+    local found = scene.run((text:gsub("POINTS", points)), { frames = {1, 6} }).warnings
+    assert.equal(1, #found, table.concat(found, "\n"))
+    assert.truthy(found[1]:find("is not closed", 1, true), found[1])
   end)
 
   it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()

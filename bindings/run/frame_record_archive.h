@@ -120,8 +120,8 @@ void serialize(Archive& keep, FrameStatistics& statistics)
 {
     auto& [frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
            left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-           constraint_residual_max, constraint_rows, loose_constraints, broken, asleep, contact_search, seconds, nodes] =
-        statistics;
+           constraint_residual_max, constraint_rows, loose_constraints, broken, asleep, contact_search, seconds,
+           nodes] = statistics;
     keep(frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
          left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
          constraint_residual_max, constraint_rows, loose_constraints, broken, asleep, seconds, nodes);

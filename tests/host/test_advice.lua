@@ -64,7 +64,8 @@ describe("a message", function()
 
   it("says that a number that changes is a function of the frame", function()
     expect("rate = {0} has the wrong type; it must be a number or rapid.attr, or a function of the frame: "
-      .. "function(frame) return ... end", fault "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0} } :solve {}")
+      .. "function(frame) return ... end",
+      fault "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0} } :solve {}")
     expect("a function of the frame", fault
       "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0, [24] = 100} } :solve {}")
   end)

@@ -186,7 +186,9 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.
   end)
 
   it("breaks a spring by its strength where a strain does that is as large", function()
-    local function frames(arguments) return scene.run(swinging("compliance = 1e-4, " .. arguments), { frames = {1, 24} }) end
+    local function frames(arguments)
+      return scene.run(swinging("compliance = 1e-4, " .. arguments), { frames = {1, 24} })
+    end
     -- 0.04 of 0.5 m by 1e-4 m/N
     local by_strength, by_strain = frames "strength = 200", frames "strain = 0.04"
     local function breaks_in(result)

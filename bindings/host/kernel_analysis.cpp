@@ -46,7 +46,7 @@ int number_of(lua_State* L, const char* field)
 }
 
 // The number that a field of the table at the top of the stack has for a name; 0 for none.
-int entry_of(lua_State* L, const char* field, const std::string& name)
+int number_under(lua_State* L, const char* field, const std::string& name)
 {
     lua_getfield(L, -1, field);
     const int line = number_of(L, name.c_str());
@@ -64,19 +64,19 @@ void check_calls(lua_State* L, const Location& location)
             throw Error(
                 "p has no method \"neighbours\", as a kernel sees one point; a :detail sees all of them: "
                 "points:neighbours(i, radius)")
-                .at({location.file, entry_of(L, "calls", name)});
+                .at({location.file, number_under(L, "calls", name)});
         const std::string near = did_you_mean(name, methods);
         const std::string remedy =
             fmt::format("; it has {} and {}", fmt::join(methods.begin(), methods.end() - 1, ", "), methods.back());
         throw Error(fmt::format("p has no method \"{}\"{}", name, near.empty() ? remedy : near))
-            .at({location.file, entry_of(L, "calls", name)});
+            .at({location.file, number_under(L, "calls", name)});
     }
 }
 
 void check_assignments(lua_State* L, const Location& location)
 {
     for (const PointName& known : point_names) {
-        const int line = known.read_only ? entry_of(L, "writes", std::string(known.name)) : 0;
+        const int line = known.read_only ? number_under(L, "writes", std::string(known.name)) : 0;
         if (line > 0)
             throw Error(fmt::format("the kernel assigns p.{}, which is read only", known.name))
                 .at({location.file, line});
@@ -150,7 +150,7 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     found.reads = keys_of(L, "reads");
     found.writes = keys_of(L, "writes");
     found.places = places_in(L);
-    for (const std::string& name : keys_of(L, "vectors")) found.vectors[name] = entry_of(L, "vectors", name);
+    for (const std::string& name : keys_of(L, "vectors")) found.vectors[name] = number_under(L, "vectors", name);
     found.may = keys_of(L, "may");
     found.may_write = keys_of(L, "may_write");
     found.joins = keys_of(L, "joins");

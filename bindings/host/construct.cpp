@@ -8,7 +8,6 @@
 #include "bindings/host/maker.h"
 #include "bindings/host/objects.h"
 #include "bindings/host/offers.h"
-#include "bindings/host/script_place.h"
 
 namespace rapid {
 namespace {
@@ -35,15 +34,12 @@ int make_object(State& state)
     refuse_in_kernels(state, shown_name(maker, *options), "make it outside, once");
     return construct(state, [&] {
         ScriptHost& host = state.host();
-        std::vector<std::string> warnings;
-        MakeContext context{host.folder(), warnings, host.options().may_write, host.options().on_read,
+        MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read,
                             host.options().find_file};
         try {
             check_named(*options);
             const auto make = [&] { return maker.make(maker, *options, context); };
-            ObjectPtr made = host.maker_cache ? host.maker_cache->get(maker, options, make) : make();
-            for (const std::string& warning : warnings) host.warn(warning, where(state));
-            return made;
+            return host.maker_cache ? host.maker_cache->get(maker, options, make) : make();
         } catch (const Error& error) {
             throw Error(
                 fmt::format("{}: {}", shown_name(maker, *options), error.what()));  // with the file that it names

@@ -210,15 +210,6 @@ void ScriptHost::collect_outputs(State& state)
         throw Error("the graph returns no output; end the file with `return` and a node").at({graph.file, 0});
 }
 
-void ScriptHost::warn(const std::string& text, const Location& call)
-{
-    if (main_->is_loaded()) {
-        const std::string kind = text.substr(0, text.find_first_of("0123456789"));
-        if (!warned_.insert(fmt::format("{}:{}: {}", call.file, call.line, kind)).second) return;
-    }
-    warnings.push_back(text);
-}
-
 State& ScriptHost::local()
 {
     if (std::this_thread::get_id() == main_thread_) return *main_;

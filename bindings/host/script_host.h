@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <variant>
@@ -33,9 +32,6 @@ public:
     std::vector<Session::Parameter> parameters;
     std::map<std::string, std::size_t> parameter_places;  // by name
     std::vector<std::string> warnings;
-    // Adds a warning of a maker. While frames run, a call gives warnings that begin alike, up to their first number,
-    // once.
-    void warn(const std::string& text, const Location& call);
     const std::shared_ptr<Interruption> shared_interruption;
     Interruption& interruption;
     std::map<std::string, std::vector<Session::FunctionCode>> code;
@@ -86,7 +82,6 @@ private:
     std::unique_ptr<State> main_, second_;
     tbb::enumerable_thread_specific<std::unique_ptr<State>> workers_;
     std::thread::id main_thread_;
-    std::set<std::string> warned_;  // FILE:LINE and the beginning of each warning that was given while frames ran
 };
 
 }  // namespace rapid

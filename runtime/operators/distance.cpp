@@ -108,7 +108,9 @@ struct Distance {
                    "breaks a pair that is longer than its distance by more than this part of it; a rigid one is only "
                    "where others move both of its points")
             .constant()
-            .param(&Distance::strength, "strength", Value(), above(0), "N", "breaks a pair that pulls with more")
+            .param(&Distance::strength, "strength", Value(), above(0), "N",
+                   "breaks a pair that pulls with more; impulses of impacts, which take no time, do not "
+                   "count")
             .constant();
     }
 

@@ -101,8 +101,13 @@ return rapid.create { points = rapid.points.grid {} } :attract { center = {3, 0,
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.09 } }
   :contact { radius = 0.01 } :solve {}]])
+    folder:write("rod.lua", [[
+local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {0, -1, 0}} } } :gravity {}
+  :distance { pairs = {{1, 2}}, strength = 1 }
+  :group { name = "top", where = function(p) return p.id == 0 end } :pin { group = "top" } :solve {}]])
     local keys = {}
-    for _, scene in ipairs { "all", "free", "many" } do
+    for _, scene in ipairs { "all", "free", "many", "rod" } do
       local result = command.rapid("run " .. scene .. ".lua -f 1-3 --quiet --stats s.json", { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
       keys_of(json.decode(folder:read "s.json"), {}, keys)

@@ -187,21 +187,6 @@ describe("a warning", function()
     assert.equal("", warnings(chain:format ":contact { radius = 0.01, spin = true }"))
   end)
 
-  it("of an open mesh that is made again in each frame comes once", function()
-    local text = [[
-local function box(frame)
-  local s = 1 + 0.01 * frame.number
-  local P = {}
-  for k = 0, 7 do P[k + 1] = vec3(s * (k % 2), s * (math.floor(k / 2) % 2), s * math.floor(k / 4)) end
-  local faces = {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}, {1, 3, 4}}
-  return rapid.levelset.from_mesh(rapid.mesh.from { points = P, faces = faces }, { voxel = 0.1 })
-end
-return rapid.create { points = POINTS } :collide { shape = box } :solve {}]]
-    local found = scene.run((text:gsub("POINTS", points)), { frames = {1, 6} }).warnings
-    assert.equal(1, #found, table.concat(found, "\n"))
-    assert.truthy(found[1]:find("is not closed", 1, true), found[1])
-  end)
-
   it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()
     expect('node "emit1": its points are gone after the frame of their birth: no :solve comes after it',
       warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")

@@ -1,6 +1,7 @@
 -- rapid run --cache: a run that goes on where it was, to the same bytes; and what refuses to.
 local command = require "testing.command"
 local amount = require "tests.amount"
+local await = require "tests.await"
 local statistics = require "tests.same_statistics"
 
 local rain = [[
@@ -390,22 +391,22 @@ flock -n 9
 ]]
     assert.equal("--cache cache: another run has it; wait for its end, or give another folder\nstatus 2\n", said)
     -- One that ends is waited for.
-    assert.truthy(folder:shell [[
+    assert.truthy(folder:shell(await .. [[
 flock cache/.lock sleep 0.5 &
-until [ -e cache/.lock ]; do sleep 0.01; done
+await $! test -e cache/.lock || exit 1
 "$RAPID" run scene.lua -f 1-2 --cache cache
 wait
-]]:find("\nframe 2  ", 1, true))
+]]):find("\nframe 2  ", 1, true))
   end)
 
   it("ends the frame on SIGTERM, keeps it in a snapshot, and goes on from there", function()
     local folder = new_folder()
-    local said = folder:shell [[
+    local said = folder:shell(await .. [[
 run() { exec "$RAPID" run scene.lua -f 1-40 --set rate=4000 "$@"; }
 (run -o whole/a.####.bgeo --quiet) || exit 1
 run -o a/a.####.bgeo --cache cache --cache-every 1000 --stats a.json >said 2>&1 &
 one=$!
-until grep -q '^frame 3 ' said; do sleep 0.01; done
+await $one grep -q '^frame 3 ' said || { cat said; exit 1; }
 kill -TERM $one
 wait $one
 echo "status $?"
@@ -413,7 +414,7 @@ tail -n 1 said
 ls cache | grep snapshot
 (run -o a/a.####.bgeo --cache cache --stats b.json) >said 2>&1 || cat said
 diff -r whole a
-]]
+]])
     local frame, snapshot = said:match("^status 143\ninterrupted after frame (%d+); the same command goes on " ..
       "behind it\nsnapshot%.(%d+)%.rapid\n$")
     assert.truthy(frame, said)
@@ -432,30 +433,30 @@ return rapid.create { points = rapid.points.from { P = { {0, 0, 0} } } }
     points.detail.sum = sum
   end) :solve {}
 ]]
-    local said = folder:shell [[
+    local said = folder:shell(await .. [[
 "$RAPID" run scene.lua -f 1-8 --cache cache --cache-every 2 --grace 0.2 >said 2>&1 &
 one=$!
-until grep -q '^frame 3 ' said; do sleep 0.01; done
+await $one grep -q '^frame 3 ' said || { cat said; exit 1; }
 kill -TERM $one
 wait $one
 echo "status $?"
 tail -n 1 said
 ls cache | grep snapshot
-]]
+]])
     assert.equal("status 143\ninterrupted; the frame took longer than the --grace, and is dropped\n" ..
       "snapshot.0002.rapid\n", said)
     -- With a second signal, at once. (What the first run said would be found before this one begins.)
-    said = folder:shell [[
+    said = folder:shell(await .. [[
 "$RAPID" run scene.lua -f 1-8 --cache other --grace 1000 >again 2>&1 &
 one=$!
-until grep -q '^frame 3 ' again 2>/dev/null; do sleep 0.01; done
+await $one grep -q '^frame 3 ' again || { cat again; exit 1; }
 kill -TERM $one
 sleep 0.1
 kill -TERM $one
 wait $one
 echo "status $?"
 tail -n 1 again
-]]
+]])
     assert.equal("status 143\ninterrupted\n", said)
   end)
 

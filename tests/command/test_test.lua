@@ -1,4 +1,5 @@
 -- rapid test: how script-level tests are found, run and counted, and their access to scenes.
+local await = require "tests.await"
 local command = require "testing.command"
 
 local scene = [[
@@ -218,9 +219,9 @@ it("four", function() io.write "no newline" end)]]
     local folder = new_folder { ["t.lua"] = [[
 local command = require "testing.command"
 it("sleeps", function() command.shell("echo $PPID $$ >ids; exec sleep 1000") end)]] }
-    local result = command.shell([[
+    local result = command.shell(await .. [[
 "$RAPID" test t.lua &
-until [ -s ids ]; do sleep 0.01; done
+await $! test -s ids || exit 1
 kill -9 $!
 # A process that has ended may wait for its new parent to notice.
 runs() { grep -sq '^State:.[^ZX]' /proc/$1/status; }

@@ -1,4 +1,5 @@
 -- rapid wedge: one scene at many settings.
+local await = require "tests.await"
 local command = require "testing.command"
 local csv_rows = require "tests.csv_rows"
 local json = require "dkjson"
@@ -157,10 +158,10 @@ return rapid.create {} :emit { source = rapid.shape.box {}, rate = rate }
   end)
 
   it("ends its rows with itself, and leaves whole files alone", function()
-    local result = command.shell([[
+    local result = command.shell(await .. [[
       "$RAPID" wedge box.lua --vary rate=24000,48000 --jobs 2 -f 1-100000 -o "$PWD/long/{rate}.####.csv" &
       wedge=$!
-      while [ ! -e long/48000.0002.csv ] || [ ! -e long/24000.0002.csv ]; do sleep 0.05; done
+      await $wedge test -e long/48000.0002.csv -a -e long/24000.0002.csv || echo it has written no frames
       kill -TERM $wedge
       wait $wedge
       echo status $?

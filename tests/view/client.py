@@ -60,7 +60,7 @@ class Client:
 
     def until_done(self, run=1, pulls=False):
         """The status of a run that is done. pulls: its newest frames, shapes and figures, as the page does."""
-        version = 0
+        version, end = 0, time.monotonic() + PATIENCE
         while True:
             status = self.ask("status", since=version, graph=1)
             version = status["version"]
@@ -72,6 +72,7 @@ class Client:
             if status["run"] >= run and status["state"] == "done":
                 return status
             assert status["state"] in ("starting", "computing"), status["state"]
+            assert time.monotonic() < end, f"waited {PATIENCE} s in vain; the last status was {status}"
             time.sleep(0.03 if pulls else 0.3)
 
     def close(self):

@@ -1,0 +1,17 @@
+-- Shell text for lines that start a process and wait for what it does:
+--
+--   await PID COMMAND...    waits until the command succeeds. Fails if the process ends before that, or after minutes.
+--
+-- A loop without the process would never end if the process cannot start.
+return [[
+await() {
+  process=$1; shift
+  for try in $(seq 12000); do
+    ! "$@" 2>/dev/null || return 0
+    # What it did last counts, too.
+    kill -0 "$process" 2>/dev/null || { "$@" 2>/dev/null; return; }
+    sleep 0.02
+  done
+  return 1
+}
+]]

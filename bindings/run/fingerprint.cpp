@@ -115,8 +115,11 @@ Fingerprint fingerprint_of(const Session& session, const Plan& plan, const fs::p
 {
     Fingerprint fingerprint = options;
     fingerprint["Rapid"] = RAPID_ABI;
-    for (const std::string& file : loaded_plugins())
-        fingerprint["the plugin " + fs::path(file).filename().string()] = hash_text(file_hash(file));
+    // Plugins of several folders may share a name.
+    for (const std::string& file : loaded_plugins()) {
+        std::string& hashes = fingerprint["the plugin " + fs::path(file).filename().string()];
+        hashes += (hashes.empty() ? "" : " ") + hash_text(file_hash(file));
+    }
     for (const auto& [file, functions] : session.code()) {
         const bool own = fs::path(file).string().starts_with(lua_folder().string());
         fingerprint[code + name_of(file, own ? lua_folder() : graph.parent_path())] = text_of(functions);

@@ -188,7 +188,7 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
     if (!events.path().empty()) {  // those up to the last frame are known when it is computed
         last_due_ = frames_.last;
         if (!first_due_) first_due_ = last_due_;
-        if (every_ > 0) events.log_to(events_log());
+        if (every_ > 0 || !snapshots().empty()) events.log_to(events_log());
     }
     try {
         journal_.begin(folder_ / "journal", known_);

@@ -36,6 +36,15 @@ local function new_folder(text)
   return folder
 end
 
+-- Compiles a plugin that has no nodes.
+local function write_plugin(folder, name)
+  folder:done "-f 1-1 --cache of_version"
+  local known = command.rapid("info of_version/snapshot.####.rapid --json", { cwd = folder.path }).stdout
+  folder:write("plugin.c", ('const char rapid_plugin_mark[] = "rapid plugin, built with %s";'):format(
+    require "dkjson".decode(known)[1].fingerprint.Rapid))
+  folder:shell("cc -shared -fPIC -o " .. name .. " plugin.c")
+end
+
 -- The frames that a run tells it has computed.
 local function computed(said)
   local list = {}
@@ -220,7 +229,7 @@ return rapid.create { seed = 3 }
       ["--keep-all"] = { "--keep-all", differs = "attributes of create1" },  -- snapshots lack some
       ["--script-timeout"] = { "--script-timeout 100" },
       ["--script-memory"] = { "--script-memory 512M" },
-      ["--memory"] = { "--memory 2G" }, ["--frames"] = { "--frames 1-6" },
+      ["--memory"] = { "--memory 2G" }, ["--frames"] = { "--frames 5-6" },
       ["--output"] = { "--output b.####.bgeo" },
       ["--camera"] = { "--camera 0,1,5,0,0,0" }, ["--size"] = { "--size 64x64" },
       ["--part"] = { "--part 1/2", differs = "--part" }, ["--sample"] = { "--sample 0.5", differs = "--sample" },
@@ -229,7 +238,7 @@ return rapid.create { seed = 3 }
       ["--cache-every"] = { "--cache-every 3" }, ["--again"] = { "--again" }, ["--grace"] = { "--grace 5" },
       ["--durable"] = { "--durable" }, ["--quiet"] = { "--quiet" },
       ["--untrusted"] = { "--untrusted" }, ["--allow-read"] = { "--untrusted --allow-read ." },
-      ["--threads"] = { "--threads 3" }, ["--plugin"] = false,  -- loads other code, which may do anything
+      ["--threads"] = { "--threads 3" }, ["--plugin"] = { "--plugin p.so", differs = "the plugin p.so" },
       ["--verbose"] = { "--verbose" },
       -- Not given together with --cache, or not for a run.
       ["--watch"] = false, ["--farm"] = false, ["--farm-options"] = false, ["--dry-run"] = false, ["--parts"] = false,
@@ -243,22 +252,68 @@ return rapid.create { seed = 3 }
     assert.truthy(listed > 30, help)
 
     local begun, whole = new_folder(), new_folder()
+    write_plugin(begun, "p.so")
     begun:done "-f 1-4 -o a.####.bgeo --cache cache"
     whole:done "-f 1-6 -o a.####.bgeo"
-    for name, option in pairs(options) do
-      if option then
-        begun:shell "rm -rf trial && mkdir trial && cp -rp scene.lua cache trial"
-        local result = command.rapid("run scene.lua -o a.####.bgeo --cache cache " .. option[1] ..
-          (name == "--frames" and "" or " -f 1-6"),
-          { cwd = begun:file "trial" })
-        local differs = result.stderr:match "it is of another run: (.-) was "
-        assert.equal(option.differs, differs, name)
-        assert.equal(option.differs and 2 or 0, result.status, name .. ": " .. result.stderr)
-        if result.status == 0 then
-          assert.equal(whole:read "a.0006.bgeo", begun:read "trial/a.0006.bgeo", name)
-        end
+    local function check(name, option, first, second)
+      local function run(given, frames)
+        return command.rapid(("run scene.lua -o a.####.bgeo --cache cache %s %s"):format(given,
+          given:find "%-%-frames" and "" or "-f " .. frames), { cwd = begun:file "trial" })
+      end
+      begun:shell("rm -rf trial && mkdir trial && cp -p scene.lua p.so trial")
+      if first then
+        assert.equal(0, run(first, "1-4").status, name)
+      else
+        begun:shell "cp -rp cache trial"
+      end
+      local result = run(second, "5-6")
+      assert.equal(option.differs, (result.stderr:match "it is of another run: (.-) was "), name)
+      assert.equal(option.differs and 2 or 0, result.status, name .. ": " .. result.stderr)
+      if option.differs then return end
+      if second ~= "--quiet" and second ~= "--again" then
+        assert.same(range(5, 6), computed(result.stdout), name)
+      end
+      for _, file in ipairs { "a.0005.bgeo", "a.0006.bgeo" } do
+        assert.truthy(whole:read(file) == begun:read("trial/" .. file), name .. ": " .. file)
       end
     end
+    for name, option in pairs(options) do
+      if option then
+        check(name, option, nil, option[1])
+        if name ~= "--frames" then check(name, option, option[1], "") end
+      end
+    end
+  end)
+
+  it("refuses a plugin that has changed, also one of several that have a name", function()
+    local folder = new_folder()
+    folder:shell "mkdir one two"
+    write_plugin(folder, "one/p.so")
+    folder:shell "cp one/p.so two"
+    local function run(frames)
+      return command.rapid("run scene.lua --cache cache -f " .. frames,
+        { cwd = folder.path, environment = { RAPID_PLUGIN_PATH = "one/p.so:two/p.so" } })
+    end
+    assert.equal("", run("1-4").stderr)
+    assert.same(range(5, 6), computed(run("1-6").stdout))
+    for _, name in ipairs { "one/p.so", "two/p.so" } do
+      folder:shell("cp " .. name .. " kept; printf x >>" .. name)
+      local result = run "1-6"
+      assert.equal(2, result.status)
+      assert.match("it is of another run: the plugin p.so was %x+ %x+, is %x+ %x+;", result.stderr)
+      folder:shell("cp kept " .. name)
+    end
+    assert.same({}, computed(run("1-6").stdout))
+  end)
+
+  it("takes events up from snapshots where it keeps none itself", function()
+    local folder = new_folder()
+    folder:done "-f 1-12 --events whole.csv"
+    folder:done "-f 1-10 --events a.csv --cache cache --cache-every 5"
+    assert.same({ 11, 12 }, computed(folder:done "-f 1-12 --events a.csv --cache cache --cache-every 0"))
+    folder:shell "cmp whole.csv a.csv"
+    assert.same({ 11, 12 }, computed(folder:done "-f 1-12 --events b.csv --cache cache --cache-every 5"))
+    folder:shell "cmp whole.csv b.csv"
   end)
 
   it("estimates errors in all runs, or in none, as the first one has", function()

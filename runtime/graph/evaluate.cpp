@@ -85,7 +85,14 @@ FrameFigures Evaluator::examine()
 {
     for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = true;
     advance();
-    return advance().figures;
+    const FrameFigures found = advance().figures;
+    const std::int64_t start = next_ - 2;
+    std::uint64_t idle = found.idle;
+    for (std::int64_t after = 2; idle > 0 && after <= most_tried; after *= 2) {
+        next_ = start + after;
+        idle = advance().figures.idle;
+    }
+    return found;
 }
 
 void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vector<std::size_t>& readers,

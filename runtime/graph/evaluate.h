@@ -83,7 +83,8 @@ public:
     FrameResult advance();
 
     // Stiffness and resolution in the first frame after the start, of a few newborn and the initial points, which Solve
-    // does not move. The evaluator can't be used afterwards. Error: as advance().
+    // does not move. If an emitter emits nothing in that frame, later ones are tried, at most most_tried away: their
+    // points go through the kernels, too. The evaluator can't be used afterwards. Error: as advance().
     FrameFigures examine();
 
     // All that the next frames depend on, after the last one; its columns are shared until either side writes them.
@@ -93,6 +94,8 @@ public:
     void load(const Snapshot& snapshot);
 
 private:
+    static constexpr std::int64_t most_tried = 64;  // frames after the start
+
     void evaluate_constants(const Snapshot& snapshot);
     bool adopts_once(std::size_t node) const;
     // Calls the functions of the frame, `left` sub-frames before its end.

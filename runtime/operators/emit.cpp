@@ -46,7 +46,7 @@ namespace {
 
 constexpr std::size_t batch_size = 256;     // births at a time, in the first-level cache
 constexpr double most_births = 2147483647;  // in a frame
-constexpr std::size_t trial_births = 64;    // of a frame, when only stiffness is examined
+constexpr std::size_t trial_births = 64;    // of a frame, in a trial (Evaluator::examine)
 
 struct Emit {
     EmitSource source;
@@ -227,12 +227,15 @@ struct Emit {
     {
         if (now.at_start) return start(inputs, now);
         Flow flow = std::move(inputs[0]);
+        const std::uint64_t born = now.figures.born;
         if (source.is_node) {
             bear_from_parents(flow, inputs.subspan(1), now);
-            return flow;
+        } else {
+            move_source(*flow.simulation, now);
+            emit(flow, births(*flow.simulation, now), now);
         }
-        move_source(*flow.simulation, now);
-        emit(flow, births(flow.simulation->clock().step_at(now.frame), flow.simulation->clock()), now);
+        has_emitted_ |= now.figures.born > born;
+        if (flow.simulation->trial && !has_emitted_) ++now.figures.idle;
         return flow;
     }
 
@@ -294,8 +297,14 @@ private:
         return found == impulse->end() ? 0 : static_cast<std::size_t>(found->second);
     }
 
-    Births births(std::int64_t step, const FrameClock& clock)
+    Births births(const Simulation& simulation, const Evaluation& now)
     {
+        const FrameClock clock = simulation.clock();
+        const std::int64_t step = clock.step_at(now.frame);
+        // A trial skips frames.
+        if (simulation.trial && impulse)
+            return clock_.at_once(!impulse->empty() && impulse->begin()->first <= now.frame.number ? trial_births : 0,
+                                  clock.fps);
         if (!rate) return births_of_frame(step, clock);
         const double steps = clock.steps_per_second();
         if (rate->value / steps > most_births)
@@ -364,6 +373,7 @@ private:
     BirthClock clock_;
     bool at_beginning_ = false;  // of an interval: see BirthSource::Move
     bool warned_unmatched_ = false;
+    bool has_emitted_ = false;    // read in trials
     mutable BirthSource source_;  // made from `source` and `from` when they change
     ParentEmitter parents_;       // where it is a node
 };

@@ -69,6 +69,37 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
     assert.equal(0, with(5, "points[5000].P = vec3(0, 0, 0)").status)
   end)
 
+  it("finds what kernels do wrong with points that are born later, or at events", function()
+    local chain = [[
+local rapid = require "rapid"
+local parents = rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
+  :collide { shape = rapid.shape.plane { offset = -9 } } :solve {}
+return rapid.create {} :emit { source = %s }
+  :points("k", function(p, frame) %s end)
+  :solve {}
+]]
+    for _, source in ipairs {
+      "rapid.mesh.sphere {}, rate = 5", "rapid.mesh.sphere {}, impulse = { [30] = 5 }",
+      "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
+      "rapid.mesh.sphere {}, count = function(frame) return frame.number > 40 and 1 or 0 end",
+      "function(frame) return rapid.points.from { P = frame.number > 8 and {{0, 1, 0}} or {} } end, rate = 99",
+      'parents, on = "hit"', 'parents, on = "death", split = true', 'parents, on = "age > 0.5", kill_parent = true',
+      "parents, on = function(p) return p.P.y < -5 end", "parents, rate = 0.02",
+    } do
+      local result = check(chain:format(source, "p.v = p.P.x.y"))
+      assert.not_equal(0, result.status, source)
+      assert.match('^scene.lua:5: node "k"', result.stderr)
+      assert.equal("", check(chain:format(source, "p.v = p.P * frame.time")).stderr)
+    end
+    -- The frames of a trial are those in which points are.
+    assert.equal(0, check(chain:format(
+      "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
+      "p.v = p.P * ({ [17] = 2 })[frame.number]")).status)
+    for _, source in ipairs { "rapid.mesh.sphere {}, rate = 0", "parents, rate = 0", 'parents, on = "hit", count = 0' } do
+      assert.equal(0, check(chain:format(source, "p.v = p.P.x.y")).status, source)
+    end
+  end)
+
   it("warns of what is doubtful, and goes on", function()
     local result = check [[
 local rapid = require "rapid"

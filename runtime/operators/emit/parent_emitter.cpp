@@ -35,6 +35,28 @@ BirthPlan plan_of_step(const ParentOptions& options, const Flow& flow, const Flo
     return plan;
 }
 
+bool emits(const BirthPlan& plan)
+{
+    const auto is_positive = [](const auto& amount) { return !amount.attribute.empty() || amount.value > 0; };
+    if (plan.rate) return is_positive(*plan.rate);
+    return plan.count ? is_positive(*plan.count) : plan.on.has_value();
+}
+
+// In a trial, in which no point moves and nothing happens to it: one birth of a living parent.
+std::vector<Brood> sample_of(const ParentPaths& parents)
+{
+    for (std::uint32_t i = 0; i < parents.size(); ++i) {
+        if (!parents[i].takes_part || !parents[i].is_alive) continue;
+        Brood brood{};
+        brood.parent = i;
+        brood.hit = Brood::no_hit;
+        brood.count = 1;
+        brood.begin = brood.end = parents[i].end;
+        return {brood};
+    }
+    return {};
+}
+
 // Points of this chain are removed at once, those of another by the evaluator, from all that nobody has taken yet.
 void remove_parents(Flow& flow, const Flow& from, const ParentPaths& parents, const std::vector<Brood>& broods,
                     const Evaluation& now)
@@ -97,10 +119,12 @@ void ParentEmitter::bear(Flow& flow, const Flow& from, const ParentOptions& opti
     std::vector<Brood> broods;
     // A chain that begins when its parents have lived already bears from its next frame on.
     if (!now.at_start || record.h == 0) broods = clock_.births(parents, plan_of_step(options, flow, from, now), now);
+    const bool is_sample = flow.simulation->trial && !now.at_start && broods.empty() && emits(options.plan);
+    if (is_sample) broods = sample_of(parents);
     const Offspring offspring(parents, broods, options.traits, now);
     offspring.make_columns(flow.points);
     require_room(flow.points, broods);
-    if (options.kills) remove_parents(flow, from, parents, broods, now);
+    if (options.kills && !is_sample) remove_parents(flow, from, parents, broods, now);
     now.figures.born += offspring.append_to(flow.points, flow.simulation->next_id, most);
     if (parents.without_path() > 0 && !now.at_start)
         now.warnings.push_back(fmt::format(

@@ -23,7 +23,7 @@ return rapid.create { fps = 24, seed = 1, points = rapid.points.from { P = start
       local angle = 6.28319 * part + (4 + 3 * part) * frame.time
       local wide = 0.12 + 0.1 * math.sin(2 * frame.time + 9 * part)
       local out = vec3(math.cos(angle), math.sin(angle), math.sin(angle + 1.5) * 0.7)
-      p.P = tip(frame.time) + out * wide
+      p.v = (tip(frame.time) + out * wide - p.P) / frame.dt  -- solve moves it there
       p.Cd = vec3(0.9, 0.25, 0.1):lerp(vec3(0.1, 0.35, 1), part)
     end)
   :solve     {}

@@ -7,6 +7,7 @@
 
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/graph/points_object.h"
 
 namespace rapid {
 namespace {
@@ -14,6 +15,11 @@ namespace {
 std::string warning_of(const Node& node, const std::string& text)
 {
     return fmt::format("{}:{}: node \"{}\": {}", node.location.file, node.location.line, node.name, text);
+}
+
+bool names(const std::vector<std::string>& list, std::string_view name)
+{
+    return std::find(list.begin(), list.end(), name) != list.end();
 }
 
 bool comes(const PlannedSimulation& simulation, std::string_view name)
@@ -58,8 +64,7 @@ void warn_of_missing_lives(const Plan& plan, std::vector<std::string>& warnings)
         const auto is_script = [](const auto& argument) { return argument.second.template object<PointFunction>(); };
         if (std::none_of(arguments.begin(), arguments.end(), is_script)) continue;
         const std::vector<std::string> reads = uses_of(planned).reads;
-        const auto names = [&](const char* name) { return std::find(reads.begin(), reads.end(), name) != reads.end(); };
-        if (!names("age") || !names("life") || comes_to(plan, planned, "life")) continue;
+        if (!names(reads, "age") || !names(reads, "life") || comes_to(plan, planned, "life")) continue;
         warnings.push_back(
             warning_of(*planned.node, "its points live for ever, so their age is no part of a life; give emit a life"));
     }
@@ -76,6 +81,72 @@ void warn_of_idle_spins(const Plan& plan, std::vector<std::string>& warnings)
     }
 }
 
+bool is_at_rest(const PointSet& points)
+{
+    const Column<Vec3f>& v = points.v();
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (v[i] != Vec3f::Zero()) return false;
+    return true;
+}
+
+// Returns false if the points that an emitter emits are surely at rest.
+bool may_emit_velocity(const Node& emit)
+{
+    for (const char* name : {"velocity", "speed", "inherit_velocity"})
+        if (emit.arguments.count(name)) return true;
+    if (const auto birth = emit.arguments.find("birth"); birth != emit.arguments.end())
+        if (const auto kernel = birth->second.object<PointFunction>()) {
+            Uses uses;
+            kernel->uses(uses);
+            if (names(uses.writes, "v")) return true;
+        }
+    const auto source = emit.arguments.find("source");
+    const ObjectPtr* object = source == emit.arguments.end() ? nullptr : source->second.get<ObjectPtr>();
+    if (!object || (*object)->varies() || source->second.object<NodeHandle>()) return true;
+    const auto points = source->second.object<PointsObject>();
+    return points && !is_at_rest(points->points);
+}
+
+// Returns false if no point that passes through the node surely has another velocity than 0 by it.
+bool may_give_velocity(const PlannedNode& planned)
+{
+    const Node& node = *planned.node;
+    switch (node.type->kind) {
+        case NodeKind::Source: {
+            const auto points = node.arguments.find("points");
+            const auto initial = points == node.arguments.end() ? nullptr : points->second.object<PointsObject>();
+            return initial && !is_at_rest(initial->points);
+        }
+        case NodeKind::Solve:
+            return false;
+        case NodeKind::Points:
+            return node.type->name == "emit" ? may_emit_velocity(node) : names(uses_of(planned).writes, "v");
+        default:
+            return true;
+    }
+}
+
+// Kernels that move points, all of which keep the velocity 0.
+void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& warnings)
+{
+    for (std::size_t s = 0; s < plan.simulations.size(); ++s) {
+        const auto moves_alone = [&](const PlannedNode& planned) {
+            return planned.in_loop && planned.carries.count(s) && planned.node->type->name == "points" &&
+                   names(uses_of(planned).writes, "P");
+        };
+        const auto mover = std::find_if(plan.nodes.begin(), plan.nodes.end(), moves_alone);
+        if (!plan.simulations[s].solve || mover == plan.nodes.end()) continue;
+        if (std::any_of(plan.nodes.begin(), plan.nodes.end(), [&](const PlannedNode& planned) {
+                return planned.carries.count(s) && may_give_velocity(planned);
+            }))
+            continue;
+        warnings.push_back(
+            warning_of(*mover->node,
+                       "moves P and leaves v at 0, so that files and motion blur have no velocities; assign "
+                       "p.v = (place - p.P) / frame.dt instead of p.P, and :solve moves the point there"));
+    }
+}
+
 }  // namespace
 
 std::vector<std::string> doubts_about(const Graph& graph, const Plan& plan)
@@ -84,6 +155,7 @@ std::vector<std::string> doubts_about(const Graph& graph, const Plan& plan)
     warn_of_dropped_nodes(graph, plan, warnings);
     warn_of_missing_lives(plan, warnings);
     warn_of_idle_spins(plan, warnings);
+    warn_of_moves_without_velocity(plan, warnings);
     return warnings;
 }
 

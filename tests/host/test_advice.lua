@@ -187,6 +187,36 @@ describe("a warning", function()
     assert.equal("", warnings(chain:format ":contact { radius = 0.01, spin = true }"))
   end)
 
+  it("names a kernel that moves points whose v stays 0", function()
+    local chain = "return rapid.create {%s} :emit { source = rapid.mesh.sphere {}, rate = 99, %s } "
+      .. ":points('k', function(p, frame) %s end) %s :solve {}"
+    local moves = "p.P = vec3(math.sin(frame.time + p.id), 0, 0)"
+    local warning = 'node "k": moves P and leaves v at 0, so that files and motion blur have no velocities; assign '
+      .. "p.v = (place - p.P) / frame.dt instead of p.P, and :solve moves the point there"
+    expect(warning, warnings(chain:format("", "", moves, "")))
+    expect(warning, warnings(chain:format("points = POINTS", "birth = function(p) p.P = p.P * 2 end", moves, "")))
+    for _, text in ipairs {
+      chain:format("", "velocity = {0, 1, 0}", moves, ""), chain:format("", "speed = 1", moves, ""),
+      chain:format("", "birth = function(p) p.v = p.P end", moves, ""),
+      chain:format("points = rapid.points.from { P = {{0, 1, 0}}, v = {{0, 1, 0}} }", "", moves, ""),
+      chain:format("", "", moves .. " p.v = vec3(math.cos(frame.time + p.id), 0, 0)", ""),
+      chain:format("", "", moves, ":gravity {}"), chain:format("", "", moves, ":points('w', function(p) p.v = p.P end)"),
+      chain:format("", "", "p.v = p.P", ""), chain:format("", "", "", ":action('a', function(p) p.P = p.P * 2 end)"),
+      chain:format("", "birth = function(p) p.P = p.P * 2 end", "", ""),
+      "return rapid.create { points = POINTS } :solve {} :points('k', function(p) p.P = p.P * 2 end)",
+    } do assert.equal("", warnings(text)) end
+    -- What follows the advice has the same places, and velocities.
+    local function frame_of(text) return scene.run(chain:format("", "", text, ""), { frames = {1, 9} })[9] end
+    local moved = frame_of "local place = vec3(frame.time * p.id, 1, 0) p.P = place"
+    local driven = frame_of "local place = vec3(frame.time * p.id, 1, 0) p.v = (place - p.P) / frame.dt"
+    assert.truthy(#moved > 20)
+    for k = 1, 20 do
+      assert.near(moved[k].P.x, driven[k].P.x, 1e-5)
+      assert.near(0, moved[k].v.x, 0)
+      assert.near(driven[k].id, driven[k].v.x, 1e-3)
+    end
+  end)
+
   it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()
     expect('node "emit1": its points are gone after the frame of their birth: no :solve comes after it',
       warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")

@@ -219,7 +219,7 @@ struct Emit {
         }
         clock_ = BirthClock(simulation.start);
         move_source(simulation, now);
-        emit(flow, clock_.at_once(impulse ? impulse_at(simulation.start) : 0, simulation.fps), now);
+        emit(flow, clock_.at_once(impulse ? impulse_at(*impulse, simulation.start) : 0, simulation.fps), now);
         return flow;
     }
 
@@ -291,20 +291,12 @@ private:
     ParentOptions parent_options(double wait = 0) const;
     void bear_from_parents(Flow& flow, std::span<const Flow> sources, const Evaluation& now);
 
-    std::size_t impulse_at(std::int64_t frame) const
-    {
-        const auto found = impulse->find(frame);
-        return found == impulse->end() ? 0 : static_cast<std::size_t>(found->second);
-    }
-
     Births births(const Simulation& simulation, const Evaluation& now)
     {
         const FrameClock clock = simulation.clock();
         const std::int64_t step = clock.step_at(now.frame);
-        // A trial skips frames.
         if (simulation.trial && impulse)
-            return clock_.at_once(!impulse->empty() && impulse->begin()->first <= now.frame.number ? trial_births : 0,
-                                  clock.fps);
+            return clock_.at_once(has_impulse_by(*impulse, now.frame.number) ? trial_births : 0, clock.fps);
         if (!rate) return births_of_frame(step, clock);
         const double steps = clock.steps_per_second();
         if (rate->value / steps > most_births)
@@ -318,7 +310,8 @@ private:
     Births births_of_frame(std::int64_t step, const FrameClock& clock)
     {
         const std::int64_t parts = clock.subframes, before = step - 1 - clock.start, part = before % parts;
-        const auto n = static_cast<std::size_t>(count ? count->value : impulse_at(clock.start + 1 + before / parts));
+        const auto n =
+            static_cast<std::size_t>(count ? count->value : impulse_at(*impulse, clock.start + 1 + before / parts));
         if (!age && (birth.when == "random" || birth.when == "even"))
             return clock_.at_once(n, clock.fps, static_cast<int>(part), clock.subframes);
         const bool here = part == (age || birth.when == "end" ? parts - 1 : 0);
@@ -347,7 +340,6 @@ private:
     }
 
     bool joins_group(const Evaluation& now) const { return !joins.empty() && now.keeps_group(joins); }
-
     void move_source(const Simulation& simulation, const Evaluation& now);
     void emit(Flow& flow, Births births, const Evaluation& now);
 

@@ -23,6 +23,21 @@ inline constexpr double whole_tolerance = 1e-9;
 // Of a newborn point with the attributes that most have, in the state and in what is made of it within a frame.
 inline constexpr double bytes_a_birth = 2 * 64;
 
+// The births at a frame, of numbers by frame.
+template <class Numbers>
+std::size_t impulse_at(const Numbers& impulse, std::int64_t frame)
+{
+    const auto found = impulse.find(frame);
+    return found == impulse.end() ? 0 : static_cast<std::size_t>(found->second);
+}
+
+// For trials, which skip frames.
+template <class Numbers>
+bool has_impulse_by(const Numbers& impulse, double frame)
+{
+    return !impulse.empty() && static_cast<double>(impulse.begin()->first) <= frame;
+}
+
 // The births of one frame, or of a part of it, numbered from 0 over the emitter's whole life.
 struct Births {
     std::uint64_t first = 0;

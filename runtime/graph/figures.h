@@ -51,8 +51,8 @@ struct FrameFigures {
     bool has_no_energy = false;
     std::vector<Stiffness> stiff;
     double script_seconds = 0, solve_seconds = 0;
-    double rounding = 0;    // m, the most by which rounding of positions has displaced a point of the sample
-    Resolution resolution;  // of a trial (Evaluator::examine)
+    double rounding = 0;     // m, the most by which rounding of positions has displaced a point of the sample
+    Resolution resolution;   // of a trial (Evaluator::examine)
     std::uint64_t idle = 0;  // in a trial: emitters that have emitted nothing so far
 
     // Adds the next part of the frame: counts add up, maxima stay, and the later part gives the state at the end.

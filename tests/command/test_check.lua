@@ -95,7 +95,8 @@ return rapid.create {} :emit { source = %s }
     assert.equal(0, check(chain:format(
       "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
       "p.v = p.P * ({ [17] = 2 })[frame.number]")).status)
-    for _, source in ipairs { "rapid.mesh.sphere {}, rate = 0", "parents, rate = 0", 'parents, on = "hit", count = 0' } do
+    for _, source in ipairs { "rapid.mesh.sphere {}, rate = 0", "parents, rate = 0",
+                              'parents, on = "hit", count = 0' } do
       assert.equal(0, check(chain:format(source, "p.v = p.P.x.y")).status, source)
     end
   end)

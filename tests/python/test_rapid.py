@@ -251,6 +251,20 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(TypeError):
             scene.set(height=None)
 
+    def test_a_shape_gives_one_real_distance_of_each_place(self):
+        text = """local rapid = require "rapid" return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } }
+  :gravity {} :collide { shape = rapid.host "floor" } :solve {}"""
+        for distance, wrong in ((lambda P: P[:1, 1], ValueError), (lambda P: P[:, 1:2], ValueError),
+                                (lambda P: P[:, 1] + 1j, TypeError), (lambda P: None, TypeError)):
+            scene = rapid.Scene("floor.lua", text=text,
+                                objects={"floor": rapid.Shape(lambda P, gradient, of=distance: of(P))})
+            with self.assertRaisesRegex(wrong, "the distance is of"):
+                scene.advance_to(3)
+
+    def test_paths_are_a_list(self):
+        with self.assertRaisesRegex(TypeError, "paths = 'modules'; it must be a list of folders"):
+            fall(paths="modules")
+
     def test_an_option_that_is_the_name_of_a_parameter_is_refused(self):
         def opened(**options):
             return rapid.Scene("scene.lua", text="""local rapid = require "rapid"

@@ -255,6 +255,8 @@ class Scene:
         options.settings, options.setting_count = settings, len(settings)
         if seed is not None:
             options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
+        if isinstance(paths, (str, bytes)):
+            raise TypeError(f"paths = {paths!r}; it must be a list of folders")
         folders = (c_char_p * len(paths))(*(encoded(str(path)) for path in paths))
         options.paths, options.path_count = folders, len(paths)
         options.threads, options.script_seconds = Int.checked(threads), script_seconds

@@ -128,7 +128,12 @@ class Shape:
         def distance(_, n, P, phi, gradient):
             arrays = _Arrays()
             slope = arrays.add(gradient, (n, 3), output=True) if gradient else None
-            numpy.ctypeslib.as_array(phi, shape=(n,))[:] = self._distance(arrays.add(P, (n, 3)), slope)
+            distances = numpy.asarray(self._distance(arrays.add(P, (n, 3)), slope))
+            if distances.dtype.kind not in "fiub":
+                raise TypeError(f"the distance is of {distances.dtype}; it must be of numbers")
+            if distances.shape not in ((), (n,)):
+                raise ValueError(f"the distance is of shape {distances.shape}; it must be ({n},), one of each place")
+            numpy.ctypeslib.as_array(phi, shape=(n,))[:] = distances
             arrays.give_back()
             return 0
         shape.distance = Distance(callbacks.guard(distance, 1))

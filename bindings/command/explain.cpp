@@ -29,7 +29,7 @@ public:
             .type_name("GRAPH");
         options
             .add_option(
-                "--state", [this](const std::string& text) { state_after_ = read_frames(text).last; },
+                "--state", [this](const std::string& text) { state_after_ = read_frame("--state", text); },
                 "computes the frames up to this one, and tells what each node then keeps, as a snapshot holds it")
             .type_name("FRAME");
         options.add_flag("--json", json_, "as JSON");

@@ -39,6 +39,15 @@ FrameSelection read_frames(const std::string& text)
     return range;
 }
 
+std::int64_t read_frame(const std::string& option, const std::string& text)
+{
+    std::int32_t frame = 0;
+    const char* const end = text.data() + text.size();
+    if (const auto parsed = std::from_chars(text.data(), end, frame); parsed.ec != std::errc() || parsed.ptr != end)
+        throw Error(fmt::format("{} {}: it must be the number of a frame, such as 12", option, text));
+    return frame;
+}
+
 void declare_frames(Options& options, std::optional<FrameSelection>& frames, const std::string& doc)
 {
     options

@@ -17,6 +17,9 @@ constexpr std::int64_t default_frames = 48;
 // this form.
 FrameSelection read_frames(const std::string& text);
 
+// One frame, for another option. Error: the text is not a whole number of 32 bits.
+std::int64_t read_frame(const std::string& option, const std::string& text);
+
 // Declares -f. doc: which frames they are, and how many are taken without it.
 void declare_frames(Options& options, std::optional<FrameSelection>& frames, const std::string& doc);
 

@@ -87,6 +87,7 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
     const std::exception_ptr error = set_up();
     if (!error) return;
     close();
+    if (is_at_limit_) throw Error(memory_limit_text());
     std::rethrow_exception(error);
 }
 
@@ -172,15 +173,16 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
     if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
-    else if (state.making_ && state.memory_ > 0)
+    else
+        state.is_at_limit_ = is_beyond_limit;
+    if (moved) return moved;
+    if (state.making_ && state.memory_ > 0)
         std::longjmp(*state.making_, 1);
     else if (state.L_ && !state.protected_)
         throw std::bad_alloc();
-    else if (state.protected_ && is_asked_by_compiled_code()) {
-        state.is_left_at_limit_ = is_beyond_limit;
+    else if (state.protected_ && is_asked_by_compiled_code())
         Interruption::Call::try_to_leave(state.slot_);
-    }
-    return moved;
+    return nullptr;
 }
 
 void State::open_libraries()
@@ -247,14 +249,15 @@ int State::protected_call(int arguments, int results, int handler)
 void State::fail_broken() const
 {
     host_.interruption.check();
-    if (is_left_at_limit_) throw Error(memory_limit_text());
+    if (is_at_limit_) throw Error(memory_limit_text());
     throw std::bad_alloc();
 }
 
 std::string State::memory_limit_text() const
 {
-    return fmt::format("the script needs more than {} MiB of Lua memory; --script-memory sets the limit",
-                       host_.options().script_memory >> 20);
+    const std::size_t most = host_.options().script_memory;
+    const std::string text = most >> 20 ? fmt::format("{} MiB", most >> 20) : fmt::format("{} bytes", most);
+    return fmt::format("the script needs more than {} of Lua memory; --script-memory sets the limit", text);
 }
 
 void State::leave_if_broken() const

@@ -140,7 +140,7 @@ private:
     bool limited_ = false;            // to options().script_memory, now
     bool has_libraries_ = false;      // those of LuaJIT itself
     bool is_broken_ = false;          // compiled code was left by a jump
-    bool is_left_at_limit_ = false;   // likewise, as it asked for more than it may have
+    bool is_at_limit_ = false;        // memory was last refused as the script asked for more than it may have
     bool protected_ = false;          // now
     std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory
     Interruption::Slot slot_;

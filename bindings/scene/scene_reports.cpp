@@ -95,6 +95,8 @@ Result<SceneTrace> Scene::trace(const TraceOptions& options)
 {
     Result<Impl::Traced> traced = impl_->call(SceneError::WrongCall, [&] {
         if (options.ids.empty()) refuse("there are no ids; give those of the points that are to be told of");
+        if (options.last < options.first)
+            refuse(fmt::format("frames {} to {} end before they begin", options.first, options.last));
         if (options.step < 1) refuse(fmt::format("step = {}; it must be at least 1", options.step));
         return impl_->trace(options);
     });

@@ -269,5 +269,11 @@ describe("rapid explain --state", function()
     local wrong = explain "falls.lua --state 0"
     assert.equal(2, wrong.status)
     assert.equal("--state 0: it is before the scene's first frame, 1\n", wrong.stderr)
+    for _, frame in ipairs { "x", "1-3", "2x2", "1e9", "9223372036854775807", "" } do
+      wrong = explain(("falls.lua --state '%s'"):format(frame))
+      assert.equal(2, wrong.status)
+      local told = ("--state %s: it must be the number of a frame, such as 12\n"):format(frame)
+      assert.truthy(wrong.stderr:find(told, 1, true), wrong.stderr)
+    end
   end)
 end)

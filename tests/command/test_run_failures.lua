@@ -57,7 +57,7 @@ describe("a script error in a frame", function()
 local function deeper(p) return p.P + nil end
 return rapid.create { points = points }
   :points("fails", function(p, frame)
-    if frame.number == 3 then p.P = deeper(p) end
+    if frame.number == 3 then p.v = deeper(p) end
   end) :solve {}
 ]]
 
@@ -123,6 +123,13 @@ return rapid.create { points = points } :points("spins", function(p) while true 
       :run "-f 1-4 --script-memory 32M"
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find("memory", 1, true), result.stderr)
+    -- Less than a state takes before it runs a script.
+    for most, bytes in pairs { ["1"] = 1, ["300K"] = 307200 } do
+      result = new_folder(points .. "return rapid.create {} :solve {}"):run("-f 1-2 --script-memory " .. most)
+      assert.equal(2, result.status)
+      assert.equal(("the script needs more than %d bytes of Lua memory; --script-memory sets the limit\n")
+        :format(bytes), result.stderr)
+    end
   end)
 end)
 

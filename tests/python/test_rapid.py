@@ -265,6 +265,11 @@ class Scenes(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "paths = 'modules'; it must be a list of folders"):
             fall(paths="modules")
 
+    def test_a_trace_of_frames_that_end_before_they_begin_is_refused(self):
+        scene = fall()
+        with self.assertRaisesRegex(rapid.Error, "frames 5 to 1 end before they begin"):
+            scene.trace([0], 5, 1)
+
     def test_an_option_that_is_the_name_of_a_parameter_is_refused(self):
         def opened(**options):
             return rapid.Scene("scene.lua", text="""local rapid = require "rapid"

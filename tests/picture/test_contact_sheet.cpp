@@ -69,6 +69,18 @@ TEST_CASE("labels stay below their own tile, however long, and in ASCII")
     CHECK(marks(sheet, 12 + 400 + 1, 12 + 200 + 2, 400, 2 * 22) == 0);
 }
 
+TEST_CASE("each letter of a label is drawn whole, whatever precedes it")
+{
+    const auto marks_of = [](const std::string& label) {
+        return marks(contact_sheet({{plain(200, 100, red_pixel), {label}}}), 12, 12 + 200 + 2, 400, 22);
+    };
+    for (char letter = '!'; letter <= '~'; ++letter) {
+        CAPTURE(letter);
+        CHECK(marks_of({letter}) > 0);
+        CHECK(marks_of({letter, letter}) == 2 * marks_of({letter}));
+    }
+}
+
 TEST_CASE("series of tiles begin with a row, or lie in one")
 {
     const auto columns = [](std::size_t count, std::size_t series) {

@@ -26,8 +26,8 @@ def limit_memory():
 
 
 def inside(command, seconds=None, **variables):
-    """Runs a command in the copy, which then has the place of the checkout: paths in objects and precompiled headers fit,
-    and no broken program finds the checkout. Returns the status, or None after too many seconds, and the output."""
+    """Runs a command in the copy, which is mounted over the checkout: paths in objects and precompiled headers fit, and
+    no broken program finds the checkout. Returns the status, or None after too many seconds, and the output."""
     mounts = 'mount --bind "$3" /tmp && mount --bind "$1" "$2" && cd "$2" && shift 3 && exec "$@"'
     log = WORK / "log"
     with open(log, "wb") as output:
@@ -93,7 +93,7 @@ def build():
 
 
 class Suite:
-    """Some tests, which one command runs, and which stop at the first failure if they can."""
+    """Tests that one command runs. It stops at the first failure if it can."""
 
     def __init__(self, name, command):
         self.name, self.command = name, command
@@ -126,7 +126,7 @@ def catch(folder, chosen="~[long]~[.]"):
 
 
 def suites():
-    """What tests/run runs, but for what reads the sources and what has builds of its own."""
+    """Returns the suites of tests/run, without those that read the sources or have builds of their own."""
     found = [catch(path.name.removeprefix("test_")) for path in sorted((BUILD / "bin").glob("test_*"))]
     for path in sorted(pathlib.Path("tests").rglob("test_*.lua")):
         if path.parts[1] != "farm":
@@ -138,7 +138,8 @@ def suites():
 
 
 def own_first(known, source):
-    """These suites, those that belong to a source first (tests/selected), and of them its own file of tests."""
+    """Sorts suites: first the file of tests of a source, then the suites that belong to it (tests/selected), then the
+    others, the fastest first."""
     selected = subprocess.run(["tests/selected", str(source)], check=False, capture_output=True, text=True).stdout
     filters, own = [], set()
     for kind, what, *rest in (line.split() for line in selected.splitlines()):

@@ -81,7 +81,8 @@ def closing(text, start):
 
 
 def with_choice(place, number):
-    """The line of C++ as both: rapid_mutant(number) chooses the broken one. None if the line has no form for that."""
+    """Returns the line of C++ with both forms, of which rapid_mutant(number) chooses the broken one. None if that can't be
+    written."""
     chosen = f"rapid_mutant({number})"
     if place.kind == "constant":
         return place.whole(f"({chosen} ? {place.mutated} : {place.original})")

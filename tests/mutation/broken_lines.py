@@ -81,8 +81,8 @@ def closing(text, start):
 
 
 def with_choice(place, number):
-    """Returns the line of C++ with both forms, of which rapid_mutant(number) chooses the broken one. None if that can't be
-    written."""
+    """Returns the line of C++ in both forms, of which rapid_mutant(number) chooses the broken one. None if the line
+    does not allow that."""
     chosen = f"rapid_mutant({number})"
     if place.kind == "constant":
         return place.whole(f"({chosen} ? {place.mutated} : {place.original})")

@@ -201,4 +201,11 @@ describe("texts", function()
     end
     assert.is_nil(result.stderr:find("c.####.bgeo", 1, true))
   end)
+
+  it("are told of where they are asked for, and nowhere else", function()
+    local result = scene.command("run", text, "-f 1-4 -o with.####.ply:name -o without.####.ply:v")
+    assert.equal(0, result.status, result.stderr)
+    assert.truthy(result.stderr:find('with.####.ply: .ply holds no texts, and leaves out "name"', 1, true))
+    assert.is_nil(result.stderr:find("without.####.ply", 1, true))
+  end)
 end)

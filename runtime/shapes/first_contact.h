@@ -104,6 +104,8 @@ public:
     }
 
 private:
+    static constexpr int most_steps_back = 4096;
+
     void begin_some()
     {
         if constexpr (samples_along<Sampler>) some_.sample(sampler_);
@@ -158,8 +160,10 @@ private:
         const double speed = path.v.norm();
         if (!(speed > 0)) return contact;
         const Box3d bounds = sampler_.bounds();
-        // Each step is as long as the bound on the distance allows, so at least the half width of the band.
-        for (double back = 0;;) {
+        // Each step is as long as the bound on the distance allows, so at least the half width of the band. A field of
+        // a program may be negative everywhere, and then there is no way out.
+        double back = 0;
+        for (int steps = 0; steps < most_steps_back; ++steps) {
             back += std::abs(f) / (sampler_.slope_bound() * speed);
             const Vec3d P = path.P - back * path.v;
             Vec3d there;
@@ -169,6 +173,7 @@ private:
                 return contact;
             }
         }
+        return contact;
     }
 
     const Sampler& sampler_;

@@ -143,6 +143,25 @@ TEST_CASE("a program's shape with a hollow is found along each path", "[offers]"
     CHECK(places > 3 * calls);
 }
 
+TEST_CASE("a program's shape without an outside ends no run: its points count as trapped", "[offers]")
+{
+    HostShape everywhere;
+    everywhere.lower.fill(-1e9);
+    everywhere.upper.fill(1e9);
+    everywhere.distance = [](std::size_t n, const double*, double* phi, double* gradient) {
+        std::fill_n(phi, n, -1.0);
+        if (gradient) std::fill_n(gradient, 3 * n, 0.0);
+    };
+    SceneOptions options;
+    options.objects = {{"everywhere", everywhere}};
+    const std::string text = one + ":gravity {} :collide { shape = rapid.host 'everywhere' } :solve {}";
+    Scene scene = good(Scene::open_text("one.lua", text, options));
+    const SceneFrame now = good(scene.advance_to(4));
+    CHECK(now.size() == 2);
+    REQUIRE(now.warnings().size() == 1);
+    CHECK_THAT(now.warnings()[0], Contains("points are in a shape, with no way out"));
+}
+
 TEST_CASE("a setting puts a program's shape into the place of the scene's", "[offers]")
 {
     SceneOptions options;

@@ -120,7 +120,7 @@ struct Extreme {
     Doubles operator()(const Doubles& a, const Doubles& b) const
     {
         const Doubles sum = a + b;
-        return (a == a) & (b == b) ? F()(a, b) + 0.0 : sum;
+        return ((a == a) & (b == b)) ? F()(a, b) + 0.0 : sum;
     }
 };
 struct Least {

@@ -285,6 +285,13 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
         scene.set(seed=6, memory=4)
         self.assertEqual(list(scene.advance()["P"][0]), [6, 4, 0])
 
+    def test_a_parameter_that_is_given_twice_is_refused(self):
+        twice = "height is given twice, by name and in a dictionary; keep one of them"
+        with self.assertRaisesRegex(TypeError, twice):
+            fall(set={"height": 1}, height=2)
+        with self.assertRaisesRegex(TypeError, twice):
+            fall().set({"height": 1}, height=1)
+
     def test_frames_come_one_by_one(self):
         scene = fall()
         self.assertEqual([frame.number for frame in scene.run(3, 6)], [3, 4, 5, 6])

@@ -228,6 +228,13 @@ class Snapshot:
         return Snapshot(handle)
 
 
+def _each_once(values, parameters):
+    """Both together. Raises TypeError if a name is in both."""
+    for name in parameters.keys() & values.keys():
+        raise TypeError(f"{name} is given twice, by name and in a dictionary; keep one of them")
+    return {**values, **parameters}
+
+
 class Scene:
     """A scene of a file, or with text= of a text, whose messages name it so.
 
@@ -251,7 +258,7 @@ class Scene:
         self._handle = None
         self._held = {}      # texts that callbacks have returned
         options = sized(Options)
-        settings = to_settings({**(set or {}), **parameters})
+        settings = to_settings(_each_once(set or {}, parameters))
         options.settings, options.setting_count = settings, len(settings)
         if seed is not None:
             options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
@@ -326,7 +333,7 @@ class Scene:
 
     def set(self, values=None, /, **parameters):
         """Gives parameters values, as Scene() does, and goes back to the start."""
-        settings = to_settings({**(values or {}), **parameters})
+        settings = to_settings(_each_once(values or {}, parameters))
         self._call("scene_set", self._handle.value, settings, len(settings))
 
     def offer(self, name, thing):

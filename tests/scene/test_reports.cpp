@@ -199,7 +199,8 @@ TEST_CASE("a wrong trace is an error, and one that fails half-way tells what is 
 {
     Scene scene = opened(ball);
     CHECK_THAT(scene.trace({{0}, "creat1", 1, 9, 1}).error().message, Contains("did you mean \"create1\""));
-    CHECK_THAT(scene.trace({{0}, "", 1, 0, 1}).error().message, Contains("before the scene's first"));
+    CHECK_THAT(scene.trace({{0}, "", 1, 0, 1}).error().message, Contains("frames 1 to 0 end before they begin"));
+    CHECK_THAT(scene.trace({{0}, "", -1, 0, 1}).error().message, Contains("before the scene's first"));
     CHECK_THAT(scene.trace({{0}, "", 1, 9, 0}).error().message, Contains("step = 0"));
     CHECK_THAT(scene.trace({{}, "", 1, 2, 1}).error().message, Contains("there are no ids"));
 

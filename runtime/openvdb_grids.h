@@ -1,11 +1,16 @@
 // OpenVDB with the kinds of grids that are used here. Their virtual functions are in its library: without the lines
 // below each file that makes a grid compiles all of them again, eight seconds for each kind. What is not inlined is
-// taken from the library, too, and it has what optimised code does not inline.
+// taken from the library, too. It has all that g++ does not inline where it optimises. Sanitizers, and clang with them,
+// inline less and call functions that it does not have.
 #pragma once
 
 #include <openvdb/openvdb.h>
 
-#ifdef __OPTIMIZE__
+#if defined(__OPTIMIZE__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define RAPID_OPENVDB_IN_LIBRARY
+#endif
+
+#ifdef RAPID_OPENVDB_IN_LIBRARY
 extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::Int32Tree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::Vec3STree::RootNodeType>;

@@ -5,7 +5,7 @@
 
 #include "runtime/openvdb_grids.h"
 
-#ifdef __OPTIMIZE__
+#ifdef RAPID_OPENVDB_IN_LIBRARY
 extern template class openvdb::tree::Tree<openvdb::points::PointDataTree::RootNodeType>;
 extern template class openvdb::Grid<openvdb::points::PointDataTree>;
 #endif

@@ -3,7 +3,9 @@
 
 #include <openvdb/tools/MeshToVolume.h>
 
-#ifdef __OPTIMIZE__
+#include "runtime/openvdb_grids.h"
+
+#ifdef RAPID_OPENVDB_IN_LIBRARY
 extern template class openvdb::tree::Tree<
     openvdb::tree::Tree4<openvdb::tools::MeshToVoxelEdgeData::EdgeData, 5, 4, 3>::Type::RootNodeType>;
 #endif

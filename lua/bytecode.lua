@@ -15,7 +15,7 @@
 --   calls            names on the point itself that it calls like methods
 --   kills            whether `kill` is called or could be
 --   reads_points     of a function of the whole set: whether it may do more with its points than to name points.detail
---   vectors          by name of an attribute to which vec3(...) or quat(...) is assigned: how many numbers it has
+--   vectors          attributes to which it assigns vec3(...) or quat(...), with the number of components
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
@@ -69,7 +69,7 @@ end
 
 local analyse_function
 
--- Results of the constructors of vectors, by their numbers.
+-- The results of vec3 and quat, by their number of components.
 local vectors = { [3] = { kind = "vector", size = 3 }, [4] = { kind = "vector", size = 4 } }
 
 -- The value of a function's upvalue: { kind = "shared", value }, or nil where it is a local of the kernel around a

@@ -858,8 +858,8 @@ function Node:detail(params) end
 ---@field within? number  in place of pairs: all that are as near in the set that first enters the node [number, m, above 0]
 ---@field rest? number  the distance; where not given, that at first [number, m, at least 0]
 ---@field compliance? number  stretch by force; 0: rigid [number, m/N, at least 0, default 0]
----@field strain? number  breaks a pair that is longer than its distance by more than this part of it; a rigid one is only where others move both of its points [number, above 0]
----@field strength? number  breaks a pair that pulls with more; impulses of impacts, which take no time, do not count [number, N, above 0]
+---@field strain? number  breaks a pair that is longer than its distance by more than this part of it; for springs, as no load stretches a rigid pair [number, above 0]
+---@field strength? number  breaks a pair that pulls with more; an impact on a collider or contact counts as a force over its sub-step, so that more sub-steps break more [number, N, above 0]
 ---@field name? string  what the node is called in messages [string]
 
 ---Keeps pairs of points at a distance: rods, ropes, springs.

@@ -8,7 +8,7 @@ await() {
   process=$1; shift
   for try in $(seq 12000); do
     ! "$@" 2>/dev/null || return 0
-    # What it did last counts, too.
+    # The command may succeed by what the process did just before it ended.
     kill -0 "$process" 2>/dev/null || { "$@" 2>/dev/null; return; }
     sleep 0.02
   done

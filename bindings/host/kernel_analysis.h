@@ -34,7 +34,7 @@ struct KernelAnalysis {
     std::set<std::string> reads, writes;      // of the point itself
     std::set<std::string> may, may_write;     // of values that may be the point
     std::map<std::string, Location> places;   // where it first names an attribute of the point itself
-    std::map<std::string, int> vectors;       // attributes to which it assigns vec3(...) or quat(...), with its numbers
+    std::map<std::string, int> vectors;       // components of what it assigns to an attribute: 3 or 4
     std::set<std::string> joins, asks;        // groups that it joins or leaves, and that it asks for
     bool asks_any = false;                    // for groups by computed names
     bool kills = false, asks_places = false;  // whether it may; a function of the whole set, whether it reads points

@@ -111,8 +111,8 @@ bool SceneOfPlan::may_have_colliders() const
     });
 }
 
-// Colliders that enclose a source of points, or initial points, where the scene begins: so they look the same in all
-// frames, whichever of them are drawn.
+// Finds the colliders that enclose a source of points, or initial points, when the scene begins. The first frame
+// decides, so that a collider looks the same in all frames, whichever are drawn.
 std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
 {
     std::set<Argument> vessels;
@@ -130,10 +130,16 @@ std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
             }
     sources.insert(sources.end(), places.begin(), places.end());
     for (std::size_t b = 0; b < first.given_by.size() && !sources.empty(); ++b) {
-        if (first.scene->bodies[b].role != PictureScene::Body::Collider) continue;
-        const RayCrossings mesh(first.scene->bodies[b].mesh);
-        if (std::any_of(sources.begin(), sources.end(), [&](const auto& P) { return encloses(mesh, P); }))
-            vessels.insert(first.given_by[b]);
+        const PictureScene::Body& body = first.scene->bodies[b];
+        if (body.role != PictureScene::Body::Collider) continue;
+        const Box3f bounds = body.mesh->bounds();
+        std::optional<RayCrossings> crossings;  // costs a pass over the mesh
+        const auto is_inside = [&](const auto& P) {
+            if (P.empty() || !bounds.contains(P.front())) return false;
+            if (!crossings) crossings.emplace(body.mesh);
+            return encloses(*crossings, P);
+        };
+        if (std::any_of(sources.begin(), sources.end(), is_inside)) vessels.insert(first.given_by[b]);
     }
     return vessels;
 }

@@ -188,7 +188,7 @@ Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::i
 // outputs. Error: of an output, as SceneRun::prepare().
 Result<std::string> check_outputs(Scene& scene, const FileOutputs& files);
 // A line for each stiff node, and for each shape that is too coarse for its points: tries out the first frame with a
-// few points. Error: of a kernel, that sees one of these points; other errors are left to the run.
+// few points. Error: what a kernel does wrong with one of these points; other errors are left to the run.
 Result<std::string> advice_on(Scene& scene, const FileOutputs& files);
 
 // Whether frames have the same bits in other orders of the points and in two states of Lua.

@@ -14,7 +14,7 @@ public:
     // Where it names an attribute first; line 0 where it does not.
     virtual Location place_of(const std::string& attribute) const = 0;
 
-    // How many numbers it assigns to the attribute at a time: 3 of a vec3, 4 of a quaternion; 0 where it does not tell.
+    // The number of components of what it assigns to the attribute: 3 for a vec3, 4 for a quaternion, 0 if unknown.
     virtual int numbers_of(const std::string& attribute) const = 0;
 };
 

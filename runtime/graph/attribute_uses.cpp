@@ -26,7 +26,7 @@ Location place_of(const Node& node, const std::string& attribute)
     return {};
 }
 
-// How many numbers the node takes or assigns as a value of the attribute; 1 where it does not tell.
+// The number of components of the attribute that the node takes or assigns; 1 if unknown.
 int numbers_in(const Node& node, const std::string& attribute)
 {
     for (const auto& [name, value] : node.arguments) {

@@ -89,7 +89,7 @@ bool is_at_rest(const PointSet& points)
     return true;
 }
 
-// Returns false if the points that an emitter emits are surely at rest.
+// Returns false only if all points of the emitter are born at rest.
 bool may_emit_velocity(const Node& emit)
 {
     for (const char* name : {"velocity", "speed", "inherit_velocity"})
@@ -107,7 +107,7 @@ bool may_emit_velocity(const Node& emit)
     return points && !is_at_rest(points->points);
 }
 
-// Returns false if no point that passes through the node surely has another velocity than 0 by it.
+// Returns false only if the node gives no point a velocity.
 bool may_give_velocity(const PlannedNode& planned)
 {
     const Node& node = *planned.node;
@@ -126,7 +126,7 @@ bool may_give_velocity(const PlannedNode& planned)
     }
 }
 
-// Kernels that move points, all of which keep the velocity 0.
+// Kernels that assign P in chains in which nothing gives points a velocity.
 void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& warnings)
 {
     for (std::size_t s = 0; s < plan.simulations.size(); ++s) {

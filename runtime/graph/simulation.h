@@ -30,8 +30,8 @@ struct Simulation {
     std::shared_ptr<StepRecord> record;               // of the last step; null where nothing reads it
     std::int64_t first_new = 0;                       // points with this id and above are born in the next step
     std::vector<std::int64_t> condemned;              // ids of points that emitters of other chains take away
-    bool trial =
-        false;  // only kernels and stiffness are examined: emitters emit a sample, and Solve does not move points
+    // Only kernels and stiffness are examined: emitters emit a sample, and Solve does not move points.
+    bool trial = false;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
     bool estimates_errors = true;                             // where false, Solve tells none
     bool tells_points = false;  // Solve tells of each point, as attributes of its result (solve/point_figures.h)

@@ -104,13 +104,14 @@ struct Distance {
             .constant()
             .param(&Distance::compliance, "compliance", 0.0, at_least(0), "m/N", "stretch by force; 0: rigid")
             .constant()
-            .param(&Distance::strain, "strain", Value(), above(0), "",
-                   "breaks a pair that is longer than its distance by more than this part of it; a rigid one is only "
-                   "where others move both of its points")
+            .param(
+                &Distance::strain, "strain", Value(), above(0), "",
+                "breaks a pair that is longer than its distance by more than this part of it; for springs, as no load "
+                "stretches a rigid pair")
             .constant()
             .param(&Distance::strength, "strength", Value(), above(0), "N",
-                   "breaks a pair that pulls with more; impulses of impacts, which take no time, do not "
-                   "count")
+                   "breaks a pair that pulls with more; an impact on a collider or contact counts as a force over its "
+                   "sub-step, so that more sub-steps break more")
             .constant();
     }
 

@@ -23,7 +23,7 @@ struct LoggedHit {
     bool recorded;          // in the hit attributes
 };
 
-// A rod or a spring that breaks is logged at each of its ends.
+// One end of a rod or spring that breaks.
 struct LoggedBreak {
     std::uint32_t point;  // place in the set before the step
     double time;          // s since the start

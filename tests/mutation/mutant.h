@@ -13,7 +13,7 @@
 
 #include <cstdlib>
 
-// Broken lines deserve these.
+// A broken line may compare or index what no sane line does.
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wbool-compare"
 #pragma GCC diagnostic ignored "-Wparentheses"

@@ -23,7 +23,7 @@ inline constexpr double whole_tolerance = 1e-9;
 // Of a newborn point with the attributes that most have, in the state and in what is made of it within a frame.
 inline constexpr double bytes_a_birth = 2 * 64;
 
-// The births at a frame, of numbers by frame.
+// The number of births at a frame. impulse: numbers of births by frame.
 template <class Numbers>
 std::size_t impulse_at(const Numbers& impulse, std::int64_t frame)
 {
@@ -31,7 +31,7 @@ std::size_t impulse_at(const Numbers& impulse, std::int64_t frame)
     return found == impulse.end() ? 0 : static_cast<std::size_t>(found->second);
 }
 
-// For trials, which skip frames.
+// Whether a frame up to this one has an impulse: a trial skips frames (Evaluator::examine).
 template <class Numbers>
 bool has_impulse_by(const Numbers& impulse, double frame)
 {

@@ -246,7 +246,7 @@ public:
             schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].correct_position(step); });
             for (const Row& row : rows_) sleep_.wake_by_load(row, step);
         }
-        if constexpr (requires(const Function& function) { function.breaks(0.0, 0.0); })
+        if constexpr (requires { &Function::breaks; })
             remove([&](const Row& row) {
                 if (!row.active || row.asleep) return false;
                 typename Row::Vectors gradient;

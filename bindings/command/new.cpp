@@ -10,7 +10,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/or_throw.h"
-#include "include/rapid/installation.h"
+#include "bindings/scene/installation.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "bindings/command/or_throw.h"
-#include "include/rapid/installation.h"
+#include "bindings/scene/installation.h"
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
 

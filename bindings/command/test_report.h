@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "include/rapid/test.h"
+#include "bindings/scene/scene_tests.h"
 
 namespace rapid {
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "bindings/command/or_throw.h"
-#include "include/rapid/installation.h"
+#include "bindings/scene/installation.h"
 #include "runtime/path_list.h"
 
 namespace rapid {

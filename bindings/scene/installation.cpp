@@ -1,5 +1,5 @@
 // Where Rapid's own files are.
-#include "include/rapid/installation.h"
+#include "bindings/scene/installation.h"
 
 #include "bindings/host/modules.h"
 #include "bindings/scene/scene_error.h"

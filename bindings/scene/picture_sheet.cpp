@@ -1,5 +1,5 @@
 // Small pictures in rows.
-#include "include/rapid/picture_sheet.h"
+#include "bindings/scene/picture_sheet.h"
 
 #include <fmt/format.h>
 

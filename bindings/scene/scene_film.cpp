@@ -1,5 +1,5 @@
 // Films of frames.
-#include "include/rapid/film.h"
+#include "bindings/scene/scene_film.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 
 #include "bindings/host/testing/run_tests.h"
 #include "bindings/scene/scene_error.h"
-#include "include/rapid/test.h"
+#include "bindings/scene/scene_tests.h"
 
 namespace rapid {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
+#include "bindings/scene/scene_film.h"
 #include "bindings/view/frame_store.h"
-#include "include/rapid/film.h"
 #include "runtime/cancellation.h"
 #include "runtime/files/temporary_folder.h"
 

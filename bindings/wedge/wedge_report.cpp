@@ -9,7 +9,7 @@
 
 #include "bindings/command/command.h"
 #include "bindings/command/or_throw.h"
-#include "include/rapid/picture_sheet.h"
+#include "bindings/scene/picture_sheet.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/whole_file.h"

@@ -1,5 +1,5 @@
 // Pictures in rows: their places, what is missing, and files that are none.
-#include "include/rapid/picture_sheet.h"
+#include "bindings/scene/picture_sheet.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"

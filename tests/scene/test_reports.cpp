@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "include/rapid/installation.h"
+#include "bindings/scene/installation.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"

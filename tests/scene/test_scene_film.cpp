@@ -1,7 +1,7 @@
 // Films of frames.
 #include <cmath>
 
-#include "include/rapid/film.h"
+#include "bindings/scene/scene_film.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "include/rapid/test.h"
+#include "bindings/scene/scene_tests.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"

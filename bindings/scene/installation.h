@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "scene.h"
+#include "include/rapid/scene.h"
 
 namespace rapid {
 

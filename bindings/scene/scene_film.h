@@ -11,8 +11,8 @@
 #include <memory>
 #include <string>
 
-#include "scene.h"
-#include "shapes.h"
+#include "include/rapid/scene.h"
+#include "include/rapid/shapes.h"
 
 namespace rapid {
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "scene.h"
+#include "include/rapid/scene.h"
 
 namespace rapid {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 

@@ -2,12 +2,12 @@
 // with --races, runs frames to find kernels that keep state from point to point.
 #include <fmt/format.h>
 
-#include "bindings/command/command.h"
 #include "bindings/command/file_options.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/scene_arguments.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/frame_selection.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
 
 namespace rapid {

@@ -13,7 +13,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "bindings/command/cache_files.h"
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/cache_files.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
 
 namespace rapid {

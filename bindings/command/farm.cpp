@@ -6,9 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
 #include "bindings/command/farm_job.h"
 #include "bindings/command/slurm.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "bindings/command/programs.h"
 #include "bindings/command/slurm.h"
+#include "bindings/command_line/programs.h"
 #include "runtime/files/whole_file.h"
 
 namespace rapid {

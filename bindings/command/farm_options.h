@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/command.h"
 #include "bindings/command/farm_job.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 

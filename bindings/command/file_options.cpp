@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {

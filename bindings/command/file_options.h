@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "include/rapid/run.h"
 
 namespace rapid {

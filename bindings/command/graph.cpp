@@ -1,10 +1,10 @@
 // rapid graph: a picture of a scene's graph.
 #include <fmt/format.h>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/scene_arguments.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/files/whole_file.h"
 #include "runtime/threads.h"
 

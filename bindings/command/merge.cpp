@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/untrusted.h"
 #include "include/rapid/merge.h"
 #include "runtime/threads.h"
 

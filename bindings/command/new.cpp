@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/files/output_file.h"
 

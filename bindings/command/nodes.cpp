@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
 
 namespace rapid {
 namespace {

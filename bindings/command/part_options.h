@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "include/rapid/run.h"
 
 namespace rapid {

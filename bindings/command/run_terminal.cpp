@@ -6,7 +6,7 @@
 #include <chrono>
 #include <utility>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {

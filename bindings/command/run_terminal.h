@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "include/rapid/run.h"
 #include "runtime/report/progress.h"
 

@@ -12,7 +12,7 @@
 #include <set>
 #include <sstream>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/program_path.h"
 

@@ -11,10 +11,10 @@
 #include <thread>
 
 #include "bindings/command/child.h"
-#include "bindings/command/command.h"
 #include "bindings/command/test_file.h"
 #include "bindings/command/test_report.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/untrusted.h"
 
 namespace rapid {
 namespace {

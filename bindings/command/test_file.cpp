@@ -14,8 +14,8 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
 
 namespace rapid {
 

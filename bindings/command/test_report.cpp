@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <sstream>
 
-#include "bindings/command/command.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/scene_arguments.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/frame_selection.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
 
 namespace rapid {

@@ -16,7 +16,7 @@
 #include <fstream>
 #include <vector>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 
 namespace rapid {
 namespace {

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <utility>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/error.h"
 #include "runtime/picture/tone.h"
 

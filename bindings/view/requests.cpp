@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/view/request_fields.h"
 
 namespace rapid {

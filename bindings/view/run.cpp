@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {

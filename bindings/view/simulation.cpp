@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/view/points.h"
 #include "bindings/view/run.h"
 

@@ -9,14 +9,14 @@
 #include <cstring>
 #include <filesystem>
 
-#include "bindings/command/cache_files.h"
-#include "bindings/command/command.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/programs.h"
-#include "bindings/command/scene_arguments.h"
-#include "bindings/command/signals.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/cache_files.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/frame_selection.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/programs.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/signals.h"
+#include "bindings/command_line/untrusted.h"
 #include "bindings/scene/installation.h"
 #include "bindings/view/requests.h"
 #include "bindings/view/server.h"

@@ -1,5 +1,5 @@
 // What a sandboxed process can't do, each tried in a process of its own.
-#include "bindings/command/system_call_filter.h"
+#include "bindings/command_line/system_call_filter.h"
 
 #include <fcntl.h>
 #include <linux/keyctl.h>

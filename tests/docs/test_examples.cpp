@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "bindings/host/session.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/plugin.h"

@@ -1,4 +1,4 @@
-#include "bindings/command/process_sandbox.h"
+#include "bindings/command_line/process_sandbox.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"

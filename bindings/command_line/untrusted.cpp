@@ -1,8 +1,8 @@
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/untrusted.h"
 
 #include <fmt/format.h>
 
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/path_list.h"
 

@@ -1,4 +1,4 @@
-#include "bindings/command/signals.h"
+#include "bindings/command_line/signals.h"
 
 #include <utility>
 

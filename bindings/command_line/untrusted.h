@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/command.h"
-#include "bindings/command/process_sandbox.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/process_sandbox.h"
 
 namespace rapid {
 

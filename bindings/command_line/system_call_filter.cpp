@@ -1,4 +1,4 @@
-#include "bindings/command/system_call_filter.h"
+#include "bindings/command_line/system_call_filter.h"
 
 #include <fcntl.h>
 #include <sched.h>

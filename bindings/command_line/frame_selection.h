@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "bindings/command/options.h"
+#include "bindings/command_line/options.h"
 #include "runtime/files/frame_selection.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "bindings/study/machine.h"
+#include "bindings/command/machine.h"
 
 #include <fmt/format.h>
 #include <luajit.h>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/command/process_sandbox.h"
+#include "bindings/command_line/process_sandbox.h"
 
 namespace rapid {
 

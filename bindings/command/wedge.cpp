@@ -7,17 +7,16 @@
 #include <fstream>
 
 #include "bindings/command/cache_options.h"
-#include "bindings/command/command.h"
 #include "bindings/command/farm_options.h"
 #include "bindings/command/file_options.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/programs.h"
-#include "bindings/command/scene_arguments.h"
-#include "bindings/command/untrusted.h"
-#include "bindings/wedge/process_pool.h"
-#include "bindings/wedge/wedge_report.h"
-#include "bindings/wedge/wedge_rows.h"
+#include "bindings/command/process_pool.h"
+#include "bindings/command/wedge_report.h"
+#include "bindings/command/wedge_rows.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/frame_selection.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/temporary_folder.h"
 
@@ -29,7 +28,7 @@ namespace fs = std::filesystem;
 class WedgeCommand : public Command, public Confined {
 public:
     std::string name() const override { return "wedge"; }
-    std::string doc() const override { return program(name()).doc; }
+    std::string doc() const override { return "runs a graph at many settings"; }
 
     void declare(Options& options) override
     {

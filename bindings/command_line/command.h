@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bindings/command/options.h"
+#include "bindings/command_line/options.h"
 #include "runtime/error.h"
 
 namespace rapid {

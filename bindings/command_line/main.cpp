@@ -14,11 +14,11 @@
 #include <new>
 #include <optional>
 
-#include "bindings/command/command.h"
-#include "bindings/command/options.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/programs.h"
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/options.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/programs.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {

@@ -1,11 +1,11 @@
-#include "bindings/command/scene_arguments.h"
+#include "bindings/command_line/scene_arguments.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "bindings/command/memory_limit.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/memory_limit.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {

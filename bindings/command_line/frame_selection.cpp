@@ -1,4 +1,4 @@
-#include "bindings/command/frame_selection.h"
+#include "bindings/command_line/frame_selection.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "bindings/command/programs.h"
+#include "bindings/command_line/programs.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "bindings/command/program_list.h"
+#include "bindings/command_line/program_list.h"
 #include "runtime/error.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "bindings/wedge/wedge_rows.h"
+#include "bindings/command/wedge_rows.h"
 
 #include <fmt/format.h>
 

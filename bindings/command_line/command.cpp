@@ -1,4 +1,4 @@
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -13,15 +13,14 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
-#include "bindings/command/frame_selection.h"
-#include "bindings/command/or_throw.h"
-#include "bindings/command/programs.h"
-#include "bindings/command/scene_arguments.h"
+#include "bindings/command/machine.h"
+#include "bindings/command/study_run.h"
 #include "bindings/command/swept_setting.h"
-#include "bindings/command/untrusted.h"
-#include "bindings/study/machine.h"
-#include "bindings/study/study_run.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/frame_selection.h"
+#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/scene_arguments.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/files/whole_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
@@ -101,7 +100,7 @@ Outcome outcome_of(const std::function<void(const TellParent& tell)>& work,
 class StudyCommand : public Command, public Confined {
 public:
     std::string name() const override { return "study"; }
-    std::string doc() const override { return program(name()).doc; }
+    std::string doc() const override { return "shows the error of a scene against its run time, at many settings"; }
 
     void declare(Options& options) override
     {

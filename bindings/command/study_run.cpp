@@ -1,4 +1,4 @@
-#include "bindings/study/study_run.h"
+#include "bindings/command/study_run.h"
 
 #include <unistd.h>
 
@@ -6,8 +6,8 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
 #include "runtime/threads.h"
 
 namespace rapid {

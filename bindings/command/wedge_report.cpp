@@ -1,4 +1,4 @@
-#include "bindings/wedge/wedge_report.h"
+#include "bindings/command/wedge_report.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bindings/command/command.h"
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/picture_sheet.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/frame_pattern.h"

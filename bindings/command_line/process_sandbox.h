@@ -21,7 +21,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "bindings/command/system_call_filter.h"
+#include "bindings/command_line/system_call_filter.h"
 
 namespace rapid {
 

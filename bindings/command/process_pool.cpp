@@ -1,4 +1,4 @@
-#include "bindings/wedge/process_pool.h"
+#include "bindings/command/process_pool.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,9 +13,9 @@
 #include <cstring>
 #include <map>
 
-#include "bindings/command/command.h"
-#include "bindings/command/programs.h"
-#include "bindings/command/signals.h"
+#include "bindings/command_line/command.h"
+#include "bindings/command_line/programs.h"
+#include "bindings/command_line/signals.h"
 #include "runtime/files/file_error.h"
 
 namespace rapid {

@@ -1,8 +1,8 @@
-#include "bindings/command/cache_files.h"
+#include "bindings/command_line/cache_files.h"
 
 #include <fmt/format.h>
 
-#include "bindings/command/untrusted.h"
+#include "bindings/command_line/untrusted.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {

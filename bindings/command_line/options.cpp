@@ -1,4 +1,4 @@
-#include "bindings/command/options.h"
+#include "bindings/command_line/options.h"
 
 #include <fmt/format.h>
 

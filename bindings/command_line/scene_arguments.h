@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "bindings/command/command.h"
+#include "bindings/command_line/command.h"
 #include "include/rapid/scene.h"
 
 namespace rapid {

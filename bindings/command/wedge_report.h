@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bindings/wedge/process_pool.h"
-#include "bindings/wedge/wedge_rows.h"
+#include "bindings/command/process_pool.h"
+#include "bindings/command/wedge_rows.h"
 
 namespace rapid {
 

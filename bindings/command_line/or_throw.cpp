@@ -1,4 +1,4 @@
-#include "bindings/command/or_throw.h"
+#include "bindings/command_line/or_throw.h"
 
 #include <new>
 #include <stdexcept>

@@ -80,23 +80,23 @@ PointSet points_of(std::span<const Event> events, std::int64_t frame)
 }
 
 // Of a frame, as a log has them.
-std::string piece_of(std::int64_t frame, const std::vector<Event>& events)
+std::string record_of(std::int64_t frame, const std::vector<Event>& events)
 {
-    std::string piece(sizeof frame + events.size() * sizeof(Event), '\0');
-    std::memcpy(piece.data(), &frame, sizeof frame);
-    std::memcpy(piece.data() + sizeof frame, static_cast<const void*>(events.data()), events.size() * sizeof(Event));
-    return piece;
+    std::string record(sizeof frame + events.size() * sizeof(Event), '\0');
+    std::memcpy(record.data(), &frame, sizeof frame);
+    std::memcpy(record.data() + sizeof frame, static_cast<const void*>(events.data()), events.size() * sizeof(Event));
+    return record;
 }
 
-PointSet points_of_piece(std::string_view piece)
+PointSet points_of_record(std::string_view record)
 {
     std::int64_t frame = 0;
-    if (piece.size() < sizeof frame || (piece.size() - sizeof frame) % sizeof(Event) != 0)
+    if (record.size() < sizeof frame || (record.size() - sizeof frame) % sizeof(Event) != 0)
         throw Error("it is no log of events");
-    std::memcpy(&frame, piece.data(), sizeof frame);
-    piece.remove_prefix(sizeof frame);
-    std::vector<Event> events(piece.size() / sizeof(Event));
-    std::memcpy(static_cast<void*>(events.data()), piece.data(), piece.size());
+    std::memcpy(&frame, record.data(), sizeof frame);
+    record.remove_prefix(sizeof frame);
+    std::vector<Event> events(record.size() / sizeof(Event));
+    std::memcpy(static_cast<void*>(events.data()), record.data(), record.size());
     return points_of(events, frame);
 }
 
@@ -136,7 +136,7 @@ void EventFile::add(const FrameResult& result)
     if (events.empty()) return;
     file_->append(points_of(events, result.frame));
     if (log_) try {
-            log_->add(piece_of(result.frame, events));
+            log_->append(record_of(result.frame, events));
         } catch (const std::exception& error) {
             log_.reset();
             failure_ = fmt::format("{}: {}; no further snapshots are kept", log_path_.string(), error.what());
@@ -153,13 +153,23 @@ void EventFile::log_to(const std::filesystem::path& log)
     }
 }
 
-std::optional<std::uint64_t> EventFile::logged() const { return log_ ? std::optional(log_->bytes()) : std::nullopt; }
+std::optional<std::uint64_t> EventFile::logged() const { return log_ ? std::optional(log_->end()) : std::nullopt; }
+
+template <class F>
+void EventFile::read_log(std::uint64_t bytes, const F& f) const
+{
+    std::string record;
+    for (std::uint64_t place = 0; place < bytes;) {
+        if (!log_->read(place, record) || place > bytes) throw Error("it is damaged");
+        f(points_of_record(record));
+    }
+}
 
 void EventFile::check_log(std::uint64_t bytes) const
 {
     if (!log_) throw Error(fmt::format("its events can't be read from {}", log_path_.string()));
     try {
-        log_->read(bytes, points_of_piece);
+        read_log(bytes, [](const PointSet&) {});
     } catch (const Error& error) {
         throw Error(fmt::format("its events in {}: {}", log_path_.string(), error.what()));
     }
@@ -168,8 +178,8 @@ void EventFile::check_log(std::uint64_t bytes) const
 void EventFile::go_on_behind(std::uint64_t bytes)
 {
     if (!log_) return;
-    log_->read(bytes, [this](std::string_view piece) { file_->append(points_of_piece(piece)); });
-    log_->go_on_behind(bytes);
+    read_log(bytes, [this](const PointSet& points) { file_->append(points); });
+    log_->go_on_at(bytes);
 }
 
 void EventFile::finish()

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "bindings/run/piece_log.h"
+#include "runtime/files/frame_archive.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/point_file.h"
 
@@ -39,11 +39,14 @@ public:
 
 private:
     void check() const;
+    // Calls f with the events of each record of the log up to there. Throws Error if the log is not whole.
+    template <class F>
+    void read_log(std::uint64_t bytes, const F& f) const;
 
     std::string path_;
     std::optional<PointFile> file_;
     std::filesystem::path log_path_;
-    std::optional<PieceLog> log_;
+    std::optional<RecordLog> log_;
     std::string failure_;
 };
 

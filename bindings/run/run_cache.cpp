@@ -1,27 +1,19 @@
 #include "bindings/run/run_cache.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
+#include <sys/stat.h>
 
-#include <algorithm>
-#include <cerrno>
-#include <charconv>
-#include <chrono>
-#include <thread>
 #include <utility>
 
+#include "bindings/run/frame_record_archive.h"
 #include "runtime/io/state_file.h"
-#include "runtime/points/state_archive.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double longest_wait = 5;  // s, for a run that ends
-constexpr std::string_view prefix = "snapshot.", suffix = ".rapid";
+constexpr std::string_view snapshot = "snapshot";
 const std::string errors_estimated = "the estimate of errors";  // in a fingerprint
 
 // What a snapshot's file holds.
@@ -35,6 +27,17 @@ struct KeptRun {
         keep(snapshot, events);
     }
 };
+
+enum class RecordKind : std::uint8_t { Head, Frame, Film };
+
+template <class T>
+std::string record_of(RecordKind kind, const T& value)
+{
+    StateWriter writer;
+    writer(static_cast<std::uint8_t>(kind), value);
+    const SavedState state = writer.take();
+    return {state.bytes.begin(), state.bytes.end()};
+}
 
 fs::path absolute_path(const std::string& path) { return fs::absolute(path).lexically_normal(); }
 
@@ -56,6 +59,22 @@ std::string shown_error(const std::string& file, const std::exception& error)
 
 }  // namespace
 
+bool WrittenFile::look()
+{
+    struct stat status = {};
+    if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return false;
+    bytes = static_cast<std::uint64_t>(status.st_size);
+    modified = std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + status.st_mtim.tv_nsec;
+    return true;
+}
+
+bool WrittenFile::is_whole() const
+{
+    WrittenFile now;
+    now.path = path;
+    return now.look() && now.bytes == bytes && now.modified == modified;
+}
+
 void RunCache::set_graph(const fs::path& graph)
 {
     graph_ = graph;
@@ -67,33 +86,11 @@ void RunCache::was_read(const fs::path& file)
     if (read_) read_->add(file);
 }
 
-// Two runs that wrote into one folder would leave a journal of neither.
-void RunCache::lock()
-{
-    std::error_code error;
-    fs::create_directories(folder_, error);
-    if (error) throw Error(fmt::format("--cache {}: can't be made: {}", folder_.string(), error.message()));
-    // A link would make a file elsewhere.
-    lock_ = Descriptor(::open((folder_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
-    if (!lock_ && errno == ELOOP)
-        throw Error(fmt::format("--cache {}: its .lock is a link; give another folder", folder_.string()));
-    // One that was killed keeps it until the system has taken its memory back.
-    const Stopwatch waited;
-    while (lock_ && ::flock(lock_.number(), LOCK_EX | LOCK_NB) != 0) {
-        if (errno == EINTR) continue;
-        if (errno != EWOULDBLOCK) return;  // a file system without locks
-        if (waited.seconds() > longest_wait)
-            throw Error(fmt::format("--cache {}: another run has it; wait for its end, or give another folder",
-                                    folder_.string()));
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-}
-
 void RunCache::refuse(const std::vector<std::string>& differences)
 {
     if (!replaces_)
         throw Error(fmt::format("--cache {}: it is of another run: {}; give another folder, or --again to begin anew",
-                                folder_.string(), list_of(differences)));
+                                folder().string(), list_of(differences)));
     again_ = true;
 }
 
@@ -104,25 +101,57 @@ Fingerprint RunCache::with_errors_as_in(const Fingerprint& other) const
     return likewise;
 }
 
+bool RunCache::is_of_run(const Fingerprint& other) const { return hash_of(other) == hash_of(with_errors_as_in(other)); }
+
+void RunCache::read_record(const std::string& record, bool is_first)
+{
+    SavedState state;
+    state.bytes.assign(record.begin(), record.end());
+    StateReader reader(state);
+    std::uint8_t number = 0;
+    reader(number);
+    const RecordKind kind{number};
+    StateReader::expect((kind == RecordKind::Head) == is_first);
+    if (kind == RecordKind::Head) {
+        reader(known_.fingerprint);
+    } else if (kind == RecordKind::Frame) {
+        FrameRecord frame;
+        reader(frame);
+        for (const auto& [name, hash_then] : frame.read) StateReader::expect(InputContents::is_content(name));
+        known_.frames[frame.statistics.frame] = std::move(frame);
+    } else {
+        WrittenFile film;
+        reader(film);
+        known_.films[film.path] = film;
+    }
+    reader.finish();
+}
+
 void RunCache::read_journal()
 {
-    const auto is_of_run = [this](const Fingerprint& other) {
-        return hash_of(other) == hash_of(with_errors_as_in(other));
-    };
-    bool is_there = false;
+    const std::string name = archive_.journal().string();
+    std::optional<FrameArchive::Records> records;
     try {
-        known_ = RunJournal::read(folder_ / "journal", is_of_run, is_there);
+        records = archive_.read_journal();
     } catch (Error& error) {
-        throw error.at({(folder_ / "journal").string(), 0});
+        throw error.at({name, 0});
     }
-    if (!is_there && !snapshots().empty())
-        failures_.push_back((folder_ / "journal").string() + ": it is missing; the cache begins anew");
-    else if (is_there && known_.fingerprint.empty())
-        failures_.push_back((folder_ / "journal").string() + ": it is damaged; the cache begins anew");
-    else if (known_.damaged > 0)
-        failures_.push_back(fmt::format("{}: {} damaged; frames without a record are computed again",
-                                        (folder_ / "journal").string(),
-                                        known_.damaged == 1 ? "an entry is" : "some entries are"));
+    std::size_t damaged = records ? records->damaged : 0;
+    for (std::size_t k = 0; records && k < records->whole.size(); ++k) {
+        try {
+            read_record(records->whole[k], k == 0);
+        } catch (const Error&) {
+            ++damaged;
+        }
+        if (k == 0 && !is_of_run(known_.fingerprint)) break;  // the others may be of another version
+    }
+    if (!records && !archive_.files(snapshot).empty())
+        failures_.push_back(name + ": it is missing; the cache begins anew");
+    else if (records && known_.fingerprint.empty())
+        failures_.push_back(name + ": it is damaged; the cache begins anew");
+    else if (damaged > 0)
+        failures_.push_back(fmt::format("{}: {} damaged; frames without a record are computed again", name,
+                                        damaged == 1 ? "an entry is" : "some entries are"));
     if (!known_.fingerprint.empty() && !is_of_run(known_.fingerprint))
         refuse(differences(known_.fingerprint, with_errors_as_in(known_.fingerprint)));
     else
@@ -149,7 +178,7 @@ void RunCache::begin_anew()
 {
     known_ = {};
     contents_.clear();
-    for (const auto& [frame, file] : snapshots()) {
+    for (const auto& [frame, file] : archive_.files(snapshot)) {
         std::error_code ignored;
         fs::remove(file, ignored);
     }
@@ -165,7 +194,7 @@ void RunCache::go_on_as_before()
         failures_.push_back(
             fmt::format("--cache {}: no errors are estimated, as the run that began it has estimated none (--quiet); "
                         "give --again to estimate them",
-                        folder_.string()));
+                        folder().string()));
 }
 
 void RunCache::begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
@@ -173,7 +202,7 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
 {
     frames_ = frames;
     first_frame_ = plan.first_frame();
-    lock();
+    lock_ = FrameArchive::lock(folder(), folder(), "run");
     Fingerprint all = options;
     all.merge(read_->take());
     all[errors_estimated] = estimates_errors_ ? "yes" : "no";
@@ -188,15 +217,17 @@ void RunCache::begin(const Session& session, const Plan& plan, const FrameSelect
     if (!events.path().empty()) {  // those up to the last frame are known when it is computed
         last_due_ = frames_.last;
         if (!first_due_) first_due_ = last_due_;
-        if (every_ > 0 || !snapshots().empty()) events.log_to(events_log());
+        if (every_ > 0 || !archive_.files(snapshot).empty()) events.log_to(events_log());
     }
+    std::vector<std::string> records = {record_of(RecordKind::Head, known_.fingerprint)};
+    for (const auto& [frame, record] : known_.frames) records.push_back(record_of(RecordKind::Frame, record));
+    for (const auto& [path, film] : known_.films) records.push_back(record_of(RecordKind::Film, film));
     try {
-        journal_.begin(folder_ / "journal", known_);
+        archive_.begin_journal(records);
     } catch (const std::exception& error) {
-        failures_.push_back(shown_error((folder_ / "journal").string(), error) + "; the run goes on, and what it " +
-                            "computes is not kept");
+        failures_.push_back(shown_error(archive_.journal().string(), error) +
+                            "; the run goes on, and what it computes is not kept");
     }
-    if (every_ > 0) writer_ = std::make_unique<FileWriter>("snapshot");
 }
 
 void RunCache::find_due(const Plan& plan, FrameFiles& files)
@@ -258,27 +289,6 @@ void RunCache::leave_waiting_pictures(FrameFiles::WholeFiles& whole, const Frame
     }
 }
 
-fs::path RunCache::snapshot_file(std::int64_t frame) const
-{
-    return folder_ / fmt::format("{}{:04}{}", prefix, frame, suffix);
-}
-
-std::map<std::int64_t, fs::path> RunCache::snapshots() const
-{
-    std::map<std::int64_t, fs::path> found;
-    std::error_code error;
-    for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
-        const std::string name = entry->path().filename().string();
-        if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size())
-            continue;
-        std::int64_t frame = 0;
-        const char* const last = name.data() + name.size() - suffix.size();
-        const auto parsed = std::from_chars(name.data() + prefix.size(), last, frame);
-        if (parsed.ec == std::errc() && parsed.ptr == last && entry->is_regular_file()) found[frame] = entry->path();
-    }
-    return found;
-}
-
 bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluator, EventFile& events)
 {
     KeptRun kept;
@@ -306,7 +316,7 @@ bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluat
 void RunCache::restore(Evaluator& evaluator, EventFile& events)
 {
     if (!first_due_) return;
-    const std::map<std::int64_t, fs::path> all = snapshots();
+    const std::map<std::int64_t, fs::path> all = archive_.files(snapshot);
     for (auto one = all.rbegin(); one != all.rend(); ++one)
         if (one->first < *first_due_ && one->first >= first_frame_ && load(one->first, one->second, evaluator, events))
             return;
@@ -359,26 +369,26 @@ void RunCache::complete_before(std::optional<std::int64_t> frame, double seconds
         FrameRecord& record = open_.begin()->second;
         record.seconds = seconds;
         record.peak_bytes = peak_bytes;
-        add(record);
+        add(record_of(RecordKind::Frame, record), "; the run goes on, and will compute this frame again");
         open_.erase(open_.begin());
     }
 }
 
-void RunCache::add(const FrameRecord& record)
+void RunCache::add(const std::string& record, const char* so)
 {
     try {
-        journal_.add(record);
+        archive_.add(record);
     } catch (const std::exception& error) {
-        failures_.push_back(shown_error((folder_ / "journal").string(), error) +
-                            "; the run goes on, and will compute " + "this frame again");
+        failures_.push_back(shown_error(archive_.journal().string(), error) + so);
     }
 }
 
 void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_case)
 {
     const std::int64_t frame = evaluator.next_frame() - 1;
-    const bool is_due = every_ > 0 && ((frame - first_frame_ + 1) % every_ == 0 || frame == frames_.last);
-    if (!writer_ || !(is_due || in_any_case) || last_kept_ == frame || frame < first_frame_) return;
+    if (every_ == 0) return;
+    const bool is_due = (frame - first_frame_ + 1) % every_ == 0 || frame == frames_.last;
+    if (!(is_due || in_any_case) || last_kept_ == frame || frame < first_frame_) return;
     if (std::string failure = events.take_failure(); !failure.empty()) failures_.push_back(std::move(failure));
     if (!events.path().empty() && !events.logged()) return;
     KeptRun kept{evaluator.save(), events.logged().value_or(0)};
@@ -389,31 +399,24 @@ void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_c
     all.insert(contents_.begin(), contents_.end());
     header["fingerprint"] = all;
     // The state shares its columns with the run.
-    writer_->submit(snapshot_file(frame), [header = std::move(header), state = state_of(kept)](const fs::path& path) {
-        OutputFile file(path);
-        write_state(file, header, state);
-        file.finish();
+    archive_.submit(snapshot, frame, [header = std::move(header), state = state_of(kept)](const fs::path& path) {
+        write_state(path, header, state);
     });
     last_kept_ = frame;
 }
 
 void RunCache::finish(bool complete)
 {
-    if (writer_) writer_->finish();
+    archive_.finish();
     if (!complete) return;
     for (auto& [path, film] : films_)
-        if (film.look()) try {
-                journal_.add(film);
-            } catch (const std::exception& error) {
-                failures_.push_back(shown_error((folder_ / "journal").string(), error));
-            }
+        if (film.look()) add(record_of(RecordKind::Film, film), "");
 }
 
 std::vector<std::string> RunCache::take_warnings()
 {
     std::vector<std::string> all = std::exchange(failures_, {});
-    if (writer_)
-        for (std::string& failure : writer_->take_failures()) all.push_back(std::move(failure));
+    for (std::string& failure : archive_.take_failures()) all.push_back(std::move(failure));
     return all;
 }
 

@@ -11,8 +11,8 @@
 
 #include "bindings/run/event_file.h"
 #include "bindings/run/frame_files.h"
-#include "bindings/run/run_journal.h"
-#include "runtime/files/file_writer.h"
+#include "bindings/run/frame_record.h"
+#include "runtime/files/frame_archive.h"
 #include "runtime/files/frame_selection.h"
 #include "runtime/graph/evaluate.h"
 
@@ -28,7 +28,7 @@ public:
         bool estimates_errors = true;  // if the cache begins with this run
     };
     explicit RunCache(Options options)
-        : folder_(std::move(options.folder)),
+        : archive_(std::move(options.folder)),
           every_(options.every),
           again_(options.again),
           replaces_(options.replaces),
@@ -36,9 +36,9 @@ public:
     {
     }
 
-    bool asked() const { return !folder_.empty(); }
+    bool asked() const { return !archive_.folder().empty(); }
     bool keeps_snapshots() const { return asked() && every_ > 0; }
-    const std::filesystem::path& folder() const { return folder_; }
+    const std::filesystem::path& folder() const { return archive_.folder(); }
 
     // A file that the graph reads, before it is read.
     void was_read(const std::filesystem::path& file);
@@ -78,8 +78,17 @@ public:
     std::vector<std::string> take_warnings();
 
 private:
-    void lock();
+    // What the folder has of the run.
+    struct Known {
+        Fingerprint fingerprint;
+        std::map<std::int64_t, FrameRecord> frames;
+        std::map<std::string, WrittenFile> films;  // by path
+    };
+    // Whether a fingerprint is of this run.
+    bool is_of_run(const Fingerprint& other) const;
     void read_journal();
+    // Throws Error if the record is damaged, or of another version.
+    void read_record(const std::string& record, bool is_first);
     // fingerprint_ with the estimate of errors of another run.
     Fingerprint with_errors_as_in(const Fingerprint& other) const;
     void refuse(const std::vector<std::string>& differences);
@@ -89,31 +98,28 @@ private:
     // What is whole of the frames, and the frames that are not.
     void find_due(const Plan& plan, FrameFiles& files);
     void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;
-    std::filesystem::path snapshot_file(std::int64_t frame) const;
-    std::filesystem::path events_log() const { return folder_ / "events"; }
-    std::map<std::int64_t, std::filesystem::path> snapshots() const;
+    std::filesystem::path events_log() const { return folder() / "events"; }
     bool load(std::int64_t frame, const std::filesystem::path& file, Evaluator& evaluator, EventFile& events);
-    void add(const FrameRecord& record);
+    // Adds a record to the journal. If it can't be written, that is a warning with what follows from it.
+    void add(const std::string& record, const char* so);
 
-    const std::filesystem::path folder_;
+    Descriptor lock_;  // until the archive has written all
+    FrameArchive archive_;
     const std::int64_t every_;
     bool again_;
     const bool replaces_;
     bool estimates_errors_;
     std::filesystem::path graph_;
 
-    Descriptor lock_;
     std::unique_ptr<InputContents> read_;
     Fingerprint fingerprint_, contents_;  // contents_: of the files read in frames
-    RunJournal journal_;
-    RunJournal::Contents known_;
+    Known known_;
     FrameSelection frames_{};
     std::int64_t first_frame_ = 0, last_due_ = 0;
     std::optional<std::int64_t> first_due_, last_kept_;
     std::map<std::int64_t, FrameRecord> open_;  // frames whose files are to come
     std::map<std::string, WrittenFile> films_;  // by path, that are being written
     std::vector<std::string> warnings_, failures_;
-    std::unique_ptr<FileWriter> writer_;  // of snapshots
 };
 
 }  // namespace rapid

@@ -9,6 +9,8 @@
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/id_order.h"
+#include "runtime/io/state_file.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -107,6 +109,19 @@ private:
     std::vector<double> distances_;
 };
 
+// Reads the next frame of a reference. Throws Error if it is another one.
+PointSet frame_of(const RecordLog& reference, std::int64_t frame, std::uint64_t& place)
+{
+    std::string record;
+    if (reference.read(place, record))
+        if (const StateFile file = StateFile::in_memory(std::move(record)); file.header().at("frame") == frame) {
+            PointSet points;
+            restore(points, file.state());
+            return points;
+        }
+    throw Error(fmt::format("the reference has no frame {}", frame));
+}
+
 // Computes all frames, and gives those that are compared to `keep`. Returns the time, s.
 double run_frames(const Plan& plan, const Study& study,
                   const std::function<void(const FrameResult& result, const PointSet& points)>& keep)
@@ -137,17 +152,18 @@ Plan StudyScene::plan() const
     return plan;
 }
 
-void StudyScene::keep_frames(PointStore& store, const Progress& progress) const
+void StudyScene::keep_frames(RecordLog& log, const Progress& progress) const
 {
     const Plan plan = this->plan();
-    store.clear();
+    log.clear();
     progress(0);
-    run_frames(plan, study_,
-               [&](const FrameResult& result, const PointSet& points) { store.keep(result.frame, points); });
+    run_frames(plan, study_, [&](const FrameResult& result, const PointSet& points) {
+        log.append(text_of_state({{"frame", result.frame}}, state_of(points)));
+    });
     progress(1);
 }
 
-StudyRow StudyScene::measure(const Knobs& knobs, const PointStore* reference, const Progress& progress) const
+StudyRow StudyScene::measure(const Knobs& knobs, const RecordLog* reference, const Progress& progress) const
 {
     Measure measure(study_, session_);
     std::vector<double> seconds;
@@ -165,8 +181,8 @@ StudyRow StudyScene::measure(const Knobs& knobs, const PointStore* reference, co
                 if (!study_.compares()) return measure.add(result.figures, points);
                 const double time = result.time.at(output), fps = result.fps.at(output);
                 const Frame frame{static_cast<double>(result.frame), time, 1 / fps};
-                const PointSet compared =
-                    study_.reference ? reference->read(result.frame, place) : session_.study_reference(frame, knobs);
+                const PointSet compared = study_.reference ? frame_of(*reference, result.frame, place)
+                                                           : session_.study_reference(frame, knobs);
                 measure.add(points, compared, result.frame - plan.first_frame(), time);
             });
         }

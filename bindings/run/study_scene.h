@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "bindings/host/session.h"
-#include "bindings/run/point_store.h"
+#include "runtime/files/frame_archive.h"
 #include "runtime/graph/plan.h"
 #include "runtime/report/study.h"
 
@@ -21,10 +21,11 @@ public:
     // output that is to be compared; those of frames; no error that is a number.
     using Progress = std::function<void(int runs)>;
 
-    void keep_frames(PointStore& store, const Progress& progress) const;
+    // Replaces what the log has by the frames that are compared.
+    void keep_frames(RecordLog& log, const Progress& progress) const;
     // Runs it once to measure the error, then for the time, as often as the study wants. reference: null where the
     // study needs none.
-    StudyRow measure(const Knobs& knobs, const PointStore* reference, const Progress& progress) const;
+    StudyRow measure(const Knobs& knobs, const RecordLog* reference, const Progress& progress) const;
 
 private:
     Plan plan() const;

@@ -47,9 +47,7 @@ inline void require_key(const CheckedJson& header, const std::string& key)
 template <class T>
 void write_kept(const std::string& path, const char* what, const std::string& key, const T& value)
 {
-    OutputFile file(path);
-    write_state(file, {{"what", what}, {"key", key}, {"build", RAPID_ABI}}, state_of(value));
-    file.finish();
+    write_state(path, {{"what", what}, {"key", key}, {"build", RAPID_ABI}}, state_of(value));
 }
 
 template <class T>

@@ -65,9 +65,7 @@ Result<Done> SceneSnapshot::write(const std::string& path, const std::string& ke
         for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
         for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
         header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", data_->nodes}};
-        OutputFile file(path);
-        write_state(file, std::move(header), state_of(snapshot));
-        file.finish();
+        write_state(path, std::move(header), state_of(snapshot));
         return Done();
     });
 }

@@ -183,7 +183,7 @@ auto without_scene(const F& f) -> Result<decltype(f())>
 
 }  // namespace
 
-struct [[gnu::visibility("hidden")]] StudyReference::Data { PointStore store; };
+struct [[gnu::visibility("hidden")]] StudyReference::Data { RecordLog frames = RecordLog::in_memory(); };
 
 StudyReference::StudyReference(std::shared_ptr<Data> data) : data_(std::move(data)) {}
 
@@ -255,7 +255,7 @@ Result<Done> SceneStudy::compute_reference(const StudySource& source, const Stud
         check_study(*this);
         const Study study = study_inside(*this);
         StudyScene(study, session, std::move(graph), source.options.seed)
-            .keep_frames(into.data_->store, progress_of(progress, is_started));
+            .keep_frames(into.data_->frames, progress_of(progress, is_started));
         return Done();
     });
 }
@@ -270,7 +270,7 @@ Result<StudyRun> SceneStudy::measure(const StudySource& source, const StudyKnobs
         const Study study = study_inside(*this);
         const StudyRow row =
             StudyScene(study, session, std::move(graph), source.options.seed)
-                .measure(knobs_inside(knobs), from ? &from->data_->store : nullptr, progress_of(progress, is_started));
+                .measure(knobs_inside(knobs), from ? &from->data_->frames : nullptr, progress_of(progress, is_started));
         return StudyRun{knobs, row.error, row.rounding, row.seconds, row.compared, row.missing, ""};
     });
 }

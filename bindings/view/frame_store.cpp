@@ -1,9 +1,30 @@
 #include "bindings/view/frame_store.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
+#include "bindings/command_line/or_throw.h"
+#include "runtime/checked_json.h"
+
 namespace rapid {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = CheckedJson;
+
+constexpr std::size_t most_runs = 8;
+constexpr const char *frame_kind = "frame", *shapes_kind = "geometry", *snapshot_kind = "snapshot";
+
+// For the archive, which knows the file.
+void check_written(const Result<Done>& written)
+{
+    if (!written) throw Error(written.error().message);
+}
+
+}  // namespace
 
 std::size_t bytes_of(const ViewFrame& frame)
 {
@@ -32,7 +53,7 @@ bool FrameStore::make_room(std::size_t bytes, std::uint64_t run)
         }
         Entry* oldest = nullptr;
         for (auto& [number, entry] : frames_)
-            if (entry.frame && entry.source && (!oldest || entry.used < oldest->used) && entry.source->has(number))
+            if (entry.frame && entry.cache && (!oldest || entry.used < oldest->used) && entry.cache->has(number))
                 oldest = &entry;
         if (!oldest) return false;
         drop(*oldest);
@@ -40,7 +61,7 @@ bool FrameStore::make_room(std::size_t bytes, std::uint64_t run)
     return true;
 }
 
-bool FrameStore::put(ViewFramePtr frame, std::shared_ptr<FrameSource> source)
+bool FrameStore::put(ViewFramePtr frame, std::shared_ptr<CachedRun> cache)
 {
     const std::lock_guard lock(mutex_);
     const std::int64_t number = frame->number;
@@ -51,22 +72,21 @@ bool FrameStore::put(ViewFramePtr frame, std::shared_ptr<FrameSource> source)
     if (!make_room(frame->bytes, frame->run)) return false;
     bytes_ += frame->bytes;
     Entry& entry = frames_[number];
-    entry = {frame->run, frame, frame->statistics, std::move(source), ++uses_};
+    entry = {frame->run, frame, frame->statistics, std::move(cache), ++uses_};
     return true;
 }
 
-void FrameStore::add(std::int64_t number, std::uint64_t run, std::string statistics,
-                     std::shared_ptr<FrameSource> source)
+void FrameStore::add(std::int64_t number, std::uint64_t run, std::string statistics, std::shared_ptr<CachedRun> cache)
 {
     const std::lock_guard lock(mutex_);
     Entry& entry = frames_[number];
     drop(entry);
-    entry = {run, nullptr, std::move(statistics), std::move(source), 0};
+    entry = {run, nullptr, std::move(statistics), std::move(cache), 0};
 }
 
 ViewFramePtr FrameStore::find(std::int64_t number)
 {
-    std::shared_ptr<FrameSource> source;
+    std::shared_ptr<CachedRun> cache;
     std::uint64_t run = 0;
     {
         const std::lock_guard lock(mutex_);
@@ -74,10 +94,10 @@ ViewFramePtr FrameStore::find(std::int64_t number)
         if (found == frames_.end()) return nullptr;
         found->second.used = ++uses_;
         if (found->second.frame) return found->second.frame;
-        source = found->second.source;
+        cache = found->second.cache;
         run = found->second.run;
     }
-    const ViewFramePtr read = source->load(number, run);
+    const ViewFramePtr read = cache->load(number, run);
     if (!read) return nullptr;
     auto frame = std::make_shared<ViewFrame>(*read);
     const std::lock_guard lock(mutex_);
@@ -141,6 +161,147 @@ std::size_t FrameStore::bytes() const
 {
     const std::lock_guard lock(mutex_);
     return bytes_;
+}
+
+CachedRun::CachedRun(const fs::path& folder, std::string hash, Scene& scene) : hash_(std::move(hash)), archive_(folder)
+{
+    try {
+        archive_.begin_journal(read_journal(scene));
+    } catch (const Error& error) {
+        throw Error(fmt::format("--cache {}: {}", archive_.journal().string(), error.what()));
+    }
+    std::error_code none;
+    fs::last_write_time(folder, fs::file_time_type::clock::now(), none);  // used last
+    for (const auto& [number, known] : known_) {
+        there_[number] = known.shapes;
+        last_shapes_ = std::max(last_shapes_, known.shapes);
+    }
+}
+
+std::vector<std::string> CachedRun::read_journal(Scene& scene)
+{
+    std::error_code none;
+    std::map<std::int64_t, std::string> records;
+    for (std::string& record : archive_.read_journal().value_or(FrameArchive::Records{}).whole) try {
+            const Json entry = Json::parse(record);
+            const auto number = entry.at("frame").get<std::int64_t>();
+            Known known{entry.at("statistics").get<std::string>(), entry.at("warnings").get<std::vector<std::string>>(),
+                        entry.at("shapes").get<std::int64_t>()};
+            if (!or_throw(scene.are_unchanged(entry.at("read").get<std::map<std::string, std::string>>())) ||
+                !fs::exists(archive_.file(frame_kind, number), none) || !Json::accept(known.statistics) ||
+                (known.shapes != 0 && !fs::exists(archive_.file(shapes_kind, known.shapes), none)))
+                continue;
+            known_[number] = std::move(known);
+            records[number] = std::move(record);
+        } catch (const nlohmann::json::exception&) {
+            continue;
+        }
+    std::vector<std::string> list;
+    for (auto& [number, record] : records) list.push_back(std::move(record));
+    return list;
+}
+
+std::int64_t CachedRun::number_of(const SceneShapes& shapes)
+{
+    if (shapes == SceneShapes()) return 0;
+    if (shapes == written_) return written_number_;
+    written_ = shapes;
+    written_number_ = ++last_shapes_;
+    archive_.submit(shapes_kind, written_number_, [shapes](const fs::path& path) { check_written(shapes.save(path)); });
+    return written_number_;
+}
+
+void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warnings,
+                    const std::map<std::string, std::string>& read)
+{
+    const std::lock_guard lock(mutex_);
+    if (there_.contains(frame.number)) return;
+    const std::int64_t shapes = number_of(frame.shapes);
+    archive_.submit(frame_kind, frame.number, [points = frame.points, key = hash_](const fs::path& path) {
+        check_written(points.save(path, key));
+    });
+    there_[frame.number] = shapes;
+    const Json entry = {{"frame", frame.number},
+                        {"shapes", shapes},
+                        {"statistics", frame.statistics},
+                        {"warnings", warnings},
+                        {"read", read}};
+    try {
+        archive_.add(entry.dump(-1, ' ', false, Json::error_handler_t::replace));
+    } catch (const Error&) {  // the next view computes the frame again
+    }
+}
+
+void CachedRun::keep(const SceneSnapshot& snapshot)
+{
+    archive_.submit(snapshot_kind, snapshot.frame(),
+                    [snapshot, key = hash_](const fs::path& path) { check_written(snapshot.write(path, key)); });
+}
+
+std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) const
+{
+    const std::map<std::int64_t, fs::path> all = archive_.files(snapshot_kind);
+    for (auto one = std::make_reverse_iterator(all.lower_bound(frame)); one != all.rend(); ++one)
+        // A damaged one is passed over: an earlier one will do.
+        if (Result<SceneSnapshot> snapshot = SceneSnapshot::read(one->second, hash_)) return std::move(*snapshot);
+    return std::nullopt;
+}
+
+bool CachedRun::has(std::int64_t number) const
+{
+    std::error_code none;
+    const std::lock_guard lock(mutex_);
+    return there_.contains(number) && fs::exists(archive_.file(frame_kind, number), none);
+}
+
+SceneShapes CachedRun::shapes(std::int64_t number)
+{
+    if (number == 0) return {};
+    if (loaded_number_ == number) return loaded_;
+    loaded_ = or_throw(SceneShapes::load(archive_.file(shapes_kind, number)));
+    loaded_number_ = number;
+    return loaded_;
+}
+
+ViewFramePtr CachedRun::load(std::int64_t number, std::uint64_t run)
+{
+    const std::lock_guard lock(mutex_);
+    const auto there = there_.find(number);
+    if (there == there_.end()) return nullptr;
+    Result<SceneFrame> loaded = SceneFrame::load(archive_.file(frame_kind, number), hash_);
+    if (!loaded) {  // the next view computes it again
+        std::error_code none;
+        fs::remove(archive_.file(frame_kind, number), none);
+        there_.erase(there);
+    }
+    SceneFrame points = or_throw(std::move(loaded));
+    return std::make_shared<ViewFrame>(ViewFrame{number, run, std::move(points), "", shapes(there->second)});
+}
+
+FrameCache::FrameCache(const fs::path& folder)
+    : folder_(folder / "view"), lock_(FrameArchive::lock(folder_, folder, "view"))
+{
+}
+
+std::shared_ptr<CachedRun> FrameCache::open(Scene& scene)
+{
+    const std::string hash = or_throw(scene.fingerprint()).hash;
+    auto run = std::make_shared<CachedRun>(folder_ / hash, hash, scene);
+    remove_old();
+    return run;
+}
+
+void FrameCache::remove_old() const
+{
+    std::vector<std::pair<fs::file_time_type, fs::path>> runs;
+    std::error_code error;
+    for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
+        std::error_code none;
+        const fs::file_time_type used = fs::last_write_time(entry->path(), none);
+        if (!none && entry->is_directory(none)) runs.emplace_back(used, entry->path());
+    }
+    std::sort(runs.rbegin(), runs.rend());
+    for (std::size_t k = most_runs; k < runs.size(); ++k) fs::remove_all(runs[k].second, error);
 }
 
 }  // namespace rapid

@@ -19,7 +19,6 @@
 #include <thread>
 #include <vector>
 
-#include "bindings/view/frame_cache.h"
 #include "bindings/view/frame_store.h"
 #include "include/rapid/scene.h"
 #include "runtime/error.h"

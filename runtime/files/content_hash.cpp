@@ -6,7 +6,6 @@
 #include <xxhash.h>
 
 #include <cerrno>
-#include <memory>
 #include <new>
 
 #include "runtime/files/file_error.h"
@@ -16,22 +15,30 @@ namespace rapid {
 
 std::uint64_t content_hash(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 
+ContentHash::ContentHash() : state_(XXH3_createState())
+{
+    if (!state_) throw std::bad_alloc();
+    XXH3_64bits_reset(state_.get());
+}
+
+void ContentHash::add(const void* data, std::size_t bytes) { XXH3_64bits_update(state_.get(), data, bytes); }
+std::uint64_t ContentHash::value() const { return XXH3_64bits_digest(state_.get()); }
+void ContentHash::Free::operator()(XXH3_state_s* state) const { XXH3_freeState(state); }
+
 std::uint64_t file_hash(const std::filesystem::path& path)
 {
     check_readable(path);
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!file) throw file_error("can't be read", errno);
-    const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> sum(XXH3_createState(), XXH3_freeState);
-    if (!sum) throw std::bad_alloc();
-    XXH3_64bits_reset(sum.get());
+    ContentHash hash;
     constexpr std::size_t piece = std::size_t{1} << 20;
     const auto buffer = std::make_unique_for_overwrite<unsigned char[]>(piece);
     while (true) {
         const ssize_t count = ::read(file.number(), buffer.get(), piece);
         if (count < 0 && errno == EINTR) continue;
         if (count < 0) throw file_error("can't be read", errno);
-        if (count == 0) return XXH3_64bits_digest(sum.get());
-        XXH3_64bits_update(sum.get(), buffer.get(), static_cast<std::size_t>(count));
+        if (count == 0) return hash.value();
+        hash.add(buffer.get(), static_cast<std::size_t>(count));
     }
 }
 

@@ -4,12 +4,29 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
+
+struct XXH3_state_s;
 
 namespace rapid {
 
 std::uint64_t content_hash(std::string_view bytes);
+
+// The hash of bytes that come one part after another.
+class ContentHash {
+public:
+    ContentHash();
+    void add(const void* data, std::size_t bytes);
+    std::uint64_t value() const;
+
+private:
+    struct Free {
+        void operator()(XXH3_state_s* state) const;
+    };
+    std::unique_ptr<XXH3_state_s, Free> state_;
+};
 
 // Of a file, which is read piece by piece. Error: it can't be read.
 std::uint64_t file_hash(const std::filesystem::path& path);

@@ -3,17 +3,19 @@
 #include <blosc.h>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <memory>
-#include <new>
 #include <string_view>
+#include <utility>
 
 #include "runtime/error.h"
+#include "runtime/files/content_hash.h"
+#include "runtime/files/output_file.h"
 #include "runtime/io/text_table.h"
 #include "runtime/of_thread.h"
 
@@ -79,7 +81,7 @@ bool is_worth_packing(const Raw& raw)
 [[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
 
 // A piece of the size of its content is stored.
-void unpack(std::span<const unsigned char> piece, char* data, std::size_t bytes)
+void unpack(std::string_view piece, char* data, std::size_t bytes)
 {
     if (piece.size() == bytes) {
         std::memcpy(data, piece.data(), bytes);
@@ -127,16 +129,15 @@ void take_texts(const CheckedJson& blocks, SavedState& state)
     }
 }
 
-std::uint64_t number_at(const unsigned char* at)
+std::uint64_t number_at(const char* at)
 {
     std::uint64_t number;
     std::memcpy(&number, at, sizeof number);
     return number;
 }
 
-}  // namespace
-
-void write_state(OutputFile& file, CheckedJson header, const SavedState& state)
+void write_to(const std::function<void(const void* data, std::size_t bytes)>& write, CheckedJson header,
+              const SavedState& state)
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
     // Of a column of texts the block holds the places, and the header its texts.
@@ -174,12 +175,10 @@ void write_state(OutputFile& file, CheckedJson header, const SavedState& state)
         for (const Token text : texts[b - 1]) of_block.push_back(text.text());
     }
 
-    const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> sum(XXH3_createState(), XXH3_freeState);
-    if (!sum) throw std::bad_alloc();
-    XXH3_64bits_reset(sum.get());
+    ContentHash hash;
     const auto append = [&](const void* data, std::size_t bytes) {
-        XXH3_64bits_update(sum.get(), data, bytes);
-        file.append(data, bytes);
+        hash.add(data, bytes);
+        write(data, bytes);
     };
     const std::string text = header.dump(1, ' ', false, CheckedJson::error_handler_t::replace);
     const std::uint64_t length = text.size();
@@ -187,8 +186,25 @@ void write_state(OutputFile& file, CheckedJson header, const SavedState& state)
     append(&length, sizeof length);
     append(text.data(), text.size());
     for (const Piece& piece : pieces) append(piece.bytes.data(), piece.bytes.size());
-    const std::uint64_t digest = XXH3_64bits_digest(sum.get());
-    file.append(&digest, sizeof digest);
+    const std::uint64_t digest = hash.value();
+    write(&digest, sizeof digest);
+}
+
+}  // namespace
+
+void write_state(const std::filesystem::path& path, CheckedJson header, const SavedState& state)
+{
+    OutputFile file(path);
+    write_to([&](const void* data, std::size_t bytes) { file.append(data, bytes); }, std::move(header), state);
+    file.finish();
+}
+
+std::string text_of_state(CheckedJson header, const SavedState& state)
+{
+    std::string text;
+    write_to([&](const void* data, std::size_t bytes) { text.append(static_cast<const char*>(data), bytes); },
+             std::move(header), state);
+    return text;
 }
 
 bool StateFile::is_one(const std::filesystem::path& path)
@@ -200,20 +216,19 @@ bool StateFile::is_one(const std::filesystem::path& path)
     return file.read(head.data(), head.size()) && std::string_view(head.data(), head.size()) == state_magic;
 }
 
-StateFile::StateFile(const std::filesystem::path& path) : file_(path)
+StateFile::StateFile(Content content) : content_(std::move(content))
 {
-    const std::span<const unsigned char> bytes = file_.bytes();
+    const std::string_view all = text();
     constexpr std::size_t ends = state_magic.size() + 2 * sizeof(std::uint64_t);
-    if (bytes.size() < ends || file_.text().substr(0, state_magic.size()) != state_magic)
-        damaged("it does not begin as one");
-    const std::size_t body = bytes.size() - sizeof(std::uint64_t);
-    if (XXH3_64bits(bytes.data(), body) != number_at(bytes.data() + body)) damaged("its checksum is wrong");
-    const std::uint64_t length = number_at(bytes.data() + state_magic.size());
+    if (all.size() < ends || !all.starts_with(state_magic)) damaged("it does not begin as one");
+    const std::size_t body = all.size() - sizeof(std::uint64_t);
+    if (content_hash(all.substr(0, body)) != number_at(all.data() + body)) damaged("its checksum is wrong");
+    const std::uint64_t length = number_at(all.data() + state_magic.size());
     const std::size_t begin = state_magic.size() + sizeof length;
     if (length > body - begin) damaged("its header is longer than the file");
     blocks_at_ = begin + static_cast<std::size_t>(length);
     try {
-        header_ = CheckedJson::parse(file_.text().substr(begin, static_cast<std::size_t>(length)),
+        header_ = CheckedJson::parse(all.substr(begin, static_cast<std::size_t>(length)),
                                      [](int depth, CheckedJson::parse_event_t, CheckedJson&) {
                                          if (depth > most_depth) damaged("its header is nested too deep");
                                          return true;
@@ -231,9 +246,10 @@ SavedState StateFile::state() const
 {
     SavedState state;
     std::size_t at = blocks_at_;
-    const std::size_t end = file_.bytes().size() - sizeof(std::uint64_t);
+    const std::string_view all = text();
+    const std::size_t end = all.size() - sizeof(std::uint64_t);
     struct Place {
-        std::span<const unsigned char> piece;
+        std::string_view piece;
         char* to;
         std::size_t bytes;
     };
@@ -251,7 +267,7 @@ SavedState StateFile::state() const
             const std::uint64_t size = piece.get<std::uint64_t>();
             if (size > end - at) damaged("it is shorter than its header says");
             const std::size_t filled = std::min(piece_bytes, bytes - done);
-            places.push_back({file_.bytes().subspan(at, static_cast<std::size_t>(size)), to + done, filled});
+            places.push_back({all.substr(at, static_cast<std::size_t>(size)), to + done, filled});
             at += static_cast<std::size_t>(size);
             done += filled;
         }

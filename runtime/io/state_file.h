@@ -13,10 +13,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "runtime/checked_json.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/output_file.h"
 #include "runtime/points/saved_state.h"
 
 namespace rapid {
@@ -24,16 +27,20 @@ namespace rapid {
 // The "format" of the files that this Rapid writes, and of those that it reads.
 inline constexpr int state_format = 5;
 
-// Compresses on all threads. header: an object. The caller finishes the file.
-void write_state(OutputFile& file, CheckedJson header, const SavedState& state);
+// Compresses on all threads. `header` is an object. Throws Error if the file can't be written.
+void write_state(const std::filesystem::path& path, CheckedJson header, const SavedState& state);
+// The same file in memory.
+std::string text_of_state(CheckedJson header, const SavedState& state);
 
 class StateFile {
 public:
     // Reads and checks the whole file. Error: it can't be read; it is no such file, torn or damaged.
-    explicit StateFile(const std::filesystem::path& path);
+    explicit StateFile(const std::filesystem::path& path) : StateFile(Content{InputFile(path), {}}) {}
+    // The same of what text_of_state() has returned.
+    static StateFile in_memory(std::string text) { return StateFile(Content{{}, std::move(text)}); }
 
     const CheckedJson& header() const { return header_; }
-    std::uint64_t bytes() const { return file_.bytes().size(); }
+    std::uint64_t bytes() const { return text().size(); }
     // Decompresses, on all threads. Error: it is damaged.
     SavedState state() const;
 
@@ -41,7 +48,14 @@ public:
     static bool is_one(const std::filesystem::path& path);
 
 private:
-    InputFile file_;
+    struct Content {
+        std::optional<InputFile> file;
+        std::string text;  // without a file
+    };
+    explicit StateFile(Content content);
+    std::string_view text() const { return content_.file ? content_.file->text() : content_.text; }
+
+    Content content_;
     CheckedJson header_;
     std::size_t blocks_at_ = 0;
 };

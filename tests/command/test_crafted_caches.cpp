@@ -131,9 +131,7 @@ TEST_CASE("a cache that is made to do harm is refused, or the run goes on", "[cr
         if (k % 2 == 0) {
             std::ofstream(journal, std::ios::binary) << forged_journal(whole_journal, seed);
         } else {
-            OutputFile file(snapshot);
-            write_state(file, whole.header(), test::Forger(seed)(whole.state()));
-            file.finish();
+            write_state(snapshot, whole.header(), test::Forger(seed)(whole.state()));
         }
         const int status = run(folder.path());
         CAPTURE(k, test::file_text(folder / "said"));

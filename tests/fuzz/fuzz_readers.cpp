@@ -4,21 +4,22 @@
 // Lengths and checksums that would be wrong after every change are put in here.
 #include <sys/mman.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <string>
 #include <string_view>
 
 #include "bindings/command/farm_job.h"
 #include "bindings/run/part_record.h"
-#include "bindings/run/piece_log.h"
 #include "runtime/error.h"
 #include "runtime/files/content_hash.h"
+#include "runtime/files/frame_archive.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
@@ -61,16 +62,15 @@ std::string state_file(std::string_view input)
     const std::string_view header = take_stretch(input);
     std::string file = "\x89RAPID\r\n" + number(header.size());
     file.append(header).append(input);
-    return file + number(XXH3_64bits(file.data(), file.size()));
+    return file + number(rapid::content_hash(file));
 }
 
-// Of pieces.
-std::string piece_log(std::string_view input)
+std::string record_log(std::string_view input)
 {
     std::string file;
     while (!input.empty()) {
-        const std::string_view piece = take_stretch(input);
-        file.append(number(piece.size()) + number(rapid::content_hash(piece))).append(piece);
+        const std::string_view record = take_stretch(input);
+        file.append(number(record.size()) + number(rapid::content_hash(record))).append(record);
     }
     return file;
 }
@@ -108,9 +108,14 @@ void read_state(std::string_view input)
 
 void read_log(std::string_view input)
 {
-    const std::string log = piece_log(input);
-    std::size_t bytes = 0;
-    rapid::PieceLog(path_of(log)).read(log.size(), [&](std::string_view piece) { bytes += piece.size(); });
+    // A log follows no link, which the path of a file without a name is.
+    const std::string path = std::filesystem::temp_directory_path() / ("rapid-fuzz-log-" + std::to_string(::getpid()));
+    std::ofstream(path, std::ios::binary) << record_log(input);
+    const rapid::RecordLog log(path);
+    std::filesystem::remove(path);
+    std::uint64_t place = 0;
+    for (std::string record; log.read(place, record);) {
+    }
 }
 
 struct Reader {

@@ -109,9 +109,7 @@ TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "
         {
             test::Run run(scene);
             for (int frame = 0; frame < 6; ++frame) run.evaluator().advance();
-            OutputFile file(folder / "whole");
-            write_state(file, {{"frame", 6}}, state_of(run.evaluator().save()));
-            file.finish();
+            write_state(folder / "whole", {{"frame", 6}}, state_of(run.evaluator().save()));
         }
         go_on_behind(StateFile(folder / "whole").state(), scene);
 

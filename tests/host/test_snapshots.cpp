@@ -157,9 +157,7 @@ TEST_CASE("goes on behind the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
     Run run(folder / "scene.lua");
     run.evaluator().load(snapshot);
     for (int k = 0; k < 6; ++k) run.evaluator().advance();
-    OutputFile file(folder / "after");
-    write_state(file, {{"frame", run.evaluator().next_frame() - 1}}, state_of(run.evaluator().save()));
-    file.finish();
+    write_state(folder / "after", {{"frame", run.evaluator().next_frame() - 1}}, state_of(run.evaluator().save()));
 }
 
 TEST_CASE("a run behind a snapshot in another process is the run that was not interrupted", "[snapshot]")
@@ -169,9 +167,7 @@ TEST_CASE("a run behind a snapshot in another process is the run that was not in
         const test::TemporaryFolder folder;
         Run whole(folder.write("scene.lua", "local rapid = require \"rapid\"\n" + text));
         for (int k = 0; k < 5; ++k) whole.evaluator().advance();
-        OutputFile file(folder / "before");
-        write_state(file, {{"frame", 5}}, state_of(whole.evaluator().save()));
-        file.finish();
+        write_state(folder / "before", {{"frame", 5}}, state_of(whole.evaluator().save()));
         for (int k = 0; k < 6; ++k) whole.evaluator().advance();
 
         const std::string program = fs::read_symlink("/proc/self/exe").string();

@@ -214,9 +214,10 @@ describe("the folder of a view's cache", function()
       "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } } :solve {}")
     folder:write("victim", "precious")
     local view = '"$RAPID" view scene.lua -f 1-3 --no-open --cache cache'
-    command.shell("timeout 60 " .. view .. " >said 2>&1 & until [ -e cache/view/*/index ]; do kill -0 $! || exit 1; " ..
-      "sleep 0.02; done; kill $!; wait $!; exit 0", { cwd = folder.path })
-    command.shell("cd cache/view/*/ && rm index && ln -s ../../../victim index", { cwd = folder.path })
+    command.shell("timeout 60 " .. view .. " >said 2>&1 & " ..
+      "until [ -e cache/view/*/journal ]; do kill -0 $! || exit 1; sleep 0.02; done; kill $!; wait $!; exit 0",
+      { cwd = folder.path })
+    command.shell("cd cache/view/*/ && rm journal && ln -s ../../../victim journal", { cwd = folder.path })
     command.shell("timeout 4 " .. view .. " >said 2>&1", { cwd = folder.path })
     assert.equal("precious", folder:read "victim")
     command.shell("cd cache/view && rm -f .lock && ln -s ../../seen .lock", { cwd = folder.path })

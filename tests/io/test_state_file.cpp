@@ -21,9 +21,7 @@ PointSet kept_points()
 
 fs::path written(const test::TemporaryFolder& folder, const SavedState& state)
 {
-    OutputFile file(folder / "state");
-    write_state(file, {{"rapid", "0.1.0"}, {"frame", 12}}, state);
-    file.finish();
+    write_state(folder / "state", {{"rapid", "0.1.0"}, {"frame", 12}}, state);
     return folder / "state";
 }
 

@@ -3,7 +3,6 @@
 #include <openvdb/io/File.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <array>
 #include <cstdint>
@@ -11,7 +10,7 @@
 #include <functional>
 #include <set>
 
-#include "runtime/files/output_file.h"
+#include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/openvdb_grids.h"
@@ -85,17 +84,14 @@ void write_plain_fog(const Path& path) { write_density(path, openvdb::io::COMPRE
 
 void write_state_of_points(const Path& path)
 {
-    OutputFile file(path);
-    write_state(file, {{"rapid", "0.1.0"}, {"frame", 12}}, state_of(random_points({.size = 40, .wide = false})));
-    file.finish();
+    write_state(path, {{"rapid", "0.1.0"}, {"frame", 12}}, state_of(random_points({.size = 40, .wide = false})));
 }
 
 void seal_state(std::string& mutant)
 {
-    std::uint64_t sum;
-    if (mutant.size() < sizeof sum) return;
-    const std::size_t body = mutant.size() - sizeof sum;
-    sum = XXH3_64bits(mutant.data(), body);
+    if (mutant.size() < sizeof(std::uint64_t)) return;
+    const std::size_t body = mutant.size() - sizeof(std::uint64_t);
+    const std::uint64_t sum = content_hash(mutant.substr(0, body));
     std::memcpy(mutant.data() + body, &sum, sizeof sum);
 }
 

@@ -18,26 +18,20 @@ void add_value(JsonText& json, const Value& value)
     if (const bool* truth = value.get<bool>()) return json.value(*truth);
     if (const double* number = value.get<double>(); number && std::isfinite(*number)) return json.value(*number);
     if (const std::string* text = value.get<std::string>()) return json.value(*text);
-    if (const Vec3d* v = value.get<Vec3d>()) return json.value(std::vector{v->x(), v->y(), v->z()});
+    if (const Vec3d* v = value.get<Vec3d>()) return json.value(*v);
     json.value(describe(value));
 }
 
 void add_param(JsonText& json, const Param& param)
 {
     json.begin_object();
-    json.member("name", param.name);
-    json.member("type", param.type);
-    json.key("default");
-    add_value(json, param.fallback);
+    json.members("name", param.name, "type", param.type, "default", [&] { add_value(json, param.fallback); });
     if (std::isfinite(param.range.lo)) json.member("min", param.range.lo);
     if (param.range.lo_excluded) json.member("above_min", true);
     if (std::isfinite(param.range.hi)) json.member("max", param.range.hi);
     if (!param.choices.empty()) json.member("choices", param.choices);
-    json.member("unit", param.unit);
-    json.member("doc", param.doc);
-    json.member("required", param.required);
-    json.member("per_point", param.per_point);
-    json.member("of_the_frame", param.of_the_frame);
+    json.members("unit", param.unit, "doc", param.doc, "required", param.required, "per_point", param.per_point,
+                 "of_the_frame", param.of_the_frame);
     json.end();
 }
 
@@ -54,21 +48,15 @@ std::string json_of(const NodeType& type)
 {
     JsonText json;
     json.begin_object();
-    json.member("name", type.name);
-    json.member("doc", type.doc);
+    json.members("name", type.name, "doc", type.doc);
     json.key("params");
     json.begin_list();
     for (const Param& param : type.params)
         if (!param.internal) add_param(json, param);
     json.end();
     json.key("other_params");
-    if (type.rest)
-        json.value(type.rest->doc);
-    else
-        json.value(nullptr);
-    json.member("reads", type.uses.reads);
-    json.member("writes", type.uses.writes);
-    json.member("makes", made_by(type));
+    type.rest ? json.value(type.rest->doc) : json.value(nullptr);
+    json.members("reads", type.uses.reads, "writes", type.uses.writes, "makes", made_by(type));
     json.end();
     return json.text();
 }

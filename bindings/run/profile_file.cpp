@@ -4,32 +4,31 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "runtime/json_text.h"
 #include "runtime/report/frame_profile.h"
 
 namespace rapid {
 namespace {
 
-using nlohmann::ordered_json;
-
 constexpr int frames_row = 1, passes_row = 2, files_row = 3;  // "threads" of the trace
 
-std::string event_text(const ordered_json& event)
+std::string row_name(int row, const std::string& name)
 {
-    return event.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+    JsonText json;
+    json.object("name", "thread_name", "ph", "M", "pid", 1, "tid", row, "args", [&] { json.object("name", name); });
+    return json.text();
 }
 
-ordered_json row_name(int row, const std::string& name)
+// An event with a length, in µs.
+std::string complete(const std::string& name, const char* category, int row, double begin, double length,
+                     const auto&... args)
 {
-    return {{"name", "thread_name"}, {"ph", "M"}, {"pid", 1}, {"tid", row}, {"args", {{"name", name}}}};
-}
-
-// An event with a length. µs.
-ordered_json complete(const std::string& name, const char* category, int row, double begin, double length)
-{
-    return {{"name", name}, {"cat", category}, {"ph", "X"}, {"pid", 1}, {"tid", row}, {"ts", begin}, {"dur", length}};
+    JsonText json;
+    json.object("name", name, "cat", category, "ph", "X", "pid", 1, "tid", row, "ts", begin, "dur", length, "args",
+                [&] { json.object(args...); });
+    return json.text();
 }
 
 double rate(std::uint64_t count, double seconds) { return seconds > 0 ? static_cast<double>(count) / seconds : 0; }
@@ -45,9 +44,9 @@ ProfileFile::ProfileFile(std::string path) : path_(std::move(path))
     } catch (const Error& error) {
         error_ = error;
     }
-    append(event_text({{"name", "process_name"}, {"ph", "M"}, {"pid", 1}, {"args", {{"name", "rapid"}}}}));
-    append(event_text(row_name(frames_row, "frames")));
-    append(event_text(row_name(passes_row, "nodes")));
+    append(R"({"name":"process_name","ph":"M","pid":1,"args":{"name":"rapid"}})");
+    append(row_name(frames_row, "frames"));
+    append(row_name(passes_row, "nodes"));
 }
 
 double ProfileFile::microseconds(Clock::time_point moment) const
@@ -71,28 +70,21 @@ void ProfileFile::add(const FrameResult& result)
     const double begin = microseconds(result.began);
     std::uint64_t points = 0, bytes = 0;
     for (const auto& [name, set] : result.outputs) points += set.size(), bytes += set.bytes();
-    ordered_json frame =
-        complete(fmt::format("frame {}", result.frame), "frame", frames_row, begin, 1e6 * result.total_seconds);
-    frame["args"] = {{"frame", result.frame},
-                     {"points", points},
-                     {"bytes", bytes},
-                     {"points_per_second", rate(points, result.total_seconds)},
-                     {"substeps", result.figures.substeps},
-                     {"collisions", result.figures.collisions}};
-    append(event_text(frame));
-    for (const NodeWork& work : result.work) {
-        ordered_json pass = complete(fmt::format("{}", fmt::join(work.nodes, " + ")), name_of(work.stage), passes_row,
-                                     begin + 1e6 * work.begin, 1e6 * work.seconds);
-        pass["args"] = {{"frame", result.frame},
-                        {"nodes", work.nodes},
-                        {"points", work.points},
-                        {"bytes", work.bytes},
-                        {"points_per_second", rate(work.points, work.seconds)}};
-        append(event_text(pass));
+    append(complete(fmt::format("frame {}", result.frame), "frame", frames_row, begin, 1e6 * result.total_seconds,
+                    "frame", result.frame, "points", points, "bytes", bytes, "points_per_second",
+                    rate(points, result.total_seconds), "substeps", result.figures.substeps, "collisions",
+                    result.figures.collisions));
+    for (const NodeWork& work : result.work)
+        append(complete(fmt::format("{}", fmt::join(work.nodes, " + ")), name_of(work.stage), passes_row,
+                        begin + 1e6 * work.begin, 1e6 * work.seconds, "frame", result.frame, "nodes", work.nodes,
+                        "points", work.points, "bytes", work.bytes, "points_per_second",
+                        rate(work.points, work.seconds)));
+    for (const auto& [name, value] : {std::pair("points", points), std::pair("bytes of points", bytes)}) {
+        JsonText json;
+        json.object("name", name, "ph", "C", "pid", 1, "ts", begin, "args",
+                    [&, all = value] { json.object("all outputs", all); });
+        append(json.text());
     }
-    for (const auto& [name, value] : {std::pair("points", points), std::pair("bytes of points", bytes)})
-        append(
-            event_text({{"name", name}, {"ph", "C"}, {"pid", 1}, {"ts", begin}, {"args", {{"all outputs", value}}}}));
 }
 
 void ProfileFile::add(const FrameWriter::Written& file)
@@ -102,12 +94,11 @@ void ProfileFile::add(const FrameWriter::Written& file)
     const int row = files_row + static_cast<int>(lane - lanes_.begin());
     if (lane == lanes_.end()) {
         lane = lanes_.insert(lane, end);
-        append(event_text(row_name(row, lanes_.size() == 1 ? "files" : fmt::format("files {}", lanes_.size()))));
+        append(row_name(row, lanes_.size() == 1 ? "files" : fmt::format("files {}", lanes_.size())));
     }
     *lane = end;
-    ordered_json written = complete("write " + file.path, "write", row, begin, 1e6 * file.seconds);
-    written["args"] = {{"frame", file.frame}, {"bytes", file.bytes}};
-    append(event_text(written));
+    append(complete("write " + file.path, "write", row, begin, 1e6 * file.seconds, "frame", file.frame, "bytes",
+                    file.bytes));
 }
 
 void ProfileFile::finish()

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -269,14 +271,8 @@ std::string group_text(const AttributeDifference& d, std::size_t width)
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 
-// The name of a type; null of what a set lacks.
-void add_type(JsonText& json, const std::string& type)
-{
-    if (type.empty())
-        json.value(nullptr);
-    else
-        json.value(type);
-}
+// The name of a type. A set that lacks the attribute has none.
+std::optional<std::string> known(const std::string& type) { return type.empty() ? std::nullopt : std::optional(type); }
 
 }  // namespace
 
@@ -298,42 +294,16 @@ std::string to_json(const Comparison& comparison)
 {
     JsonText json;
     json.begin_object();
-    json.member("same", comparison.same);
-    json.member("points", std::vector{comparison.points_a, comparison.points_b});
-    json.member("compared", comparison.compared);
-    json.member("only_a", comparison.only_a);
-    json.member("only_b", comparison.only_b);
-    json.member("tolerance", comparison.tolerance);
-    json.member("tolerance_P", comparison.tolerance_P);
-    json.key("attributes");
-    json.begin_list();
-    for (const AttributeDifference& d : comparison.attributes) {
-        json.begin_object();
-        json.member("name", d.name);
-        json.key("types");
-        json.begin_list();
-        add_type(json, d.type_a);
-        add_type(json, d.type_b);
-        json.end();
-        json.member("max", d.max);  // null: infinite
-        json.member("rms", d.rms);
-        json.member("p95", d.p95);
-        json.member("worst_id", d.worst_id);
-        json.member("different", d.different);
-        json.member("same", d.same);
-        json.end();
-    }
-    json.end();
-    json.key("groups");
-    json.begin_list();
-    for (const AttributeDifference& d : comparison.groups) {
-        json.begin_object();
-        json.member("name", d.name);
-        json.member("different", d.different);
-        json.member("same", d.same);
-        json.end();
-    }
-    json.end();
+    json.members("same", comparison.same, "points", std::array{comparison.points_a, comparison.points_b}, "compared",
+                 comparison.compared, "only_a", comparison.only_a, "only_b", comparison.only_b, "tolerance",
+                 comparison.tolerance, "tolerance_P", comparison.tolerance_P);
+    json.list("attributes", comparison.attributes, [&](const AttributeDifference& d) {
+        json.object("name", d.name, "types", std::array{known(d.type_a), known(d.type_b)}, "max", d.max, "rms", d.rms,
+                    "p95", d.p95, "worst_id", d.worst_id, "different", d.different, "same", d.same);
+    });
+    json.list("groups", comparison.groups, [&](const AttributeDifference& d) {
+        json.object("name", d.name, "different", d.different, "same", d.same);
+    });
     json.end();
     return json.text();
 }

@@ -75,11 +75,6 @@ std::string byte_count(std::size_t bytes)
     return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
 }
 
-void add_corner(JsonText& json, const char* name, const Vec3f& P)
-{
-    json.member(name, std::vector{P.x(), P.y(), P.z()});
-}
-
 }  // namespace
 
 PointSummary describe(const PointSet& points)
@@ -138,41 +133,20 @@ std::string to_json(const PointSummary& summary)
 {
     JsonText json;
     json.begin_object();
-    json.member("points", summary.points);
-    json.member("bytes", summary.bytes);
+    json.members("points", summary.points, "bytes", summary.bytes);
     if (!summary.bounds.isEmpty()) {
         json.key("bounds");
-        json.begin_object();
-        add_corner(json, "min", summary.bounds.min());
-        add_corner(json, "max", summary.bounds.max());
-        json.end();
+        json.object("min", summary.bounds.min(), "max", summary.bounds.max());
     }
-    json.key("attributes");
-    json.begin_list();
-    for (const AttributeSummary& a : summary.attributes) {
+    json.list("attributes", summary.attributes, [&](const AttributeSummary& a) {
         json.begin_object();
-        json.member("name", a.name);
-        json.member("type", std::string(type_name(a.type)));
-        json.member("uniform", a.uniform);
-        json.member("min", a.min);
-        json.member("max", a.max);
-        json.member("not_finite", a.not_finite);
-        if (a.type == AttributeType::String) {
-            json.member("texts", a.texts);
-            json.member("first_texts", a.first_texts);
-        }
+        json.members("name", a.name, "type", type_name(a.type), "uniform", a.uniform, "min", a.min, "max", a.max,
+                     "not_finite", a.not_finite);
+        if (a.type == AttributeType::String) json.members("texts", a.texts, "first_texts", a.first_texts);
         json.end();
-    }
-    json.end();
-    json.key("groups");
-    json.begin_list();
-    for (const GroupSummary& g : summary.groups) {
-        json.begin_object();
-        json.member("name", g.name);
-        json.member("points", g.members);
-        json.end();
-    }
-    json.end();
+    });
+    json.list("groups", summary.groups,
+              [&](const GroupSummary& g) { json.object("name", g.name, "points", g.members); });
     json.end();
     return json.text();
 }

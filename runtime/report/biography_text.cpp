@@ -26,37 +26,26 @@ std::string text_of(const AttributeValue& value)
     return fmt::format("({:.6g}, {:.6g}, {:.6g}, {:.6g})", q.x(), q.y(), q.z(), q.w());
 }
 
-template <class V>
-std::vector<typename V::Scalar> numbers_of(const V& x)
+void add_value(JsonText& json, const AttributeValue& value)
 {
-    return {x.x(), x.y(), x.z()};
+    if (const auto* text = std::get_if<Token>(&value)) return json.value(text->text());
+    if (const auto* q = std::get_if<Quatf>(&value)) return json.value(q->coeffs());
+    std::visit(
+        [&]<class T>(const T& x) {
+            if constexpr (!std::is_same_v<T, Token> && !std::is_same_v<T, Quatf>) json.value(x);
+        },
+        value);
 }
 
-void add_json(JsonText& json, const AttributeValue& value)
+void add_moment(JsonText& json, const char* name, const std::optional<Biography::Moment>& moment)
 {
-    if (const auto* x = std::get_if<float>(&value)) return json.value(*x);
-    if (const auto* x = std::get_if<Vec3f>(&value)) return json.value(numbers_of(*x));
-    if (const auto* x = std::get_if<std::int32_t>(&value)) return json.value(*x);
-    if (const auto* x = std::get_if<std::int64_t>(&value)) return json.value(*x);
-    if (const auto* x = std::get_if<Token>(&value)) return json.value(std::string(x->text()));
-    const Quatf& q = std::get<Quatf>(value);
-    json.value(std::vector{q.x(), q.y(), q.z(), q.w()});
+    if (!moment) return json.member(name, nullptr);
+    json.key(name);
+    json.object("frame", moment->frame, "time", moment->time, "P", moment->P, "v", moment->v, "node", moment->node,
+                "why", moment->why);
 }
 
-void add_json(JsonText& json, const std::optional<Biography::Moment>& moment)
-{
-    if (!moment) return json.value(nullptr);
-    json.begin_object();
-    json.member("frame", moment->frame);
-    json.member("time", moment->time);
-    json.member("P", numbers_of(moment->P));
-    json.member("v", numbers_of(moment->v));
-    json.member("node", moment->node);
-    json.member("why", moment->why);
-    json.end();
-}
-
-void add_json(JsonText& json, const Biography::Edit& edit)
+void add_edit(JsonText& json, const Biography::Edit& edit)
 {
     json.begin_object();
     json.member("node", edit.node);
@@ -64,83 +53,48 @@ void add_json(JsonText& json, const Biography::Edit& edit)
     json.begin_object();
     for (const auto& [name, values] : edit.changes) {
         json.key(name);
-        json.begin_object();
-        json.key("before");
-        add_json(json, values.first);
-        json.key("after");
-        add_json(json, values.second);
-        json.end();
+        json.object(
+            "before", [&, &before = values.first] { add_value(json, before); }, "after",
+            [&, &after = values.second] { add_value(json, after); });
     }
     json.end();
     json.member("removed", edit.removed);
     json.end();
 }
 
-void add_json(JsonText& json, const Biography::Force& force)
+void add_step(JsonText& json, const Biography::Step& step)
 {
     json.begin_object();
-    json.member("node", force.node);
-    json.member("acceleration", numbers_of(force.a));
-    json.end();
-}
-
-void add_json(JsonText& json, const Biography::Contact& contact)
-{
-    json.begin_object();
-    json.member("node", contact.node);
-    json.member("time", contact.time);
-    json.member("P", numbers_of(contact.P));
-    json.member("normal", numbers_of(contact.normal));
-    json.member("speed", contact.speed);
-    json.member("impulse", contact.impulse);
-    json.end();
-}
-
-void add_json(JsonText& json, const Biography::Step& step);
-
-template <class T>
-void add_list(JsonText& json, const char* name, const std::vector<T>& all)
-{
-    json.key(name);
-    json.begin_list();
-    for (const T& one : all) add_json(json, one);
-    json.end();
-}
-
-void add_json(JsonText& json, const Biography::Step& step)
-{
-    json.begin_object();
-    json.member("frame", step.frame);
-    json.member("time", step.time);
+    json.members("frame", step.frame, "time", step.time);
     json.key("values");
     if (step.values) {
         json.begin_object();
         for (const auto& [name, value] : *step.values) {
             json.key(name);
-            add_json(json, value);
+            add_value(json, value);
         }
         json.end();
     } else {
         json.value(nullptr);
     }
-    add_list(json, "edits", step.edits);
-    add_list(json, "forces", step.forces);
-    add_list(json, "contacts", step.contacts);
-    json.member("asleep", step.asleep);
-    json.member("contacts_known", step.has_contacts);
+    json.list("edits", step.edits, [&](const Biography::Edit& edit) { add_edit(json, edit); });
+    json.list("forces", step.forces,
+              [&](const Biography::Force& force) { json.object("node", force.node, "acceleration", force.a); });
+    json.list("contacts", step.contacts, [&](const Biography::Contact& contact) {
+        json.object("node", contact.node, "time", contact.time, "P", contact.P, "normal", contact.normal, "speed",
+                    contact.speed, "impulse", contact.impulse);
+    });
+    json.members("asleep", step.asleep, "contacts_known", step.has_contacts);
     json.end();
 }
 
-void add_json(JsonText& json, const Biography& life)
+void add_life(JsonText& json, const Biography& life)
 {
     json.begin_object();
-    json.member("id", life.id);
-    json.member("simulation", life.simulation);
-    json.key("birth");
-    add_json(json, life.birth);
-    json.key("death");
-    add_json(json, life.death);
-    add_list(json, "steps", life.steps);
+    json.members("id", life.id, "simulation", life.simulation);
+    add_moment(json, "birth", life.birth);
+    add_moment(json, "death", life.death);
+    json.list("steps", life.steps, [&](const Biography::Step& step) { add_step(json, step); });
     json.end();
 }
 
@@ -212,7 +166,7 @@ std::string to_json(const std::vector<Biography>& lives)
 {
     JsonText json;
     json.begin_list();
-    for (const Biography& life : lives) add_json(json, life);
+    for (const Biography& life : lives) add_life(json, life);
     json.end();
     return json.text();
 }

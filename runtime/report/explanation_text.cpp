@@ -72,63 +72,33 @@ std::string text_of_half(const Explanation& plan, bool kept)
            stages.text(" stages");
 }
 
-void add_part(JsonText& json, const Explanation::ExplainedNode& node)
+void add_nodes(JsonText& json, const Explanation& plan)
 {
-    json.begin_object();
-    json.member("name", node.name);
-    json.member("type", node.type);
-    json.member("kept", node.kept);
-    json.member("evaluated", node.evaluated);
-    json.member("why", node.why);
-    if (!node.changes.empty()) json.member("changes", node.changes);
-    json.end();
+    json.list("nodes", plan.nodes, [&](const Explanation::ExplainedNode& node) {
+        json.begin_object();
+        json.members("name", node.name, "type", node.type, "kept", node.kept, "evaluated", node.evaluated, "why",
+                     node.why);
+        if (!node.changes.empty()) json.member("changes", node.changes);
+        json.end();
+    });
 }
 
-void add_part(JsonText& json, const Explanation::ExplainedAttribute& attribute)
+void add_attributes(JsonText& json, const Explanation& plan)
 {
-    json.begin_object();
-    json.member("name", attribute.name);
-    json.member("simulation", attribute.simulation);
-    json.member("kept", attribute.kept);
-    json.member("bytes_per_point", attribute.bytes_per_point);
-    json.member("why", attribute.why);
-    if (!attribute.brought_in_by.empty()) json.member("brought_in_by", attribute.brought_in_by);
-    json.end();
+    json.list("attributes", plan.attributes, [&](const Explanation::ExplainedAttribute& attribute) {
+        json.begin_object();
+        json.members("name", attribute.name, "simulation", attribute.simulation, "kept", attribute.kept,
+                     "bytes_per_point", attribute.bytes_per_point, "why", attribute.why);
+        if (!attribute.brought_in_by.empty()) json.member("brought_in_by", attribute.brought_in_by);
+        json.end();
+    });
 }
 
-void add_part(JsonText& json, const Explanation::ExplainedFunction& function)
+void add_stages(JsonText& json, const Explanation& plan)
 {
-    json.begin_object();
-    json.member("name", function.name);
-    json.member("called", function.called);
-    json.member("between", function.between);
-    json.end();
-}
-
-void add_part(JsonText& json, const Explanation::ExplainedStage& stage)
-{
-    json.begin_object();
-    json.member("name", stage.name);
-    json.member("kept", stage.kept);
-    json.member("why", stage.why);
-    json.end();
-}
-
-void add_part(JsonText& json, const Explanation::ExplainedCoupling& coupling)
-{
-    json.begin_object();
-    json.member("name", coupling.name);
-    json.member("what", coupling.what);
-    json.end();
-}
-
-template <class T>
-void add_members(JsonText& json, const char* name, const std::vector<T>& all)
-{
-    json.key(name);
-    json.begin_list();
-    for (const T& one : all) add_part(json, one);
-    json.end();
+    json.list("stages", plan.stages, [&](const Explanation::ExplainedStage& stage) {
+        json.object("name", stage.name, "kept", stage.kept, "why", stage.why);
+    });
 }
 
 }  // namespace
@@ -137,15 +107,19 @@ std::string to_json(const Explanation& plan)
 {
     JsonText json;
     json.begin_object();
-    add_members(json, "nodes", plan.nodes);
-    add_members(json, "attributes", plan.attributes);
-    add_members(json, "functions", plan.functions);
-    add_members(json, "stages", plan.stages);
+    add_nodes(json, plan);
+    add_attributes(json, plan);
+    json.list("functions", plan.functions, [&](const Explanation::ExplainedFunction& function) {
+        json.object("name", function.name, "called", function.called, "between", function.between);
+    });
+    add_stages(json, plan);
     json.member("passes", plan.passes);
     json.key("parts");
     json.begin_object();
     json.member("possible", plan.couplings.empty());
-    add_members(json, "because", plan.couplings);
+    json.list("because", plan.couplings, [&](const Explanation::ExplainedCoupling& coupling) {
+        json.object("name", coupling.name, "what", coupling.what);
+    });
     json.end();
     json.member("bytes_per_point", plan.bytes_per_point());
     json.end();
@@ -156,9 +130,9 @@ std::string json_of_surplus(const Explanation& surplus)
 {
     JsonText json;
     json.begin_object();
-    add_members(json, "nodes", surplus.nodes);
-    add_members(json, "attributes", surplus.attributes);
-    add_members(json, "stages", surplus.stages);
+    add_nodes(json, surplus);
+    add_attributes(json, surplus);
+    add_stages(json, surplus);
     json.end();
     return json.text();
 }

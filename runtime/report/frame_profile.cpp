@@ -21,16 +21,9 @@ std::string profile_json(const FrameResult& result)
 {
     JsonText json;
     json.begin_list();
-    for (const NodeWork& work : result.work) {
-        json.begin_object();
-        json.member("nodes", work.nodes);
-        json.member("stage", std::string(name_of(work.stage)));
-        json.member("begin", work.begin);
-        json.member("seconds", work.seconds);
-        json.member("points", work.points);
-        json.member("bytes", work.bytes);
-        json.end();
-    }
+    for (const NodeWork& work : result.work)
+        json.object("nodes", work.nodes, "stage", name_of(work.stage), "begin", work.begin, "seconds", work.seconds,
+                    "points", work.points, "bytes", work.bytes);
     json.end();
     return json.text();
 }

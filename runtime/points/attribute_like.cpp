@@ -33,7 +33,7 @@ std::string text_of_making(const std::string& name, int numbers)
     const AttributeSpec* usual = conventional_attribute(name);
     if (!usual) usual = known_attribute(name);
     if (!usual) return name + (numbers == 3 ? " = {0, 0, 0}" : numbers == 4 ? " = {0, 0, 0, 1}" : " = 0");
-    // A parameter of every node has this name, too.
+    // Every node already has a parameter of this name.
     if (type_of(usual->fallback) == AttributeType::String) return fmt::format("attributes = {{ {} = \"\" }}", name);
     const auto list = [&](const auto& value, auto... k) {
         std::string text;
@@ -47,7 +47,8 @@ std::string text_of_making(const std::string& name, int numbers)
     return fmt::format("{} = {:g}", name, !number ? 0 : std::isfinite(*number) ? *number : 1);
 }
 
-// The name by which points have what other programs, and people, call otherwise; empty for any other word.
+// Returns Rapid's attribute name for a word common elsewhere ("color" gives "Cd"). Empty if the word is not a known
+// synonym.
 std::string_view name_of_synonym(std::string_view word)
 {
     static const std::map<std::string_view, std::string_view> names = {

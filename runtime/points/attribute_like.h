@@ -1,4 +1,4 @@
-// The value that an attribute has for points that bring none of their own.
+// Default values for attributes of points that do not set their own.
 #pragma once
 
 #include <string>
@@ -8,19 +8,19 @@
 
 namespace rapid {
 
-// The attributes whose types Houdini and its readers fix: Cd, Alpha, N, orient, scale, instance, name, with the
-// value of points without one. They are made as any other is. Null for any other name.
+// Returns the attribute whose type is fixed by Houdini and its readers (Cd, Alpha, N, orient, scale, instance, name),
+// with its default value. Null for any other name. These attributes are created like any other.
 const AttributeSpec* conventional_attribute(std::string_view name);
 
-// How an attribute of this name is made by a node `attribute`: "Cd = {1, 1, 1}", "heat = 0". numbers: how many a value
-// has, if the name does not tell: 3 of a vec3, 4 of a quaternion, else one.
+// Returns the parameters with which a node `attribute` creates this attribute: "Cd = {1, 1, 1}", "heat = 0". numbers:
+// the components of a value if the name does not determine them: 3 for a vec3, 4 for a quaternion, otherwise 1.
 std::string text_of_making(const std::string& name, int numbers = 1);
 
-// What an error says of an attribute that nothing makes, with the nearest of the names that there are.
+// Returns the error message for an attribute that no node creates, with a suggestion from `names`.
 std::string no_attribute(const std::string& name, const std::vector<std::string>& names, int numbers = 1);
 
-// An attribute that some points have, with values of the type of `like`, as the others get it: a known one with its
-// default, else that by convention, else zero.
+// Returns the attribute that gives other points a column of the same type as `like`. The default is that of the known
+// attribute, then that of the conventional one, then zero.
 AttributeSpec attribute_like(const std::string& name, const AttributeValue& like);
 
 }  // namespace rapid

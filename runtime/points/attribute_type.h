@@ -1,4 +1,4 @@
-// The types of attributes. AttributeTypes is the one list of them: columns, values and numbers of types follow from it.
+// The types of attributes. AttributeTypes is their only list: columns, values and type indices are derived from it.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ template <class... T>
 struct TypeList {
     using Column = std::variant<rapid::Column<T>...>;
     using Value = std::variant<T...>;
-    // Of a state, which has groups too.
+    // Columns of a saved state, which also stores groups.
     using KeptColumn = std::variant<rapid::Column<T>..., rapid::Column<std::uint8_t>>;
 };
 using AttributeTypes = TypeList<float, Vec3f, std::int32_t, std::int64_t, Quatf, Token>;
@@ -23,21 +23,22 @@ using AttributeTypes = TypeList<float, Vec3f, std::int32_t, std::int64_t, Quatf,
 using AnyColumn = AttributeTypes::Column;
 using AttributeValue = AttributeTypes::Value;
 
-// The place of a type in the list.
+// The index of a type in AttributeTypes.
 enum class AttributeType { Float, Vec3, Int32, Int64, Quat, String };
 
-// "float", "vec3", "int32", "int64", "quat", "string".
+// Returns "float", "vec3", "int32", "int64", "quat" or "string".
 std::string_view type_name(AttributeType type);
 inline AttributeType type_of(const AnyColumn& column) { return static_cast<AttributeType>(column.index()); }
 inline AttributeType type_of(const AttributeValue& value) { return static_cast<AttributeType>(value.index()); }
 
-// Numbers of a value: 1, 3 or 4.
+// Components of a value: 1, 3 or 4.
 template <class T>
 inline constexpr std::size_t components_of = std::is_same_v<T, Vec3f>   ? 3
                                              : std::is_same_v<T, Quatf> ? 4
                                                                         : 1;
 
-// An empty column (AnyColumn, KeptColumn) of the type at this place of its list, which has one there.
+// Returns an empty column (AnyColumn, KeptColumn) of the type at this index of its list. Precondition: the index is
+// valid.
 template <class Any>
 Any column_of_type(std::size_t place)
 {

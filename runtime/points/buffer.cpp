@@ -17,10 +17,10 @@ namespace {
 
 constexpr std::size_t page = SparePages::page;
 constexpr std::size_t line = 64;
-// Blocks from here on are pages of their own: below it mremap costs more than the copy that it saves.
+// Blocks of at least this size get their own pages. Below it, mremap costs more than the copy that it saves.
 constexpr std::size_t mapped_from = std::size_t{1} << 18;
 
-// Five lines further for each block, within the first page.
+// Returns an offset in the first page that is five cache lines larger for each new block.
 std::size_t stagger()
 {
     static std::atomic<std::size_t> serial{0};
@@ -41,7 +41,7 @@ SparePages::Block new_pages(std::size_t bytes)
     return block;
 }
 
-// Where no bytes are: what copies none takes no null pointer for their place either (C, memcpy).
+// Source and destination of empty copies: memcpy does not accept a null pointer even for zero bytes.
 alignas(line) std::byte no_bytes[line];
 
 }  // namespace
@@ -69,7 +69,7 @@ void Buffer::reserve(std::size_t bytes)
     if (!data_) data_ = no_bytes;
     if (bytes <= capacity_) return;
     if (bytes > max_bytes) throw std::bad_alloc();
-    // Growth by half: untouched pages are free, and a column that is appended to every frame is remapped seldom.
+    // Grows by half: untouched pages are free, and a column that is appended to every frame is rarely remapped.
     const std::size_t wanted = capacity_ == 0 ? bytes : std::max(bytes, capacity_ + capacity_ / 2);
 
     if (mapped_) {
@@ -91,7 +91,8 @@ void Buffer::reserve(std::size_t bytes)
     Buffer grown;
     if (wanted >= mapped_from) {
         const std::size_t offset = stagger();
-        // A page more than the values, wherever they begin in it: buffers of one size take each other's pages.
+        // Reserves a page more than the values need, whatever their offset, so that buffers of one size can reuse each
+        // other's pages.
         const SparePages::Block pages = new_pages(whole_pages(wanted) + page);
         grown.block_ = pages.begin;
         grown.block_bytes_ = pages.bytes;
@@ -117,7 +118,7 @@ void Buffer::give_up(std::size_t bytes)
 
 void Buffer::take_back()
 {
-    // The offset in a page stays, to a line.
+    // The offset in a page stays, rounded down to a cache line.
     const std::size_t back = given_up() - (mapped_ ? given_up() % page / line * line : 0);
     data_ = static_cast<char*>(data_) - back;
     capacity_ += back;

@@ -1,9 +1,9 @@
 // The memory of one column: a block that grows in place.
 //
-// Large blocks are whole pages from the system, grown with mremap: growing moves page-table entries, never values, and
-// pages that nothing has touched take no memory. A few of those given back, 64 MiB at most, are kept for who next needs
-// as many. Small blocks come from the heap. The start is 64-byte aligned until bytes are given up, and staggered:
-// columns that all begin at the same offset in their pages cost a loop over several of them 12 to 25 % (4 KiB
+// Large blocks are whole pages from the system and grow with mremap, which moves page-table entries instead of values.
+// Pages that nothing has touched take no memory. Up to 64 MiB of released blocks are cached for reuse (spare_pages.h).
+// Small blocks come from the heap. The first byte is 64-byte aligned until bytes are given up. It is also staggered:
+// columns that all begin at the same offset in their pages make a loop over several of them 12 to 25 % slower (4 KiB
 // aliasing).
 #pragma once
 
@@ -13,7 +13,7 @@ namespace rapid {
 
 class Buffer {
 public:
-    // More than any machine's address space has for a block, less than would overflow when a block grows.
+    // Larger than any address space, and small enough that growth by half cannot overflow.
     static constexpr std::size_t max_bytes = std::size_t{1} << 62;
 
     Buffer() = default;
@@ -27,22 +27,23 @@ public:
     void* data() const { return data_; }
     std::size_t capacity() const { return capacity_; }
 
-    // Makes room for at least `bytes`; what was written stays. Throws std::bad_alloc.
+    // Makes room for at least `bytes` and preserves the contents. Throws std::bad_alloc if there is no memory.
     void reserve(std::size_t bytes);
 
-    // Gives up the first bytes: those behind them are the first from now on, and are not moved.
+    // Drops the first `bytes` without moving the rest: data() then points to the bytes after them.
     void give_up(std::size_t bytes);
-    // Bytes that were given up, and less than a page more.
+    // Bytes dropped by give_up(), plus the stagger of less than a page.
     std::size_t given_up() const { return block_ ? static_cast<char*>(data_) - static_cast<char*>(block_) : 0; }
-    // Takes them back, but for less than a page: the first is 64-byte aligned again. What was written is not moved.
+    // Makes the dropped bytes available again, except for the stagger: the first byte is 64-byte aligned again. Nothing
+    // is moved.
     void take_back();
 
 private:
     void release();
 
-    void* block_ = nullptr;  // what the system gave
+    void* block_ = nullptr;  // the block as allocated
     std::size_t block_bytes_ = 0;
-    bool mapped_ = false;  // pages of its own, else from the heap
+    bool mapped_ = false;  // own pages instead of heap memory
     void* data_ = nullptr;
     std::size_t capacity_ = 0;
 };

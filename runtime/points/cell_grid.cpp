@@ -14,10 +14,10 @@ namespace {
 
 constexpr double farthest_cell = 1 << 20;
 
-// Cells a sphere up to which all of them are kept, empty or not: finding one is then a look-up.
+// Cells per sphere up to which the grid stores all cells, empty or not. Finding a cell is then a table look-up.
 constexpr double dense_below = 8;
 
-// Along an axis. Cells farther than some from the middle are all the last one: neighbours stay neighbours, and a key
+// Returns the cell coordinate along an axis. It is clamped to the farthest cell: neighbours stay neighbours, and a key
 // fits 64 bits.
 std::int64_t cell_coordinate(double x, double width)
 {
@@ -76,7 +76,8 @@ void CellSorter::fill(CellGrid& grid, const SpheresView& spheres, std::span<cons
         sort_sparse(grid, spheres, members);
 }
 
-// Finds the cells that the spheres are in, and how many these are where all of them are kept.
+// Finds the bounds of the cells that hold spheres. Returns the number of cells within them if the grid is dense,
+// otherwise 0.
 std::size_t CellSorter::bound(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members) const
 {
     Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
@@ -123,7 +124,8 @@ inline void CellSorter::put(CellGrid& grid, std::size_t m, const Sphere& sphere)
     grid.place[m] = sphere.place;
 }
 
-// Into buckets of cells first, and then each bucket into its cells: in the order of the set, within a cell.
+// Sorts the spheres into buckets of cells, then each bucket into its cells. Spheres of one cell keep the order of the
+// set.
 void CellSorter::sort_dense(CellGrid& grid, std::size_t cells, const SpheresView& spheres,
                             std::span<const std::uint32_t> members)
 {
@@ -147,7 +149,7 @@ void CellSorter::sort_dense(CellGrid& grid, std::size_t cells, const SpheresView
     const auto sort = [&](std::size_t bucket) {
         const std::span<const Sphere> here = std::span(spheres_).subspan(
             starts_[bucket * chunks], starts_[(bucket + 1) * chunks] - starts_[bucket * chunks]);
-        std::uint32_t* end = grid.begin_.data() + 1;  // of each cell, once its spheres are there
+        std::uint32_t* end = grid.begin_.data() + 1;  // end of each cell, once its spheres are in place
         const std::size_t first = bucket * cells_each, last = std::min(cells, first + cells_each);
         if (first >= last) return;
         std::fill(end + first, end + last, 0);

@@ -1,6 +1,5 @@
-// Spheres sorted into the cells of a sparse uniform grid: along x, then y, then z, with the spheres copied in that
-// order. OpenVDB's point index grid answers the same questions 2 to 8 times slower. Empty space costs nothing in
-// either.
+// Spheres sorted into the cells of a uniform grid: by z, then y, then x. The grid stores copies of the spheres in that
+// order. Empty space costs nothing. OpenVDB's point index grid answers the same queries 2 to 8 times slower.
 #pragma once
 
 #include <algorithm>
@@ -16,39 +15,39 @@
 
 namespace rapid {
 
-// The spheres of a search, of which a grid takes those that it is told.
+// The spheres of a search. Each grid contains the members of it that are passed to CellSorter::fill().
 struct SpheresView {
     std::span<const Vec3d> P;  // m
-    Strided<float> reach;      // in units of the grid
-    Vec3d middle;              // m, of all of them: what cells count from
-    double scale = 1;          // units of the grid in a metre
+    Strided<float> reach;      // in grid units
+    Vec3d middle;              // m, origin of the cell coordinates, shared by all grids
+    double scale = 1;          // grid units per metre
 
     Vec3d in_grid(const Vec3d& X) const { return scale * (X - middle); }
 };
 
-// Sorts by buckets that fit a cache first; kept between grids for its memory.
+// Fills grids. Sorts into buckets that fit a cache first. Reuse it between grids to reuse its memory.
 class CellSorter;
 
-// The cells of one grid, with a border of empty ones.
+// The cells of one grid, with a border of empty cells.
 class CellGrid {
 public:
-    double width = 0;                // of a cell, in units of the grid, as all that follows
-    PageArray<std::uint32_t> place;  // of each sphere, its index in the set
-    PageArray<float> x, y, z, r;     // from the middle of the scene; padded for whole simd packs by any numbers
+    double width = 0;                // cell width; like all lengths below in grid units
+    PageArray<std::uint32_t> place;  // index of each sphere in the set
+    PageArray<float> x, y, z, r;     // relative to `middle`; padded to whole SIMD packs with arbitrary numbers
 
     std::size_t size() const { return place.size(); }
 
-    // A run of spheres.
+    // A range of consecutive spheres.
     struct Run {
         std::uint32_t begin, end;
     };
-    // The spheres in the cells of these keys, the last one included: part of a row along x.
+    // Returns the spheres in the cells of keys `first` to `last`, inclusive: part of a row along x.
     Run run(std::uint64_t first, std::uint64_t last) const
     {
         return dense_ ? Run{begin_[first], begin_[last + 1]} : find_run(first, last);
     }
 
-    // Of several rows, those that are not empty.
+    // The non-empty runs of up to nine rows of cells.
     class Runs {
     public:
         void add(const Run& run)
@@ -62,18 +61,19 @@ public:
         Run all_[9];
         int size_ = 0;
     };
-    using Cell = std::array<std::int64_t, 3>;  // its coordinates
+    using Cell = std::array<std::int64_t, 3>;  // cell coordinates
     Cell cell_at(const Vec3d& X) const;
-    // In any cell and its neighbours.
+    // Returns the spheres in a cell and its neighbours. The cell may be empty.
     Runs around(const Cell& cell) const;
-    // In the cells of a row from key `first` to `last`, which hold spheres, and their neighbours.
+    // Returns the spheres in the cells `first` to `last` of a row and in their neighbours. Both end cells hold spheres.
     Runs around(std::uint64_t first, std::uint64_t last) const
     {
         Runs runs;
         add_rows(runs, first - layer_step() - row_step() - 1, {last - first + 3, 3, 3});
         return runs;
     }
-    // Half of these: in the cells themselves, which are first, and in those behind them.
+    // Returns the half of around() with higher keys: first the spheres in the cells themselves, then those in the
+    // neighbours after them.
     Runs behind(std::uint64_t first, std::uint64_t last) const
     {
         Runs runs;
@@ -83,8 +83,9 @@ public:
         return runs;
     }
 
-    // Calls f(begin, end, first, last) for the spheres from `begin` to `end`, by cells that follow each other in a row
-    // and hold some: by as many as have a few spheres together, whose neighbours are then looked up once.
+    // Calls f(begin, end, first, last) for stretches of the spheres `begin` to `end`: consecutive occupied cells of a
+    // row, from key index `first` to `last`. A stretch groups cells until it has a few spheres, so that neighbours are
+    // looked up once for all of them.
     template <class F>
     void for_each_stretch(std::size_t begin, std::size_t end, const F& f) const
     {
@@ -102,13 +103,13 @@ public:
         }
     }
 
-    // Cells in memory, the empty ones left out where the grid is sparse: the key of each, and its spheres.
+    // The stored cells (the occupied ones if the grid is sparse), with the key and the spheres of each.
     std::size_t cells() const { return begin_.empty() ? 0 : begin_.size() - 1; }
     std::size_t cell_of_sphere(std::size_t sphere) const;
     std::uint64_t key(std::size_t cell) const { return dense_ ? cell : key_[cell]; }
     std::uint32_t begin(std::size_t cell) const { return begin_[cell]; }
     std::uint32_t end(std::size_t cell) const { return begin_[cell + 1]; }
-    // Keys from one row to the next, and from one layer to the next.
+    // Key differences between consecutive rows and between consecutive layers.
     std::uint64_t row_step() const { return static_cast<std::uint64_t>(count_[0]); }
     std::uint64_t layer_step() const { return row_step() * static_cast<std::uint64_t>(count_[1]); }
 
@@ -116,7 +117,7 @@ private:
     friend class CellSorter;
 
     Run find_run(std::uint64_t first, std::uint64_t last) const;
-    // Those of a box of so many cells along each axis, of which this is the first.
+    // Adds the runs of a box of cells. `first` is its lowest cell and `cells` its size along each axis.
     void add_rows(Runs& runs, std::uint64_t first, const std::array<std::uint64_t, 3>& cells) const
     {
         for (std::uint64_t k = 0; k < cells[2]; ++k)
@@ -134,14 +135,14 @@ private:
     }
 
     std::int64_t least_[3], count_[3];  // cell coordinates
-    std::vector<std::uint64_t> key_;    // of the cells that are not empty; not used where dense
-    PageArray<std::uint32_t> begin_;    // of these cells' spheres; of all cells where dense
+    std::vector<std::uint64_t> key_;    // keys of the occupied cells; unused if dense
+    PageArray<std::uint32_t> begin_;    // first sphere of each stored cell
     bool dense_ = false;
 };
 
 class CellSorter {
 public:
-    // Fills the grid, of a given width, with these spheres of the set.
+    // Fills the grid, whose width is set, with the given members of the set.
     void fill(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members);
 
 private:
@@ -158,13 +159,14 @@ private:
                     std::span<const std::uint32_t> members);
     void sort_sparse(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members);
 
-    PageArray<std::uint64_t> keys_;             // of the cell of each sphere
-    PageArray<Sphere> spheres_;                 // by buckets
-    std::vector<std::uint32_t> starts_, ends_;  // by bucket and source
+    PageArray<std::uint64_t> keys_;             // cell of each sphere
+    PageArray<Sphere> spheres_;                 // sorted by bucket
+    std::vector<std::uint32_t> starts_, ends_;  // per bucket and source chunk
     PageArray<std::uint32_t> order_;
 };
 
-// How many items are sorted together: in the second-level cache, and on all threads.
+// Returns the number of items per sorting bucket. A bucket fits the second-level cache, and there are enough for all
+// threads.
 std::size_t bucket_size(std::size_t n);
 
 }  // namespace rapid

@@ -1,7 +1,7 @@
 // A typed attribute column: one value for every point of a set.
 //
 // Copying a column copies a pointer; the first write after a copy clones the values. A value that all points share is
-// held once: `pscale = 0.02` costs four bytes, not four bytes a point.
+// stored once: `pscale = 0.02` costs four bytes in total instead of four bytes per point.
 //
 // Layout: shape [size], contiguous; vec3 is packed x y z, as OpenVDB and Houdini hold it. 64-byte aligned until points
 // are removed.
@@ -21,21 +21,21 @@
 
 namespace rapid {
 
-// The points that stay when others are removed: maximal runs of neighbours, in order.
+// The points that remain after a removal: maximal runs of consecutive points, in order.
 struct Compaction {
     struct Run {
         std::size_t begin, size;
     };
     std::vector<Run> runs;
     std::size_t kept = 0;
-    std::size_t longest = 0;  // of the runs: its number
+    std::size_t longest = 0;  // index of the longest run
     std::size_t ahead = 0;    // points in the runs before it
 
-    // From a mask, shape [size]; points with 0 are removed.
+    // Builds the runs from a mask, shape [size]. Points whose mask is 0 are removed.
     static Compaction from_mask(std::span<const std::uint8_t> keep);
 };
 
-// Reading that does not ask, point by point, whether a column is uniform. Valid until the column is written or moved.
+// Read access without a branch per point on whether the column is uniform. Valid until the column is written or moved.
 template <class T>
 struct Strided {
     const T* data;
@@ -47,7 +47,7 @@ struct Strided {
 template <class T>
 class Column {
 public:
-    // `fallback` is the value of points that are appended without one of their own.
+    // `fallback` is the value of appended points that do not set their own.
     explicit Column(std::size_t size = 0, T shared = zero()) : size_(size), shared_(shared), fallback_(shared) {}
     Column(std::size_t size, T shared, T fallback) : size_(size), shared_(shared), fallback_(fallback) {}
     explicit Column(std::span<const T> values, T fallback = zero()) : size_(0), shared_(fallback), fallback_(fallback)
@@ -73,21 +73,21 @@ public:
     const T& fallback() const { return fallback_; }
     void set_fallback(const T& value) { fallback_ = value; }
 
-    // Bytes that the values take; a column shared with another set counts in both.
+    // Memory of the values. A column shared with another set counts in both.
     std::size_t bytes() const { return values_ ? size_ * sizeof(T) : sizeof(T); }
 
-    // True when the two columns are one piece of memory (or both uniform).
+    // Returns true if both columns use the same memory, or both are uniform.
     bool shares_values_with(const Column& other) const { return values_ == other.values_; }
 
-    // The values for writing, shape [size]. Expands a uniform column and clones a shared one, so take it before a loop,
-    // not inside one, and from one thread: the executor gives a column to one writer at a time.
+    // Returns the values for writing, shape [size]. Expands a uniform column and clones a shared one. Call it before a
+    // loop instead of inside it, and from one thread: the executor gives a column to one writer at a time.
     std::span<T> write()
     {
         own(size_);
         return {mutable_data(), size_};
     }
 
-    // The values for writing when all will be overwritten: as write(), without copying what is there.
+    // Like write(), but does not preserve the values: the caller must overwrite all of them.
     std::span<T> overwrite()
     {
         if (!values_ || is_shared()) values_ = std::make_shared<Buffer>(bytes_of(size_));
@@ -100,7 +100,7 @@ public:
         shared_ = value;
     }
 
-    // Adds n points with the fallback value. A uniform column of that value stays one.
+    // Adds n points with the fallback value. A uniform column of that value stays uniform.
     void append(std::size_t n) { append(n, fallback_); }
 
     void append(std::size_t n, const T& value)
@@ -111,12 +111,12 @@ public:
             size_ += n;
             return;
         }
-        const T copy = value;  // it may be a value of this column
+        const T copy = value;  // it may refer to a value of this column
         std::span<T> added = append_for_writing(n);
         std::uninitialized_fill(added.begin(), added.end(), copy);
     }
 
-    // The values of another column, or of none: growing moves this column's own.
+    // Appends values. They must not be this column's own, which move when it grows.
     void append(std::span<const T> values)
     {
         if (values.empty()) return;
@@ -124,7 +124,7 @@ public:
         std::memcpy(static_cast<void*>(append_for_writing(values.size()).data()), values.data(), values.size_bytes());
     }
 
-    // Adds n points and returns the place of their values, which are not initialised.
+    // Adds n points and returns their values, uninitialised.
     std::span<T> append_for_writing(std::size_t n)
     {
         own(size_ + n);
@@ -132,7 +132,7 @@ public:
         return {mutable_data() + (size_ - n), n};
     }
 
-    // The values at these places, in this order.
+    // Returns a column of the values at these indices, in this order.
     Column select(std::span<const std::uint32_t> places) const
     {
         if (!values_) return Column(places.size(), shared_, fallback_);
@@ -143,7 +143,7 @@ public:
         return result;
     }
 
-    // Removes all points that are in no run; the others keep their order.
+    // Removes all points that are in no run. The others keep their order.
     void keep(const Compaction& compaction)
     {
         if (values_ && is_shared()) {
@@ -161,16 +161,16 @@ private:
 
     static bool same(const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; }
 
-    // Too many to count in bytes is too many to hold.
+    // Throws std::bad_alloc if the size in bytes would overflow.
     static std::size_t bytes_of(std::size_t size)
     {
         if (size > Buffer::max_bytes / sizeof(T)) throw std::bad_alloc();
         return size * sizeof(T);
     }
 
-    // Whether another column holds the values too. A last other one may have been let go by another thread (a writer of
-    // files), and its reads must be over before these values are written: use_count() orders nothing, but the decrement
-    // of a copy that is made and dropped does.
+    // Returns true if another column uses the same values. The last other owner may have just released them on another
+    // thread (a file writer), and its reads must happen before this column writes. use_count() orders nothing, but the
+    // decrement of a copy that is made and dropped does.
     bool is_shared() const
     {
         if (values_.use_count() > 1) return true;
@@ -181,7 +181,7 @@ private:
     const T* data() const { return static_cast<const T*>(values_->data()); }
     T* mutable_data() { return values_ ? static_cast<T*>(values_->data()) : nullptr; }
 
-    // Puts runs one behind the other; `to` is not behind the first of them.
+    // Packs the runs contiguously at `to`, which must not lie after the first run.
     static void pack(T* to, const T* from, std::span<const Compaction::Run> runs)
     {
         for (const auto& run : runs) {
@@ -190,8 +190,8 @@ private:
         }
     }
 
-    // The longest run stays in its place, and the others close up to it: it is the old that die, so most of a column is
-    // not moved. This leaves room before the first value, at most a quarter of what the values take.
+    // Keeps the longest run in position and closes the others up to it. Mostly the oldest points die, so most of a
+    // column is not moved. This leaves room before the first value, at most a quarter of the size of the values.
     void close_up(const Compaction& compaction)
     {
         const std::span runs = compaction.runs;
@@ -212,7 +212,7 @@ private:
         values_->give_up(left);
     }
 
-    // Makes the values this column's alone, expanded, with room for `size` of them.
+    // Makes the values unshared and expanded, with room for `size` of them.
     void own(std::size_t size)
     {
         if (values_ && !is_shared()) return values_->reserve(bytes_of(size));

@@ -50,14 +50,14 @@ int open_unnamed(const std::filesystem::path& folder)
     return named;
 }
 
-// Reserved, as a write to a page that finds the disk full ends the process.
+// Reserves disk space in advance: a write to a mapped page on a full disk would kill the process.
 void reserve(int descriptor, std::size_t bytes)
 {
     if (const int code = posix_fallocate(descriptor, 0, static_cast<off_t>(bytes)); code != 0)
         throw failed("reserve", code);
 }
 
-// The file and the offset of what lies in a block; no descriptor, -1, where it lies in none.
+// Returns the file and offset of an address, or the descriptor -1 if the address is in no mapped block.
 std::pair<int, std::size_t> place_in_file(const void* address)
 {
     if (!in_use) return {-1, 0};
@@ -70,7 +70,8 @@ std::pair<int, std::size_t> place_in_file(const void* address)
     return {block.descriptor, offset};
 }
 
-// Copies values, of which `in_column` are the column's, by pread() or pwrite() where these lie in a file.
+// Copies between memory and column values (`in_column`, which is `to` or `from`). Uses pread() or pwrite() if the
+// column is in a file.
 template <class Call>
 void transfer(Call call, const char* what, const void* in_column, void* to, const void* from, std::size_t bytes)
 {
@@ -90,7 +91,8 @@ void transfer(Call call, const char* what, const void* in_column, void* to, cons
     }
 }
 
-// Bytes of files that this process has in memory. Asked often: opening the file each time took a twentieth of a merge.
+// Returns the bytes of mapped files that are resident in memory. Called often: opening statm each time took 5 % of a
+// merge.
 std::size_t resident_of_files()
 {
     static const int statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
@@ -101,7 +103,7 @@ std::size_t resident_of_files()
     return shared * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-// Takes pages away from this process, which the system keeps or writes out as it likes.
+// Unmaps resident pages from this process. The system may still cache them or write them out.
 void trim()
 {
     if (resident_of_files() <= most_resident) return;
@@ -111,7 +113,7 @@ void trim()
 
 }  // namespace
 
-// For what goes over columns and does not say how far it is.
+// Trims in the background, for code that iterates over columns without calling trim_columns().
 struct ColumnFiles::Trimmer {
     Trimmer() : thread([this] { run(); }) {}
     ~Trimmer()
@@ -133,7 +135,7 @@ struct ColumnFiles::Trimmer {
     std::mutex mutex;
     std::condition_variable changed;
     bool ends = false;
-    std::thread thread;  // the last member
+    std::thread thread;  // must be the last member
 };
 
 ColumnFiles::ColumnFiles(const std::filesystem::path& folder, std::size_t resident)

@@ -1,8 +1,7 @@
-// Columns that are larger than memory: while one of these lives, the blocks of large columns (buffer.h) are unnamed
-// files, mapped. The system may write their pages out, and what of them is in memory is kept below a limit; values stay
-// as they are.
+// Columns larger than memory. While a ColumnFiles exists, large blocks of columns (buffer.h) are mappings of unnamed
+// files. The system may write their pages out, and their resident memory is held below a limit. Values are unaffected.
 //
-// For one process that does one thing, as `rapid merge` does: the setting is that of the process.
+// The setting is process-wide, for processes with a single task such as `rapid merge`.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +15,16 @@ namespace rapid {
 
 class ColumnFiles {
 public:
-    // folder: of the files, on a disk with room for the columns. resident: bytes that may be in memory.
+    // folder: location of the files, on a disk with room for the columns. resident: limit for bytes in memory.
     ColumnFiles(const std::filesystem::path& folder, std::size_t resident);
-    // The columns that were made while it lived must be gone.
+    // Columns created during its lifetime must be destroyed first.
     ~ColumnFiles();
     ColumnFiles(const ColumnFiles&) = delete;
     ColumnFiles& operator=(const ColumnFiles&) = delete;
 
-    // The same points, with their large columns in files.
+    // Returns the same points, with their large columns in files.
     static PointSet moved(PointSet points);
-    // While one of these lives, new columns are in memory all the same: those that are soon gone.
+    // Makes new columns live in memory during its lifetime. For short-lived columns.
     class Pause;
 
 private:
@@ -41,18 +40,18 @@ public:
     Pause& operator=(const Pause&) = delete;
 };
 
-// Whether a ColumnFiles lives: large columns are then best read and written in their order.
+// Returns true if a ColumnFiles exists. Large columns are then best read and written in order.
 bool columns_lie_in_files();
-// Between two stretches of columns that are gone over in their order: what is in memory of them is taken back at once
-// if it is too much. From any thread; nothing where no ColumnFiles lives.
+// Releases resident pages if they exceed the limit. Call it between sections of a sequential pass over columns, from
+// any thread. Does nothing if no ColumnFiles exists.
 void trim_columns();
 
-// From and to values of a column, wherever they lie; those of the column in one block. In a file these are a read and a
-// write of the file: through its mapping each page would be a fault, and stay in memory. Error: the file can't be read
-// or written.
+// Copy column values to or from memory. The column's values must be in one block. For a block in a file they read and
+// write the file directly: access through the mapping would fault on each page and leave it in memory. Throws Error if
+// the file can't be read or written.
 void read_values(void* to, const void* from, std::size_t bytes);
 void write_values(void* to, const void* from, std::size_t bytes);
-// The values of `size` points from `begin` on.
+// Reads the values of `size` points, starting at `begin`.
 template <class T>
 void read_values(T* to, const Strided<T>& column, std::size_t begin, std::size_t size)
 {
@@ -62,11 +61,12 @@ void read_values(T* to, const Strided<T>& column, std::size_t begin, std::size_t
         read_values(to, column.data + begin, size * sizeof(T));
 }
 
-// For Buffer: whole pages in a file; null where no ColumnFiles lives. Error: no room.
+// Returns whole pages mapped from a file, for Buffer. Null if no ColumnFiles exists. Throws Error if the disk is full.
 void* map_in_file(std::size_t bytes);
-// Whether a block is one of those; then it is of the new size, and may be elsewhere: in `block`. Error: no room.
+// Resizes a mapped block, which may move (`block` is updated). Returns false if the block is not mapped from a file.
+// Throws Error if the disk is full.
 bool resize_in_file(void*& block, std::size_t old_bytes, std::size_t bytes);
-// Whether a block is one of those; then it is gone.
+// Unmaps a block. Returns false if the block is not mapped from a file.
 bool unmap_in_file(void* block, std::size_t bytes);
 
 }  // namespace rapid

@@ -23,7 +23,7 @@ std::uint32_t IdIndex::operator[](std::int64_t id) const
 
 std::uint32_t IdIndex::find_ascending(std::int64_t id) const
 {
-    if (size_ > 0) {  // while no point has died, ids are consecutive
+    if (size_ > 0) {  // ids are consecutive as long as no point has died
         const auto nth = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(ids_[0]);
         if (nth < size_ && ids_[nth] == id) return static_cast<std::uint32_t>(nth);
     }

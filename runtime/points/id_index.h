@@ -1,4 +1,4 @@
-// Where the points of a set are, by id.
+// Maps point ids to indices in a set.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace rapid {
 
-// The first place from `begin` on with an id that is not below another; `end` where there is none. The ids between
+// Returns the first index in [begin, end) whose id is not below `id`, or `end` if there is none. Ids in the range
 // ascend.
 inline std::size_t first_not_below(const Strided<std::int64_t>& ids, std::size_t begin, std::size_t end,
                                    std::int64_t id)
@@ -32,7 +32,7 @@ public:
     // Valid until the column is written or moved.
     explicit IdIndex(const Column<std::int64_t>& ids);
 
-    // The place of the point of this id; none where no point has it.
+    // Returns the index of the point with this id, or `none`.
     std::uint32_t operator[](std::int64_t id) const;
 
 private:
@@ -40,7 +40,7 @@ private:
 
     Strided<std::int64_t> ids_;
     std::size_t size_;
-    std::vector<std::pair<std::int64_t, std::uint32_t>> sorted_;  // empty where the ids ascend already
+    std::vector<std::pair<std::int64_t, std::uint32_t>> sorted_;  // empty if the ids already ascend
 };
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Who is in a group, for those that act on its members alone.
+// Membership of a group, for code that acts only on its members.
 #pragma once
 
 #include <string_view>
@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// 1 for each member, else 0: of all points where the name is empty, of none where nothing has made the group. Valid
-// until the group is written or moved.
+// Returns 1 for each member, else 0. An empty name selects all points; a group that does not exist has no members.
+// Valid until the group is written or moved.
 Strided<std::uint8_t> members_of(const PointSet& points, std::string_view group);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Which spheres of some runs of cells touch one, of their grid or of another: eight at a time, in single precision.
+// Finds the spheres in some runs of cells that touch a given sphere, eight at a time in single precision.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +12,15 @@
 
 namespace rapid {
 
-// A sum of radii in single precision, with room for the rounding of what it is compared with.
+// Factor on a single-precision sum of radii that covers the rounding of the compared distance.
 constexpr float near_rounding = 1 + 0x1p-20f;
 
-// The rounding of the distance of two places in single precision; extent: how far they are from the middle.
+// Returns the rounding error of a single-precision distance between two positions. extent: their largest distance from
+// the middle.
 inline float near_blur(double extent) { return static_cast<float>(2 * (0x1p-22 * extent)); }
 
-// The spheres of some runs, copied side by side: runs are shorter than a pack, mostly, and are looked through once for
-// each sphere of a cell.
+// Spheres of several runs, copied contiguously. Most runs are shorter than a pack, and they are searched once for each
+// sphere of a cell.
 class NearSpheres {
 public:
     void gather(const CellGrid& grid, const CellGrid::Runs& runs)
@@ -41,19 +42,20 @@ public:
             }
             size_ += run.end - run.begin;
         }
-        store_pack(Floats{} + std::numeric_limits<float>::infinity(), &x_[size_]);  // near nothing
+        store_pack(Floats{} + std::numeric_limits<float>::infinity(), &x_[size_]);  // far from everything
     }
 
     std::uint32_t size() const { return size_; }
 
-    // Calls f(sphere, certain) for those that are near the sphere m of `own`, in single precision, but for the first
-    // `skipped`. Many are tested before any is reported: the number of hits in a pack can't be predicted.
+    // Calls f(sphere, certain) for the spheres near sphere m of `own`, except for the first `skipped`. The test has
+    // single precision; `certain` means that rounding cannot change the answer. Hits are collected for many packs
+    // before any is reported, because the number of hits in a pack is unpredictable to the branch predictor.
     template <class F>
     void for_each(const CellGrid& own, std::size_t m, float blur, std::uint32_t skipped, const F& f) const
     {
         const float x = own.x[m], y = own.y[m], z = own.z[m];
         const float most = near_rounding * own.r[m] + blur, least = (2 - near_rounding) * own.r[m] - blur;
-        // Of each pack a bit in every byte, which is the lane's.
+        // Each pack has one bit in every byte, and the byte is the lane.
         constexpr std::uint64_t first_bits = 0x0101010101010101;
         std::uint64_t there = first_bits << 8 * (skipped % lanes);
         for (std::uint32_t from = skipped / lanes * lanes; from < size_; from += lanes * lanes) {
@@ -80,7 +82,7 @@ private:
     typedef std::uint32_t Numbers __attribute__((vector_size(4 * lanes)));
 
     std::vector<float> x_, y_, z_, r_;   // as in the grid
-    std::vector<std::uint32_t> sphere_;  // of the grid
+    std::vector<std::uint32_t> sphere_;  // index in the grid
     std::uint32_t size_ = 0;
 };
 

@@ -9,9 +9,9 @@
 namespace rapid {
 namespace {
 
-constexpr float reach = 0.5f;  // in radii, of each point
+constexpr float reach = 0.5f;  // per point, in radii
 
-// Points that are not all at the origin have a radius above this.
+// Every accepted radius exceeds this unless all points are at the origin.
 constexpr double least_radius = 0x1p-200;
 
 }  // namespace
@@ -32,7 +32,7 @@ Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
     double extent = 0;
     for (const Vec3d& x : P_) extent = std::max(extent, spheres_.in_grid(x).cwiseAbs().maxCoeff());
     blur_ = near_blur(extent);
-    // With room for the rounding of cells' bounds; and no point so far that it would be put into the last cell.
+    // Leaves room for the rounding of cell bounds, and is wide enough that no point reaches the clamped last cell.
     grid_.width = std::max(1 + 0x1p-20, extent * 0x1p-19);
     PageArray<std::uint32_t> all(P.size());
     std::iota(all.begin(), all.end(), 0u);

@@ -1,4 +1,4 @@
-// The points within a radius of a position, or of each other, by cells as wide as the radius (cell_grid.h).
+// The points within a radius of a position or of each other, found with cells as wide as the radius (cell_grid.h).
 #pragma once
 
 #include <algorithm>
@@ -16,17 +16,18 @@ namespace rapid {
 
 class Neighbours {
 public:
-    // P: shape [n], m, copied. radius: of the queries, > 0, m. Error: below 2^-30 of the largest coordinate.
+    // P: shape [n], m, copied. radius: query radius, > 0, m. Throws Error if the radius is below 2^-30 of the largest
+    // coordinate.
     Neighbours(std::span<const Vec3f> P, double radius);
     Neighbours(const Neighbours&) = delete;
     Neighbours& operator=(const Neighbours&) = delete;
 
-    // The indices of the points at most the radius from X, ascending. From any number of threads.
+    // Appends the indices of the points at most the radius from X, ascending. Thread-safe.
     void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const;
 
-    // Calls f(i, others) for each of the points, on all threads, with the indices of those at most the radius from it,
-    // itself among them: ascending, in a vector that f may change. In the order of the cells: neighbours of neighbours
-    // are in the caches.
+    // Calls f(i, others) for each point, on all threads. `others` are the ascending indices of the points within the
+    // radius of it, including itself, in a vector that f may modify. Points are visited in cell order, so that
+    // neighbourhoods stay in the caches.
     template <class F>
     void for_each(const F& f) const
     {
@@ -45,7 +46,7 @@ public:
     }
 
 private:
-    // found: with room for all of the spheres, and for sorting; what is in it is of no use.
+    // found: scratch memory with room for all of the spheres and for sorting.
     void list(std::size_t sphere, const NearSpheres& spheres, std::span<std::uint32_t> found,
               std::vector<std::uint32_t>& near) const;
     bool is_near(std::uint32_t point, const Vec3d& X) const
@@ -55,7 +56,7 @@ private:
 
     PageArray<Vec3d> P_;
     double radius_;
-    SpheresView spheres_;  // in radii, so that none is too small for single precision
+    SpheresView spheres_;  // in units of the radius, so that no radius is too small for single precision
     float blur_ = 0;
     CellGrid grid_;
 };

@@ -1,5 +1,5 @@
-// An array in a block of pages (buffer.h), whose values are not cleared: for what is as large as a set of points, soon
-// gone, and written before it is used.
+// An array in a block of pages (buffer.h) whose values are not initialised. For large, short-lived arrays that are
+// written before they are read.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A parameter that is one number for all points, or an attribute that gives each point its own.
+// A parameter with one value for all points, or with a value per point from an attribute.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace rapid {
 template <class T>
 struct PerPoint {
     T constant = Column<T>::zero();
-    std::string attribute;  // where not empty, read from this column instead
+    std::string attribute;  // if not empty, the values come from this column
 
     PerPoint() = default;
     PerPoint(T value) : constant(value) {}
@@ -22,7 +22,8 @@ struct PerPoint {
         return result;
     }
 
-    // Valid while this parameter and the set's column stay as they are. Error: no such attribute, or of another type.
+    // Valid while this parameter and the set's column stay unchanged. Throws Error if the attribute does not exist or
+    // has another type.
     Strided<T> read(const PointSet& points) const
     {
         if (attribute.empty()) return {&constant, 0};
@@ -30,7 +31,8 @@ struct PerPoint {
     }
 };
 
-// The masses of points, kg: the attribute mass where the points have it, else 1. Valid while that column stays.
+// Returns the masses of points, kg: the attribute mass if it exists, otherwise 1. Valid while that column stays
+// unchanged.
 inline Strided<float> masses_of(const PointSet& points)
 {
     static constexpr float unit = 1;
@@ -38,8 +40,8 @@ inline Strided<float> masses_of(const PointSet& points)
     return masses ? masses->read() : Strided<float>{&unit, 0};
 }
 
-// The radii of points, m: those given, else the attribute pscale where the points have it, else 0. Valid as
-// PerPoint::read() is.
+// Returns the radii of points, m: those given, else the attribute pscale if it exists, else 0. Valid as long as
+// PerPoint::read().
 inline Strided<float> radii_of(const std::optional<PerPoint<float>>& given, const PointSet& points)
 {
     static constexpr float none = 0;

@@ -1,9 +1,9 @@
-// Lines through points, as files hold them: of a set with trails (trail.h) each point's, from the point itself
-// backwards through its places of earlier frames; else, of a set with the int `curve`, a line through each run of
-// points of the same value from 0 on.
+// Lines through points, as files store them. In a set with trails (trail.h) each point has a line from itself backwards
+// through its earlier positions. Otherwise, if the set has the integer attribute `curve`, a line connects each run of
+// consecutive points with the same value, which must not be negative.
 //
-// The places of trails become points behind those of the set, which have all attributes of their own point and are
-// members of the group `trail_places`: readers take them for what they are.
+// Trail positions become points after those of the set. They copy all attributes of their point and are in the group
+// `trail_places`, by which readers recognise them.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,21 @@
 namespace rapid {
 
 constexpr const char* trail_places_group = "trail_places";
-constexpr const char* curve_attribute = "curve";  // the number of a point's line, below 0 of none
+constexpr const char* curve_attribute = "curve";  // line number of a point; negative if it is on no line
 
 struct PointLines {
     PointSet points;
-    std::vector<std::uint32_t> vertices;  // of all lines, one after the other: places in `points`
+    std::vector<std::uint32_t> vertices;  // indices in `points`, line after line
     std::vector<std::uint32_t> sizes;     // vertices of each line, two or more
 };
 
 PointLines with_lines(const PointSet& points);
 
-// The set that with_lines() was given, of its points.
+// Returns the set that was passed to with_lines(), from the points that it returned.
 PointSet without_trail_places(PointSet points);
 
-// Puts the vertices of lines in the order of these, each with the number of its line as `curve`, and behind them the
-// points of no line with -1. A point that several lines share is there for each. Without lines: the points.
+// Orders points by line and stores the line number as `curve`. Points on no line follow with -1. A point on several
+// lines is repeated for each. Returns the points unchanged if there are no lines.
 PointSet in_order_of_lines(const PointLines& lines);
 
 }  // namespace rapid

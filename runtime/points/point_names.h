@@ -1,6 +1,5 @@
-// The names of a point that are the same in every scene: its own columns, what scripts may ask of it besides
-// attributes, and its methods. No attribute may take one. Scripts, their analysis and the editor's annotations read
-// this table.
+// The names of a point that exist in every scene: its built-in columns, computed fields and methods. No attribute may
+// use one. Scripts, their analysis and the editor's annotations read this table.
 #pragma once
 
 #include <string>
@@ -13,15 +12,15 @@ namespace rapid {
 
 struct PointName {
     enum Role {
-        OwnColumn,  // of every set, or among Solve and the emitters (dt)
-        Field,      // computed when it is asked for
+        OwnColumn,  // in every set, or (dt) between the emitters and Solve
+        Field,      // computed on access
         Method,
     };
 
     std::string_view name;
     Role role;
-    bool read_only = false;                     // to scripts
-    AttributeType type = AttributeType::Float;  // of a column or a field
+    bool read_only = false;                     // for scripts
+    AttributeType type = AttributeType::Float;  // of a column or field
     std::string_view doc = {};
 };
 
@@ -39,7 +38,7 @@ inline constexpr PointName point_names[] = {
     {"rand", PointName::Method},
 };
 
-// Null for any other name, such as an attribute's.
+// Returns null for any other name, such as that of an attribute.
 constexpr const PointName* find_point_name(std::string_view name)
 {
     for (const PointName& known : point_names)
@@ -59,7 +58,7 @@ constexpr bool is_read_only(std::string_view name)
     return known && known->read_only;
 }
 
-// Those of a role, in the order of the table.
+// Returns the names with this role, in table order.
 std::vector<std::string> point_names_of(PointName::Role role);
 
 }  // namespace rapid

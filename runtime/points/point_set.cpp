@@ -14,7 +14,7 @@ Compaction Compaction::from_mask(std::span<const std::uint8_t> keep)
 {
     Compaction result;
     for (std::size_t i = 0; i < keep.size();) {
-        // Of points, few die at a time: the gaps are short and the runs long.
+        // Few points die at a time, so gaps are short and runs long.
         while (i < keep.size() && keep[i] == 0) ++i;
         if (i == keep.size()) break;
         const void* removed = std::memchr(keep.data() + i, 0, keep.size() - i);
@@ -169,7 +169,7 @@ void PointSet::append(std::size_t n) { append(n, {}, {}); }
 void PointSet::append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups)
 {
     if (n == 0) return;
-    // In parallel, as the system clears pages when they are first written.
+    // Fills in parallel, because the system clears pages on first write.
     std::vector<std::function<void(std::size_t begin, std::size_t end)>> fills;
     const auto append_to = [&](auto& column, const auto& value) {
         if (column.is_uniform() || column.size() == 0) return column.append(n, value);
@@ -246,7 +246,7 @@ void PointSet::reorder(std::span<const std::uint32_t> order)
     RAPID_ASSERT(order.size() == size_);
     const auto reordered = [&](auto& column) {
         if (column.is_uniform()) return;
-        const auto before = column;  // shares its values, which the writing below then leaves alone
+        const auto before = column;  // shares the values, so that overwrite() below leaves them alone
         const auto from = before.read();
         const auto to = column.overwrite();
         for (std::size_t i = 0; i < order.size(); ++i) to[i] = from[order[i]];

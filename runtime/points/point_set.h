@@ -1,7 +1,7 @@
 // A set of points: columns of equal size by name, and groups.
 //
-// P, v and id exist always. Copying a set copies pointers (columns are copy-on-write); ids are never reused and keep a
-// point's identity through appending and removal, which keep the order of the points.
+// P, v and id always exist. Copying a set copies pointers (columns are copy-on-write). Ids are never reused and
+// identify a point through appending and removal, both of which keep the order of the points.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,18 @@
 
 namespace rapid {
 
-// A column's name, type and the value of points that have none of their own.
+// A column's name, type and default, which is the value of points that do not set their own.
 struct AttributeSpec {
     std::string name;
     AttributeValue fallback;
 };
 
-// The attributes whose name, type and default Rapid knows (age, life, mass, pscale, ...): reading one brings it into
-// being. Null for any other name.
+// Returns an attribute whose name, type and default Rapid knows (age, life, mass, pscale, ...), null for any other
+// name. Reading a known attribute creates it.
 const AttributeSpec* known_attribute(std::string_view name);
 const std::vector<AttributeSpec>& known_attributes();
 
-// One value for the whole set.
+// A value of the whole set.
 using DetailValue = std::variant<double, Vec3d>;
 
 class PointSet {
@@ -44,7 +44,7 @@ public:
     Column<Vec3f>& v() { return column<Vec3f>("v"); }
     Column<std::int64_t>& id() { return column<std::int64_t>("id"); }
 
-    // Columns and groups by name, in the order of their names.
+    // Columns and groups, sorted by name.
     using Columns = std::map<std::string, AnyColumn, std::less<>>;
     using Groups = std::map<std::string, Column<std::uint8_t>, std::less<>>;
     const Columns& columns() const { return columns_; }
@@ -56,7 +56,7 @@ public:
     const AnyColumn* find(std::string_view name) const;
     AnyColumn* find(std::string_view name);
 
-    // Null where there is no such column, or one of another type.
+    // Returns null if there is no such column, or if it has another type.
     template <class T>
     const Column<T>* find(std::string_view name) const
     {
@@ -70,7 +70,8 @@ public:
         return any ? std::get_if<Column<T>>(any) : nullptr;
     }
 
-    // The column, which must exist. Error: no such attribute (with the nearest name), or the type that it has instead.
+    // Returns an existing column. Throws Error if the attribute does not exist (suggesting the nearest name) or has
+    // another type.
     template <class T>
     const Column<T>& column(std::string_view name) const
     {
@@ -83,35 +84,37 @@ public:
         return const_cast<Column<T>&>(std::as_const(*this).column<T>(name));
     }
 
-    // Makes the column with its fallback value everywhere, unless there is one: then it is kept, and its type must
-    // agree.
+    // Creates the column with its fallback value for every point. An existing column is left as it is; its type must
+    // match.
     AnyColumn& add(const AttributeSpec& spec);
-    // As add(), and points that are appended from now on get this value.
+    // Like add(), and also sets the fallback value of an existing column.
     AnyColumn& set_fallback(const AttributeSpec& spec);
     // Replaces or adds a column; its size must be the set's.
     void set(std::string_view name, AnyColumn column);
     void remove(std::string_view name);
 
-    // The group's membership, 0 or 1 a point; made empty when there is none.
+    // Returns the group's membership, 0 or 1 per point. Creates an empty group if it does not exist.
     Column<std::uint8_t>& group(std::string_view name);
     const Column<std::uint8_t>* find_group(std::string_view name) const;
     void remove_group(std::string_view name);
 
-    // Adds n points: every column gets its fallback value (P and v zero), groups 0, ids -1 until the caller sets them.
+    // Adds n points: every column gets its fallback value (P and v zero), groups 0, and ids -1 until the caller sets
+    // them.
     void append(std::size_t n);
-    // The same, with one value for all of them in the columns named, and as members of the groups named; these exist.
-    // What is uniform of that value stays so.
+    // Also sets `values` in the named columns and membership in the named groups, all of which must exist. A column
+    // that is uniform with the same value stays uniform.
     void append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups);
 
     // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.
     void keep(std::span<const std::uint8_t> mask);
 
-    // The points at these places, in this order, as a set of their own.
+    // Returns the points at these indices, in this order, as a new set.
     PointSet select(std::span<const std::uint32_t> places) const;
-    // Gives the points at these places all values of `from`, a set of the same columns and groups; shape [from.size()].
+    // Overwrites the points at these indices with those of `from`, a set with the same columns and groups; shape
+    // [from.size()].
     void put(std::span<const std::uint32_t> places, const PointSet& from);
 
-    // Puts point order[i] into place i: order is a permutation, shape [size].
+    // Moves point order[i] to index i. `order` is a permutation, shape [size].
     void reorder(std::span<const std::uint32_t> order);
 
     // Bytes of all columns and groups.

@@ -1,4 +1,4 @@
-// A point in words, for messages: what a graph's author looks for when one goes wrong.
+// Describes a point in messages, with the values that help a scene's author find out what went wrong.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-// P = {0, 1, 0}, v = {0, -3, 0}, heat = 1, in "hot"        all attributes but id and dt, and its groups
+// Returns all attributes except id and dt, and the groups: P = {0, 1, 0}, v = {0, -3, 0}, heat = 1, in "hot"
 std::string text_of_point(const PointSet& points, std::size_t i);
 
 }  // namespace rapid

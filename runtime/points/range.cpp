@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// The range as two floats, with infinity taken out where it is not accepted.
+// The range as two floats, without infinity unless it is accepted.
 struct Bounds {
     float lo, hi;
 
@@ -52,7 +52,7 @@ std::string Range::right() const { return bounded() ? text() : "finite"; }
 
 Range range_of_attribute(std::string_view name)
 {
-    if (name == "mass") return or_infinity(above(0));  // infinite: nothing moves it
+    if (name == "mass") return or_infinity(above(0));  // an infinite mass is immovable
     if (name == "pscale" || name == "airresist") return at_least(0);
     return name == "life" ? or_infinity(any_number()) : any_number();
 }
@@ -68,7 +68,7 @@ void require_in_range(const PointSet& points, Strided<std::uint8_t> members, con
 
     std::atomic<std::size_t> first = points.size();
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
-        std::uint32_t excluded = values.stride == 0;  // a count: a loop over a flag is not made one over vectors
+        std::uint32_t excluded = values.stride == 0;  // a count, because a loop that sets a flag is not vectorised
         if (values.stride)
             for (std::size_t i = begin; i < end; ++i) excluded += bounds.excludes(values.data[i]);
         if (excluded == 0) return;

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_alike = std::size_t{1} << 20;  // points that no column tells apart
+constexpr std::size_t most_alike = std::size_t{1} << 20;  // points in a set whose columns are all uniform
 
 bool are_memberships(const Column<std::uint8_t>& members)
 {
@@ -87,12 +87,12 @@ void load(StateReader& from, PointSet& points)
     const auto has_values = [&](const auto& entry) {
         return std::visit([](const auto& column) { return !column.is_uniform(); }, entry.second);
     };
-    // A set without a value of its own for any point says how large it is, and nothing bears it out.
+    // If no column has a value per point, nothing confirms the set's size.
     StateReader::expect(size <= most_alike || std::any_of(columns.begin(), columns.end(), has_values));
     for (const auto& [name, any] : columns)
         StateReader::expect(std::visit([](const auto& column) { return column.size(); }, any) == size);
     for (const auto& [name, members] : groups) StateReader::expect(members.size() == size && are_memberships(members));
-    // Every size is checked by now: to append points takes time in proportion to their number.
+    // All sizes are checked by now. Appending takes time in proportion to the number of points.
     loaded.append(size);
     for (auto& [name, any] : columns) loaded.set(name, std::move(any));
     for (auto& [name, members] : groups) loaded.group(name) = std::move(members);

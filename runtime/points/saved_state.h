@@ -1,4 +1,5 @@
-// What a node, a constraint or a simulation keeps from frame to frame, written down (state_archive.h writes it).
+// The serialised state that a node, a constraint or a simulation carries from frame to frame (written by
+// state_archive.h).
 #pragma once
 
 #include <cstddef>
@@ -13,11 +14,11 @@ using KeptColumn = AttributeTypes::KeptColumn;
 
 struct SavedState {
     std::vector<char> bytes;
-    // Shared with those whose state it is, until they write them; each has values of its own for its points.
+    // Shared with the owner of the state until it writes them. Every column has a value per point of its owner.
     std::vector<KeptColumn> columns;
 
-    std::size_t size() const;  // bytes, with those of the columns
-    // To the bit.
+    std::size_t size() const;  // bytes, including the columns
+    // Compares bitwise.
     bool operator==(const SavedState& other) const;
 };
 

@@ -1,5 +1,5 @@
-// Short lists of numbers that all differ, sorted without a branch on them: that would be mispredicted, and std::sort
-// would take longer to start.
+// Sorts short lists of distinct numbers without branches on their values. Branches would be mispredicted, and std::sort
+// takes longer to start.
 #pragma once
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 
 namespace rapid {
 
-// Longer lists than this are left to std::sort.
+// Longer lists go to std::sort.
 constexpr std::uint32_t most_sorted_by_rank = 4 * lanes;
 
-// A number goes behind as many as are less.
+// Writes each number at its rank, the count of smaller numbers.
 template <std::uint32_t packs>
 inline void sort_by_rank(const std::uint32_t* from, std::uint32_t count, std::uint32_t* to)
 {
@@ -25,7 +25,7 @@ inline void sort_by_rank(const std::uint32_t* from, std::uint32_t count, std::ui
     for (std::uint32_t k = 0; k < count; ++k) to[rank[k / lanes][k % lanes]] = from[k];
 }
 
-// from: room for reading most_sorted_by_rank numbers.
+// from: must be readable for most_sorted_by_rank numbers.
 inline void sort_few(const std::uint32_t* from, std::uint32_t count, std::uint32_t* to)
 {
     if (count <= lanes) return sort_by_rank<1>(from, count, to);

@@ -21,7 +21,7 @@ void unmap(SparePages::Block block)
 
 SparePages& SparePages::all()
 {
-    static auto* pages = new SparePages;  // for buffers that outlive what is static
+    static auto* pages = new SparePages;  // leaked, because static buffers may outlive static objects
     return *pages;
 }
 
@@ -56,7 +56,7 @@ void SparePages::give(Block block)
     bytes_ += block.bytes;
     const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });
     if (empty != blocks_.end()) std::swap(block, *empty);
-    while (block.begin || bytes_ > most_spare_bytes) {  // others make room, in turn
+    while (block.begin || bytes_ > most_spare_bytes) {  // evicts blocks in turn
         std::swap(block, blocks_[next_]);
         next_ = (next_ + 1) % blocks_.size();
         bytes_ -= block.bytes;

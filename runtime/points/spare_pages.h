@@ -1,5 +1,5 @@
-// Pages that columns gave back, for who next needs about as many: of columns that come and go in every frame the system
-// would else clear the pages again each time, one by one. At most 64 MiB are kept.
+// A cache of pages that columns released. Without it the system would clear the pages again, one by one, for columns
+// that come and go every frame. Caches at most 64 MiB.
 #pragma once
 
 #include <cstddef>
@@ -17,27 +17,27 @@ public:
         std::size_t bytes = 0;
     };
 
-    // Those of the process.
+    // Returns the cache of the process.
     static SparePages& all();
 
-    // blocks: that are kept at most. A few serve who works on one frame; where each frame of a run takes the place of
-    // one of the run before, all columns of a frame are given back at once.
+    // blocks: the most that are cached. A few suffice for work on a single frame. If the frames of a run replace those
+    // of the previous run, all columns of a frame are released at once.
     explicit SparePages(std::size_t blocks = 4) : blocks_(blocks) {}
     void keep(std::size_t blocks);
 
-    // How many bytes to map for so many: some more where the block may be kept, so that a column which grows a little
-    // from frame to frame finds that of the frame before large enough. Pages that nothing touches take no memory.
+    // Returns the number of bytes to map for a request. Cacheable blocks get a margin, so that a column which grows
+    // slightly from frame to frame fits the block of the previous frame. Untouched pages take no memory.
     static std::size_t room_for(std::size_t bytes);
 
-    // At least so many bytes, and at most twice as many; null where there are none.
+    // Returns a block of at least this size and at most about twice that; null if the cache has none.
     Block take(std::size_t bytes);
     void give(Block block);
 
 private:
     std::mutex mutex_;
     std::vector<Block> blocks_;
-    std::size_t bytes_ = 0;  // of all
-    std::size_t next_ = 0;   // of those that are there, to make room
+    std::size_t bytes_ = 0;  // in all cached blocks
+    std::size_t next_ = 0;   // next block to evict
 };
 
 }  // namespace rapid

@@ -1,4 +1,5 @@
-// Archives of cereal for a SavedState. What has a state says so in one member function, which both of them call:
+// Cereal archives that write and read a SavedState. A type with state has one member function, which both archives
+// call:
 //
 //   template <class Archive>
 //   void serialize(Archive& keep)
@@ -6,7 +7,7 @@
 //       keep(clock_, ids_, impulses_);
 //   }
 //
-// Numbers go in as the machine has them. Columns are shared, not copied.
+// Numbers are stored in the machine's format. Columns are shared, not copied.
 #pragma once
 
 #include <cereal/cereal.hpp>
@@ -40,7 +41,7 @@ public:
         const char* first = static_cast<const char*>(data);
         state_.bytes.insert(state_.bytes.end(), first, first + bytes);
     }
-    // The place of the column's values among those of the state; the same for columns that share them.
+    // Returns the column's index in the state. Columns that share their values share the index.
     template <class T>
     std::uint32_t place_of(const Column<T>& column)
     {
@@ -59,16 +60,17 @@ private:
 
 class StateReader : public cereal::InputArchive<StateReader, cereal::AllowEmptyClassElision> {
 public:
-    // The state outlives it.
+    // The state must outlive the reader.
     explicit StateReader(const SavedState& state) : InputArchive(this), state_(state) {}
 
-    // Error: there is less.
+    // Throws Error if fewer bytes are left.
     void read(void* data, std::size_t bytes);
-    // Error: there is no room for so many elements, of at least a byte each, in what is left.
+    // Throws Error if the remaining bytes cannot hold that many elements of at least a byte each.
     void require(std::uint64_t elements) const;
-    // Error: the state holds something else, or more than was read.
+    // Throws Error if unread bytes remain.
     void finish() const;
-    // Of what was read: error where it can't be what a run has left. A file of others may hold anything.
+    // Throws Error unless the value read is possible in a state that a run has written. Foreign files may contain
+    // anything.
     static void expect(bool is_possible)
     {
         if (!is_possible) fail();
@@ -98,7 +100,7 @@ constexpr bool is_number_or_vector<Eigen::Matrix<S, rows, columns, options, rows
 template <>
 inline constexpr bool is_number_or_vector<Quatf> = true;
 
-// Values whose bytes hold nothing else: a list of them is written at once.
+// Types without pointers or padding: a list of them is written as one block.
 template <class T>
 constexpr bool is_plain = is_number_or_vector<T>;
 template <class T, std::size_t n>
@@ -111,11 +113,11 @@ template <class T>
 requires is_number_or_vector<T>
 void load(StateReader& from, T& value) { from.read(static_cast<void*>(&value), sizeof value); }
 
-// By its text: another process has other numbers.
+// Tokens are stored as strings, because their numbers differ between processes.
 void save(StateWriter& to, const Token& token);
 void load(StateReader& from, Token& token);
 
-// A byte that is neither 0 nor 1 would be no bool.
+// Bools are stored as a byte and checked: reading a byte other than 0 or 1 as a bool is undefined.
 inline void save(StateWriter& to, const bool& value) { save(to, static_cast<std::uint8_t>(value)); }
 inline void load(StateReader& from, bool& value)
 {
@@ -124,7 +126,7 @@ inline void load(StateReader& from, bool& value)
     value = byte != 0;
 }
 
-// As cereal saves it. Its own function throws an exception that is no Error if the index is out of range.
+// Reads cereal's own format. Cereal's function throws an exception other than Error if the index is out of range.
 template <class First, class... Rest>
 void load(StateReader& from, std::variant<First, Rest...>& value)
 {
@@ -186,11 +188,11 @@ void load(StateReader& from, Column<T>& column)
 void save(StateWriter& to, const PointSet& points);
 void load(StateReader& from, PointSet& points);
 
-// A state within another.
+// Nested states.
 void save(StateWriter& to, const SavedState& state);
 void load(StateReader& from, SavedState& state);
 
-// What cereal wraps values in.
+// Cereal's wrappers of values.
 template <StateArchive Archive, class T>
 void serialize(Archive& keep, cereal::NameValuePair<T>& pair)
 {
@@ -218,7 +220,7 @@ void load(StateReader& from, cereal::BinaryData<T>& data)
     from.read(data.data, static_cast<std::size_t>(data.size));
 }
 
-// The state of what has serialize().
+// Returns the state of an object that has serialize().
 template <class T>
 SavedState state_of(const T& kept)
 {
@@ -226,7 +228,7 @@ SavedState state_of(const T& kept)
     writer(kept);
     return writer.take();
 }
-// Error: it is the state of something else.
+// Throws Error if the state belongs to another type.
 template <class T>
 void restore(T& kept, const SavedState& state)
 {

@@ -1,9 +1,9 @@
-// Some of the points, chosen by their ids: a part of a run, or a sample of it.
+// A subset of the points, chosen by id: a part of a run, or a sample.
 //
-// Whether a point is in a subset depends on its id alone. Part k of n has the ids with floor(n h(id) / 2^64) = k, h a
-// hash of 64 bits: the parts are disjoint, and together they are all points. A sample of the fraction f has those with
-// h'(id) < 2^64 f, h' another hash: a larger sample holds a smaller one, and parts of a sample are as large as parts of
-// the whole.
+// Membership depends on the id alone. Part k of n contains the ids with floor(n h(id) / 2^64) = k, where h is a 64-bit
+// hash: the parts are disjoint and cover all points. A sample of fraction f contains the ids with h'(id) < 2^64 f,
+// where h' is another hash: a larger sample contains a smaller one, and the parts of a sample are as even as the parts
+// of the whole.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-// Part number of `count`, from 1.
+// Part `number` of `count`, counted from 1.
 struct Part {
     int number = 1, count = 1;
 
@@ -22,7 +22,7 @@ struct Part {
 class Subset {
 public:
     Subset() = default;
-    // sample: above 0, at most 1.
+    // sample: fraction of the points, above 0 and at most 1.
     Subset(std::optional<Part> part, std::optional<double> sample)
         : is_all_((!part || part->count == 1) && (!sample || *sample == 1))
     {
@@ -40,7 +40,7 @@ public:
         return count_ == 1 || part_of(id, count_) == number_;
     }
 
-    // The part, from 0, to which an id belongs.
+    // Returns the part, from 0, that contains an id.
     static std::uint64_t part_of(std::int64_t id, std::uint64_t count)
     {
         return static_cast<std::uint64_t>(

@@ -14,10 +14,10 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t bytes_an_entry = 128;                // of a text, besides its characters
-constexpr std::size_t bytes_between_checks = 64ull << 20;  // smaller amounts are not asked for
+constexpr std::size_t bytes_an_entry = 128;                // of a string, besides its characters
+constexpr std::size_t bytes_between_checks = 64ull << 20;  // smaller amounts are not checked against the budget
 
-// The bytes of a character that begins so: 1 to 4; 0 for one that begins none.
+// Returns the length of a UTF-8 character by its first byte: 1 to 4, or 0 if the byte starts no character.
 std::size_t length_of(unsigned char first)
 {
     if (first < 0x80) return 1;
@@ -25,7 +25,7 @@ std::size_t length_of(unsigned char first)
     return first < 0xe0 ? 2 : first < 0xf0 ? 3 : first < 0xf5 ? 4 : 0;
 }
 
-// RFC 3629: no longer than it has to be, no surrogates, nothing above U+10FFFF.
+// Checks against RFC 3629: no overlong forms, no surrogates, nothing above U+10FFFF.
 bool is_utf8(std::string_view text)
 {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
@@ -45,7 +45,7 @@ bool is_utf8(std::string_view text)
     return true;
 }
 
-// The beginning, with \xNN for what no terminal shows.
+// Returns the beginning of a string, with unprintable bytes as \xNN.
 std::string shown(std::string_view text)
 {
     std::string result;
@@ -69,7 +69,7 @@ public:
         return {number};
     }
 
-    // Texts stay where they are while others are added.
+    // Strings do not move when others are added.
     std::string_view operator[](std::uint32_t number) const { return texts_[number]; }
     std::size_t size() const { return texts_.size(); }
 
@@ -89,10 +89,10 @@ private:
     std::mutex mutex_;
     tbb::concurrent_vector<std::string> texts_;  // by number
     std::unordered_map<std::string_view, std::uint32_t> numbers_;
-    std::size_t unchecked_ = 0;  // bytes since memory was last asked for
+    std::size_t unchecked_ = 0;  // bytes since the last check of the memory budget
 };
 
-// Never destroyed: columns of other static objects may outlive it.
+// Leaked, because columns in static objects may outlive it.
 Table& table()
 {
     static Table& all = *new Table;

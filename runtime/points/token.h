@@ -1,7 +1,8 @@
-// A text as a number, for columns of texts. Equal texts have equal numbers, in one process; 0 is the empty text.
+// A string represented as a number, for string columns. Within a process, equal strings have equal numbers; 0 is the
+// empty string.
 //
-// All texts of a process are in one table, which keeps each once and never lets one go. Numbers follow the order in
-// which texts came, which is that of threads: nothing that is written or drawn may depend on them, but on their texts.
+// A process-wide table stores each string once and never removes it. Numbers follow the order in which strings arrive,
+// which depends on thread timing: output and images must depend on the strings alone.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +14,14 @@ namespace rapid {
 struct Token {
     std::uint32_t number = 0;
 
-    // Valid as long as the process is. From any thread, for tokens of token_of().
+    // Valid for the life of the process. Thread-safe for tokens from token_of().
     std::string_view text() const;
     bool operator==(const Token&) const = default;
 };
 
-// From any thread. Error: it is no UTF-8, or holds a 0; or there is no memory for one more.
+// Thread-safe. Throws Error if the text is not UTF-8, contains a zero byte, or does not fit in memory.
 Token token_of(std::string_view text);
-// Of a program that embeds Rapid. Error: no text has this number.
+// Converts a number from an embedding program. Throws Error if no string has this number.
 Token token_of_number(std::uint32_t number);
 
 }  // namespace rapid

@@ -1,7 +1,7 @@
-// Trails: the last places of each point, in columns of its set.
+// Trails: the previous positions of each point, in columns of its set.
 //
-// trail1 is where a point was a frame before, trail2 two frames before, and so on; trailnum says how many of them it
-// has had. The columns are moved on as wholes: a frame copies pointers, and no place twice.
+// trail1 is the position one frame ago, trail2 two frames ago, and so on. trailnum is the number of positions recorded
+// so far. Columns are shifted as a whole: a frame copies pointers instead of positions.
 #pragma once
 
 #include <string>
@@ -13,21 +13,21 @@ namespace rapid {
 
 constexpr int most_trail_places = 256;
 
-// "trail1".
+// Returns "trail1", "trail2", ...
 std::string trail_name(int place);
 constexpr const char* trail_count_name = "trailnum";
 
-// What points with a trail of so many places have.
+// Returns the columns of points with trails of this many positions.
 std::vector<AttributeSpec> trail_columns(int places);
 
-// Reads the trails of a set; one without any has none.
+// Reads the trails of a set. A set without trails has places() == 0.
 class Trails {
 public:
     explicit Trails(const PointSet& points);
 
-    int places() const { return static_cast<int>(columns_.size()); }  // the most that a point has
-    int count(std::size_t i) const;                                   // that this one has
-    // From 0, the point itself, to count(i).
+    int places() const { return static_cast<int>(columns_.size()); }  // the most that a point can have
+    int count(std::size_t i) const;                                   // recorded for point i
+    // Returns a position: 0 is the point itself, count(i) the oldest.
     const Vec3f& at(std::size_t i, int place) const { return place == 0 ? P_[i] : columns_[place - 1][i]; }
 
 private:

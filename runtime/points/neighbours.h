@@ -22,7 +22,7 @@ public:
     Neighbours(const Neighbours&) = delete;
     Neighbours& operator=(const Neighbours&) = delete;
 
-    // Appends the indices of the points at most the radius from X, ascending. Thread-safe.
+    // Sets `indices` to the points at most the radius from X, ascending. Thread-safe.
     void find(const Vec3d& X, std::vector<std::uint32_t>& indices) const;
 
     // Calls f(i, others) for each point, on all threads. `others` are the ascending indices of the points within the

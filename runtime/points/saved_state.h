@@ -14,7 +14,8 @@ using KeptColumn = AttributeTypes::KeptColumn;
 
 struct SavedState {
     std::vector<char> bytes;
-    // Shared with the owner of the state until it writes them. Every column has a value per point of its owner.
+    // The columns of the state that have a value per point. They are shared with the state's owner until it writes
+    // them.
     std::vector<KeptColumn> columns;
 
     std::size_t size() const;  // bytes, including the columns

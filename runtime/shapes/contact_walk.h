@@ -1,33 +1,33 @@
-// The walk along a path to its first contact, by conservative advancement: each step is one that a bound on the field
-// shows to be free of the surface (docs/numerics.md, Collision). Static, rigid and deforming fields share it.
+// The walk along a path to its first contact, by conservative advancement: a bound on the field shows that each step is
+// free of the surface (docs/numerics.md, Collision). Static, rigid and deforming fields share it.
 //
-// Field is a distance field as one path meets it:
+// Field is a distance field as seen from one path:
 //
-//   Sample at(double s, Hint, Exact) const;      the field on the path at time s
-//   double height(double s, Hint) const;         Sample::height alone
-//   Vec3d gradient_at(const Vec3d& X, double s, const Sample& here) const;    near a sample, in the field's frame
-//   Contact contact(double s, const Vec3d& n, const Sample& here) const;      time, normal and velocity, in the world
+//   Sample at(double s, Hint, Exact) const;     the field at time s of the path
+//   double height(double s, Hint) const;        only Sample::height
+//   Vec3d gradient_at(const Vec3d& X, double s, const Sample& here) const;   near a sample, in the field's frame
+//   Contact contact(double s, const Vec3d& n, const Sample& here) const;     time, normal and velocity, in world space
 //
-//   double step(double s, const Sample& here) const;    s that are free of the surface, or short of any feature
-//   double hop(const Sample& here) const;               s, where a longer step may dip into the surface by rounding
+//   double step(double s, const Sample& here) const;    s to advance: free of the surface, or short of any feature
+//   double hop(const Sample& here) const;               s, the shortest step where rounding may dip below the surface
 //   double fastest(double s, const Sample& here, double after) const;    bound on the relative speed from s to after
-//   double approach_speed(const Sample& ahead, const Sample& here) const;    slope at a sample soon after another
+//   double approach_speed(const Sample& ahead, const Sample& here) const;    slope at a sample shortly after another
 //   double acceleration() const;                        bound on the relative acceleration
 //   double close(const Sample&) const;                  the height that counts as touching
 //   double smallest_feature() const;                    0: the field is convex
 //   Box3d bounds() const;
-//   bool open_ended() const;                            a contact at the very end of the path is none
-//   static constexpr double kink;                       part of a step, for contact_at()
+//   bool open_ended() const;                            true: a contact at the very end of the path is ignored
+//   static constexpr double kink;                       fraction of a step, for contact_at()
 //
-// with lengths in metres, or in the rest units of a shape that is scaled. Sample has
+// Lengths are in metres, or in rest units if the shape is scaled. Sample has
 //
-//   double height;     above the level that the path touches at; from 0 outside
-//   double slope;      its derivative by s
-//   Vec3d X;           position in the field's frame
-//   Vec3d gradient;    not normalised; zero where there is none
-//   Vec3d velocity;    of the path relative to the field, in the field's frame
-//   double scale;      m a unit
-//   Hint hint;         what makes a sample nearby cheaper
+//   double height;   above the level that the path touches at; >= 0 outside
+//   double slope;    its derivative by s
+//   Vec3d X;         position in the field's frame
+//   Vec3d gradient;  not normalised; zero if the field has none
+//   Vec3d velocity;  of the path relative to the field, in the field's frame
+//   double scale;    metres per unit
+//   Hint hint;       speeds up a sample nearby
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,7 @@
 
 namespace rapid {
 
-// How far from the surface a sample has to be a distance; farther out it may be a bound of it, which costs less.
+// The distance from the surface up to which a sample must be exact. Farther out it may be a cheaper bound.
 enum class Exact {
     InStep,   // within a feature of the level
     AtStart,  // within two features of the radius
@@ -48,18 +48,19 @@ enum class Exact {
 
 struct NoHint {};
 
-// A step of a general field: along the distance that the slope of the field allows, or a quarter of a feature.
+// Returns the step of a general field: the travel time of the distance that the field's slope bound allows, at least a
+// quarter of a feature.
 inline double general_step(double height, double slope_bound, double feature, double speed, double acceleration)
 {
     return time_to_travel(std::max(height / slope_bound, feature / 4), speed, acceleration);
 }
 
-// A step of a convex field. Its distance is a convex function, so along the path f'' >= n·a >= -|a|, and
+// The step of a convex field. Its distance is a convex function, so along the path f'' >= n·a >= -|a|, and
 //
 //   f(s + τ) >= f + f' τ - |a| τ²/2.
 //
-// The walk to the root of the right side never passes the surface and, unlike that by a mere bound on the slope,
-// converges quadratically, as Newton's method does.
+// A walk to the root of the right side never passes the surface. Unlike a walk by a bound on the slope alone, it
+// converges quadratically, like Newton's method.
 inline double convex_step(double height, double slope, double acceleration)
 {
     const double approaching = -slope;
@@ -68,7 +69,7 @@ inline double convex_step(double height, double slope, double acceleration)
     return approaching > 0 ? 2 * height / (approaching + root) : (root - approaching) / acceleration;
 }
 
-// How the normal turns towards the velocity, a short distance ahead along the surface, 1/m.
+// Returns how much the normal turns along the direction of the velocity, per distance along the surface, 1/m.
 template <class Field>
 double curvature_at(const Field& field, double s, const Vec3d& n, const typename Field::Sample& here)
 {
@@ -82,14 +83,14 @@ double curvature_at(const Field& field, double s, const Vec3d& n, const typename
     return size > 0 ? tangent.dot(gradient / size - n) / (speed * ahead * here.scale) : 0;
 }
 
-// The contact of a path that is on the surface at time s. soon: s, a time shortly after, of a field with kinks.
+// Returns the contact of a path that is on the surface at time s. soon: a time shortly after s, for fields with kinks.
 template <class Field>
 Contact contact_at(const Field& field, double s, typename Field::Hint hint, double soon = 0)
 {
     const auto here = field.at(s, hint, Exact::InBand);
     Vec3d gradient = here.gradient;
     if (soon > s && gradient.dot(here.velocity) >= 0) {
-        // On a kink of the field, and still on the side that the path leaves by: the surface that it meets is ahead.
+        // The path is on a kink of the field and still on the side that it leaves. The surface that it meets is ahead.
         const auto ahead = field.at(soon, hint, Exact::InBand);
         if (field.approach_speed(ahead, here) < 0) gradient = ahead.gradient;
     }
@@ -104,7 +105,7 @@ class ContactWalk {
 public:
     using Sample = typename Field::Sample;
 
-    // From time s, where the field is `start`, to time `end` of the path.
+    // Starts at time s, where the field is `start`. The walk ends at time `end` of the path.
     ContactWalk(const Field& field, const Sample& start, double s, double end)
         : field_(field), here_(start), s_(s), end_(end)
     {
@@ -114,12 +115,11 @@ public:
     double time() const { return s_; }
     const Sample& here() const { return here_; }
     bool is_over() const { return over_; }
-    const Contact& contact() const { return contact_; }  // its time is infinite until one is found
+    const Contact& contact() const { return contact_; }  // its time is infinite unless there is one
 
-    // Begins a path that is flush with the surface: a contact where it moves inwards. Where it leaves, or is pressed
-    // inwards though it may still move outwards by less than will lift it by more than rounding, the test is where it
-    // is after such a hop, which lifts it by `lift` at most. From there it is a path as any other, which may come back
-    // within a feature.
+    // Starts a path that is flush with the surface. If the path moves inwards, this is a contact. Otherwise the path
+    // leaves or is pressed inwards, possibly after rising by no more than rounding. The test is then its position after
+    // a hop that lifts it by at most `lift`. From there the walk continues as usual, and may return within a feature.
     void leave_surface(double lift)
     {
         if (here_.slope < 0 && !is_along(here_.slope, here_.velocity)) return touch(s_);
@@ -137,14 +137,14 @@ public:
         here_ = there;
     }
 
-    // Chooses the time of the next sample; false where the walk is over.
+    // Chooses the time of the next sample. Returns false if the walk is over.
     bool proceeds()
     {
-        constexpr int most = 500;  // steps to a convex shape: a graze halves the distance each time, below 200 times
+        constexpr int most = 500;  // steps to a convex shape; a graze halves the distance each time, below 200 times
         if (is_convex() && !over_) {
             const double close = field_.close(here_);
             if (here_.height <= close) {
-                // The graze of a point that is leaving is no contact.
+                // A departing point that grazes the surface has no contact.
                 if (here_.slope < 0 && !is_along(here_.slope, here_.velocity)) touch(s_);
                 here_.height = close;
             }
@@ -161,10 +161,10 @@ public:
     }
     double next() const { return next_; }
 
-    // Takes the sample at next().
+    // Processes the sample at next().
     void advance(const Sample& there)
     {
-        if (!(next_ > s_)) return touch(s_);  // below the rounding of the time
+        if (!(next_ > s_)) return touch(s_);  // the step is below the rounding of the time
         if (there.height < 0) {
             if (is_convex() && hop_ > 0) return touch(s_);
             if (!is_convex()) return cross(there);
@@ -174,7 +174,7 @@ public:
         ++steps_;
     }
 
-    // The contact of the whole walk.
+    // Runs the whole walk and returns its contact.
     const Contact& walk()
     {
         while (proceeds()) advance(field_.at(next_, here_.hint, Exact::InStep));
@@ -190,7 +190,7 @@ private:
         over_ = true;
     }
 
-    // The step from here ends inside the surface.
+    // Finds the contact within a step that ends inside the surface.
     void cross(const Sample& there)
     {
         const double s = crossing_time([&](double t) { return field_.height(t, there.hint); },

@@ -1,20 +1,20 @@
-// A shape's queries, and its first contact with many paths, from a sampler of its distance (docs/extending.md, A
-// shape).
+// Derives a shape's queries, and its first contact with many paths, from a sampler of its distance (docs/extending.md,
+// A shape).
 //
-// ShapeOf<Derived> gives a shape its queries from one member function, `sampler()`, which returns a small copyable
-// struct, made once for a batch of points:
+// ShapeOf<Derived> implements the queries of a shape with one member function, `sampler()`. It returns a small copyable
+// struct that is created once per batch of points:
 //
-//   double distance(const Vec3d& P) const;                   m; beyond the band a bound of the right sign
-//   double distance(const Vec3d& P, Vec3d& gradient) const;  and the gradient, not normalised, zero where there is none
-//   double slope_bound() const;                              the largest slope of the field
-//   double smallest_feature() const;                         m: a wall thinner than this may be missed; 0: convex
-//   Box3d bounds() const;                                    outside it the distance is above 0
-//   double rounding() const;                                 m: error of a distance; where missing, of single precision
+//   double distance(const Vec3d& P) const;                    m; beyond the band, a bound of the right sign
+//   double distance(const Vec3d& P, Vec3d& gradient) const;   also the gradient, not normalised; zero if there is none
+//   double slope_bound() const;                               the largest slope of the field
+//   double smallest_feature() const;                          m: thinner walls may be missed; 0: convex
+//   Box3d bounds() const;                                     the distance is above 0 outside it
+//   double rounding() const;                                  m: error of a distance; default: single precision
 //
-// and, where that is faster than one by one, the same of many points (see BakedSampler): distances, distances_along.
+// It may also offer faster versions for many points, distances() and distances_along() (see BakedSampler).
 //
-// Along a path x(s) the height is f(s) = distance(x(s)) - radius. A smallest feature of 0 says that the shape is
-// convex: then a bound that needs no shortest step leads to the contact.
+// Along a path x(s) the height is f(s) = distance(x(s)) - radius. A smallest feature of 0 means that the shape is
+// convex. A bound without a shortest step then leads to the contact.
 #pragma once
 
 #include "runtime/shapes/sphere_tracing.h"
@@ -27,7 +27,7 @@ concept samples_along = requires(const Sampler& sampler, const double* x, double
     sampler.distances_along(1, x, x, x, x, x, x, phi, phi);
 };
 
-// The beginnings of many paths, for a sampler that takes many at once.
+// The starts of many paths, for a sampler that evaluates many points at once.
 //
 // Layout: structure of arrays; coordinates are shape [3, most].
 struct PathBeginnings {
@@ -36,8 +36,8 @@ struct PathBeginnings {
     int size = 0;
     std::size_t path[most];
     double f[most], slope[most];  // height above the radius, m, and the slope of the field along the velocity, m/s
-    bool is_flush[most];          // or below the surface
-    bool is_free[most];           // farther from the surface than the path is long
+    bool is_flush[most];          // true also below the surface
+    bool is_free[most];           // farther from the surface than the path can travel
 
     void add(std::size_t i, const Path& from)
     {
@@ -61,7 +61,7 @@ struct PathBeginnings {
             f[k] -= radius_[k];
             const double largest = std::max(std::max(std::abs(P_[0][k]), std::abs(P_[1][k])), std::abs(P_[2][k]));
             is_flush[k] = f[k] <= 0x1p-22 * (largest + radius_[k]) + rounding;
-            // The speed is convex along the path.
+            // The speed is a convex function of time, so its maximum is at an end of the path.
             const auto square = [&](const double(&x)[3][most]) {
                 return x[0][k] * x[0][k] + x[1][k] * x[1][k] + x[2][k] * x[2][k];
             };
@@ -73,7 +73,7 @@ private:
     double P_[3][most], v_[3][most], end_[3][most], T_[most], radius_[most];
 };
 
-// The first contact of each path.
+// Finds the first contact of each path.
 template <class Sampler>
 class FirstContactSearch {
 public:
@@ -129,7 +129,7 @@ private:
             contacts_[i] = inside(path, f, start.gradient);
             return;
         }
-        // A point that rounding left a little below the surface goes by the level that it is on.
+        // A point slightly below the surface by rounding uses its own height as the level to touch at.
         const double level = path.radius + std::min(f, 0.0);
         const bool convex = !(sampler_.smallest_feature() > 0);
         start.X = path.P;
@@ -144,8 +144,8 @@ private:
             tracing_.begin(i, walk.time(), walk.here().height, start.slope, level);
     }
 
-    // A path that starts inside. Where the field has no gradient (beyond a level set's band), the point goes straight
-    // back (paper §4.1), to where the field has one, or to the outside.
+    // Returns the contact of a path that starts inside. If the field has no gradient there (beyond a level set's band),
+    // the point moves straight back along its path (paper §4.1) until the field has one or the point is outside.
     Contact inside(const Path& path, double f, const Vec3d& gradient) const
     {
         Contact contact;
@@ -154,14 +154,14 @@ private:
         const double slope = gradient.norm();
         if (slope > 0) {
             contact.n = gradient / slope;
-            contact.depth /= slope;  // to first order; exact where the field is a distance
+            contact.depth /= slope;  // to first order; exact if the field is a distance
             return contact;
         }
         const double speed = path.v.norm();
         if (!(speed > 0)) return contact;
         const Box3d bounds = sampler_.bounds();
-        // Each step is as long as the bound on the distance allows, so at least the half width of the band. A field of
-        // a program may be negative everywhere, and then there is no way out.
+        // Each step is as long as the bound on the distance allows, so at least the half width of the band. A
+        // user-supplied field may be negative everywhere, and then there is no way out.
         double back = 0;
         for (int steps = 0; steps < most_steps_back; ++steps) {
             back += std::abs(f) / (sampler_.slope_bound() * speed);
@@ -184,7 +184,7 @@ private:
     PathBeginnings some_;
 };
 
-// Base: Shape, or a kind of it that asks for more.
+// Base: Shape, or a class derived from it with more virtual functions.
 template <class Derived, class Base = Shape>
 class ShapeOf : public Base {
 public:

@@ -1,4 +1,4 @@
-// The path of a point through a step: a parabola, and the tolerances that its rounding calls for.
+// The path of a point through a step: a parabola, and tolerances for its rounding.
 #pragma once
 
 #include <algorithm>
@@ -14,32 +14,33 @@ namespace rapid {
 struct Path {
     Vec3d P, v, a;
     double duration;
-    double radius;     // m; contact is where distance = radius
+    double radius;     // m; the path is in contact if distance = radius
     double begin = 0;  // s since the beginning of the frame, for shapes that move during it
 
     Vec3d at(double s) const { return P + s * (v + 0.5 * s * a); }
     Vec3d velocity(double s) const { return v + s * a; }
 };
 
-// How near to the surface a point is flush with it, m: the rounding of its position to single precision (ulp(x) is at
-// most 2^-23 |x|, and half of it an axis), and the field's own error. A point that a frame leaves on the surface must
-// be found on it by the next one: with a smaller tolerance resting points would now and then count as sunken.
+// Returns the height, m, up to which a point is flush with the surface: the rounding of its position to single
+// precision (ulp(x) is at most 2^-23 |x|, half of it per axis), plus the field's own error. The next frame must find a
+// point that a frame left on the surface still there. With a smaller tolerance resting points would sometimes count as
+// sunken.
 inline double flush_within(const Vec3d& P, double radius, double rounding)
 {
     return 0x1p-22 * (P.cwiseAbs().maxCoeff() + radius) + rounding;
 }
 
-// How near to the surface a walk along the path ends, in units of `scale` m; `rounding` is in these units.
+// Returns how near to the surface a walk along the path ends, in units of `scale` m. `rounding` is in the same units.
 inline double touching_within(const Path& path, double rounding, double scale = 1)
 {
     return std::max(0x1p-50 * (path.P.cwiseAbs().maxCoeff() + path.radius) / scale, rounding / 16);
 }
 
-// Whether the component vn of a velocity along a unit normal is no more than rounding gives a tangential velocity.
-// Without this a sliding point could meet its own floor again and again, and get nowhere.
+// Returns true if the inward normal component vn of a velocity is within the rounding of a tangential velocity. Without
+// this test a sliding point could collide with its own floor again and again, and get nowhere.
 inline bool is_along(double vn, const Vec3d& v) { return vn < 0 && vn * vn < 0x1p-96 * v.squaredNorm(); }
 
-// The normal of a gradient; where that is zero, against the velocity.
+// Returns the unit normal of a gradient, or the direction against the velocity if the gradient is zero.
 inline Vec3d unit_normal(const Vec3d& gradient, const Vec3d& v)
 {
     const double size = gradient.norm();
@@ -48,8 +49,8 @@ inline Vec3d unit_normal(const Vec3d& gradient, const Vec3d& v)
     return speed > 0 ? Vec3d(-v / speed) : Vec3d(Vec3d::UnitY());
 }
 
-// The first s >= 0 at which f + vn s + an s²/2 goes from above 0 to below, for f >= 0; infinite where it does not. Of
-// the two forms of the root the one without cancellation.
+// Returns the first s >= 0 at which f + vn s + an s²/2 changes from positive to negative, for f >= 0; infinite if it
+// never does. Uses the form of the root without cancellation.
 inline double first_fall_through(double f, double vn, double an)
 {
     constexpr double never = std::numeric_limits<double>::infinity();
@@ -62,15 +63,15 @@ inline double first_fall_through(double f, double vn, double an)
     return vn > 0 ? (vn + root) / -an : 2 * f / (root - vn);
 }
 
-// The time in which a point of this speed and acceleration can travel a distance: the root of
-// distance = speed s + acceleration s²/2, without cancellation. Infinite for a point at rest.
+// Returns the time in which a point with this speed and acceleration can travel a distance: the root of distance =
+// speed s + acceleration s²/2, without cancellation. Infinite for a point at rest.
 inline double time_to_travel(double distance, double speed, double acceleration)
 {
     const double sum = speed + std::sqrt(speed * speed + 2 * acceleration * distance);
     return sum > 0 ? 2 * distance / sum : std::numeric_limits<double>::infinity();
 }
 
-// Whether a path from P to `end` can come near a box.
+// Returns true if a path from P to `end` can touch the box.
 inline bool may_reach(const Vec3d& P, const Vec3d& end, const Vec3d& a, double duration, double radius,
                       const Box3d& bounds)
 {

@@ -1,18 +1,18 @@
-// The pose of a body, and its velocities there.
+// The pose of a rigid body with uniform scale, and its velocity field.
 #pragma once
 
 #include "runtime/vec.h"
 
 namespace rapid {
 
-// The point X of a body, in its rest frame, is at translation + scale rotation X.
+// Maps the rest position X of a body to translation + scale rotation X.
 struct Pose {
     Vec3d translation = Vec3d::Zero();  // m
     Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
     double scale = 1;  // above 0
 
     Vec3d operator*(const Vec3d& X) const { return translation + scale * (rotation * X); }
-    // First `other`, then this.
+    // Composes two poses: `other` is applied first.
     Pose operator*(const Pose& other) const
     {
         return {*this * other.translation, (rotation * other.rotation).normalized(), scale * other.scale};
@@ -21,11 +21,12 @@ struct Pose {
     Eigen::Affine3d affine() const { return Eigen::Translation3d(translation) * rotation * Eigen::Scaling(scale); }
 };
 
-// Linear in translation and scale, spherical (slerp, the shorter way round) in rotation; t from 0 (a) to 1 (b).
+// Interpolates from a (t = 0) to b (t = 1): translation and scale linearly, rotation spherically (slerp, the shorter
+// way).
 Pose interpolate(const Pose& a, const Pose& b, double t);
 
-// The velocity at each point of a body that moves, turns and grows: v(x) = linear + angular × r + growth r with
-// r = x - about, m/s.
+// The velocity field of a body that translates, rotates and grows: v(x) = linear + angular × r + growth r with r = x -
+// about, m/s.
 struct VelocityField {
     Vec3d linear = Vec3d::Zero();   // m/s
     Vec3d angular = Vec3d::Zero();  // rad/s

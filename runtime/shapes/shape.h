@@ -1,10 +1,11 @@
-// Everything a particle can collide with or be born from: a signed distance, a gradient, a first contact along a path.
+// The interface to everything that particles can collide with or be emitted from: signed distance, gradient, first
+// contact along a path.
 //
-// Distances are in metres, negative inside; gradients point out of the shape. All queries take many points at once: one
-// virtual call a chunk, never one a point. A shape is immutable, and may be queried from any number of threads.
+// Distances are in metres, negative inside; gradients point out of the shape. All queries take many points, so that
+// there is one virtual call per chunk instead of one per point. Shapes are immutable and thread-safe.
 //
-// A shape must give bounds(), distance() and first_contact(). ShapeOf (first_contact.h) derives the last two from
-// a sampler of the distance; the other functions have defaults that hold for a shape at rest with an exact distance.
+// A shape must implement bounds(), distance() and first_contact(). ShapeOf (first_contact.h) derives the last two from
+// a sampler of the distance. The defaults of the other functions suit a shape at rest with an exact distance.
 #pragma once
 
 #include <cstdint>
@@ -19,20 +20,20 @@
 
 namespace rapid {
 
-// Where a path first meets the shape from outside. A point that starts flush with the surface (within rounding) is
-// outside it: it touches at s = 0 only if it moves, or is pressed, inwards.
+// The first contact of a path with the shape. A point that starts flush with the surface (within rounding) counts as
+// outside: it has a contact at s = 0 only if it moves or is pressed inwards.
 struct Contact {
     static constexpr double none = std::numeric_limits<double>::infinity();
 
     double time = none;        // s along the path
     Vec3d n = Vec3d::Zero();   // unit normal, out of the surface
-    Vec3d vc = Vec3d::Zero();  // velocity of the surface there, m/s
-    double curvature = 0;      // 1/m, of the surface in the direction of the path; above 0 where it falls away
+    Vec3d vc = Vec3d::Zero();  // velocity of the surface at the contact, m/s
+    double curvature = 0;      // 1/m, of the surface in the direction of the path; positive if the surface falls away
     bool flat = false;         // the surface is an infinite plane
 
-    // Above 0 for a path that starts inside (time is then 0): the distance along n, m, to where distance = radius.
-    // Where the field has no gradient n is zero; `back` is then a time by which the point, going straight back relative
-    // to the surface, has left the shape or reached a gradient. It is infinite for a point with the surface's velocity.
+    // Positive if the path starts inside (time is then 0): the distance along n, m, to the level distance = radius. If
+    // the field has no gradient, n is zero. `back` is then the time by which the point, moving straight back relative
+    // to the surface, has left the shape or found a gradient. It is infinite if the point moves with the surface.
     double depth = 0;
     double back = none;
 };
@@ -51,51 +52,52 @@ public:
     static constexpr std::string_view param_type = "shape";
     std::string_view kind() const override { return "shape"; }
 
-    // The distance is above 0 outside it. May be infinite; contacts are found only within it, widened by the radius.
+    // Bounding box; the distance is positive outside it. May be infinite. Contacts are found only within it, widened by
+    // the radius.
     virtual Box3d bounds() const = 0;
 
-    // Signed distances and, unless `gradient` is empty, their gradients (not normalised; zero where there is none: deep
-    // inside, on a medial axis). All of shape [n]. Beyond a level set's band the distance is a bound of the right sign.
+    // Computes signed distances and, unless `gradient` is empty, their gradients (not normalised; zero deep inside and
+    // on a medial axis). All have shape [n]. Beyond a level set's band the distance is a bound of the right sign.
     virtual void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const = 0;
 
-    // The same for a shape that moves, each point at its own time, s since the beginning of the frame.
+    // Does the same for a moving shape, each point at its own time in s since the beginning of the frame.
     virtual void distance_at(std::span<const Vec3d> P, std::span<const double> time, std::span<double> phi,
                              std::span<Vec3d> gradient) const
     {
         static_cast<void>(time);
         distance(P, phi, gradient);
     }
-    // Whether it moves or deforms during the frame.
+    // Returns true if the shape moves or deforms during the frame.
     virtual bool moves() const { return false; }
-    // The velocity of the body at a place, m/s.
+    // Returns the velocity of the body at a position, m/s.
     virtual Vec3d velocity_at(const Vec3d& P, double time) const
     {
         static_cast<void>(P), static_cast<void>(time);
         return Vec3d::Zero();
     }
 
-    // The first contact of each path; shapes [n], [n].
+    // Finds the first contact of each path. Shapes [n], [n].
     virtual void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const = 0;
 
-    // The half space that the shape is, if it is one: callers then need no queries.
+    // Returns the half space if the shape is one. Callers then need no queries.
     virtual std::optional<HalfSpace> half_space() const { return std::nullopt; }
 
-    // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow band.
+    // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow-band level set.
     virtual double band() const { return std::numeric_limits<double>::infinity(); }
 
-    // The largest slope of the distance: 1 except for fields that are not exact distances.
+    // The largest slope of the distance field: 1 unless the field is not an exact distance.
     virtual double slope_bound() const { return 1; }
 
-    // A wall thinner than this may be missed, and a crease of a smaller radius is a kink, m: one voxel of a level set.
-    // 0: the shape is convex, and nothing is missed.
+    // A wall thinner than this may be missed, and a crease with a smaller radius is a kink, m: one voxel for a level
+    // set. 0 means that the shape is convex and nothing is missed.
     virtual double smallest_feature() const { return 0; }
 
-    // Where particles are born on or in it (scatter.h). A shape of finite area or volume overrides these; by default
-    // they throw an error that says so.
+    // Samplers of birth positions on or in the shape (scatter.h). A shape of finite area or volume overrides these; the
+    // defaults throw an error that says it has none.
     virtual std::shared_ptr<const Scatter> surface_scatter() const;
     virtual std::shared_ptr<const Scatter> volume_scatter() const;
 
-    // Its surface as a mesh, for pictures. Null if it is infinite.
+    // Returns the surface as a mesh, for pictures. Null if it is infinite.
     virtual std::shared_ptr<const Mesh> surface() const { return nullptr; }
 };
 

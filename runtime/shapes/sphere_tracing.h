@@ -1,11 +1,11 @@
-// Sphere tracing along many paths at once through a field at rest that is not convex: a step of each in turn. The
-// samples are independent, and the loops over them have no branches.
+// Sphere tracing of many paths at once through a static, non-convex field, one step of each path in turn. The samples
+// are independent, and the loops over them are free of branches.
 //
-// From a place at height f >= 0 the path within D = f / L is free, behind as well as ahead. So the next sample is ahead
-// of D by as much as its own D will reach back to, going by the slope of the field along the path so far (auto-relaxed
-// sphere tracing, Bán and Valasek 2023); where it does not reach, the gap's near end is sampled. Steps are at least a
-// quarter of the smallest feature, so that a walk ends, by a change of sign that is then refined; no wall of two
-// features is stepped over.
+// At height f >= 0 the path is free within D = f / L, both ahead and back. The next sample is therefore taken farther
+// ahead than D, so far that its own D is predicted to reach back and close the gap. The prediction uses the slope of
+// the field along the path so far (auto-relaxed sphere tracing, Bán and Valasek 2023). If the gap stays open, its near
+// end is sampled instead. Steps are at least a quarter of the smallest feature, so that the walk ends, either at the
+// end of the path or with a change of sign that is then refined. No wall as thick as two features is stepped over.
 #pragma once
 
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace rapid {
 
-// Distances at many places: by the sampler's own loop where it has one.
+// Evaluates many distances, with the sampler's own loop if it has one.
 template <class Sampler>
 void sample_distances(const Sampler& sampler, int n, const double* X, const double* Y, const double* Z, double* phi)
 {
@@ -33,13 +33,13 @@ public:
     {
     }
 
-    // Along path i, from time s on, where the field is f above `level`. slope: of f there, m/s.
+    // Adds path i from time s on, where the field is f above `level`. slope: the derivative of f at s, m/s.
     void begin(std::size_t i, double s, double f, double slope, double level)
     {
         const Path& path = paths_[i];
         const double T = path.duration;
         if (!reach_speed(i, s, f, slope, level)) return;
-        // The speed is convex along the path.
+        // The speed is a convex function of time, so its maximum is at an end.
         const double fastest = std::sqrt(std::max(path.velocity(s).squaredNorm(), path.velocity(T).squaredNorm()));
         const double per_f = 1 / (sampler_.slope_bound() * fastest);
         if (!(fastest > 0) || s + f * per_f >= T) return;
@@ -60,7 +60,7 @@ public:
         if (n_ == most) finish();
     }
 
-    // Walks all to their ends, and writes the contacts that they find.
+    // Walks all paths to their ends and writes their contacts.
     void finish()
     {
         while (n_ > 0) step();
@@ -68,14 +68,14 @@ public:
 
 private:
     static constexpr int most = 64;
-    static constexpr double much_faster = 64, a_world = 1e6;  // features
-    // A part of what the slope promises; the largest slope away from the surface, and the longest step in D, that are
+    static constexpr double much_faster = 64, a_world = 1e6;  // the distance is in features
+    // Fraction of the predicted step that is used; largest slope away from the surface and longest step, in D, that are
     // relied on.
     static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;
 
-    // The walk goes by the largest speed ahead, and would take for ever where a path is at rest at first and a world
-    // away in the end. Until it is not much slower than there, each step is as long as its own speed and acceleration
-    // allow. False: it has come to its end, with a contact or without one.
+    // Handles a path that is slow at first and ends very far away. Steps by the largest speed ahead would take forever,
+    // so each step uses the path's own speed and acceleration until the speed is comparable to that at the end. Returns
+    // false if the walk ended meanwhile, with or without a contact.
     bool reach_speed(std::size_t i, double& s, double& f, double& slope, double level)
     {
         const Path& path = paths_[i];
@@ -124,7 +124,7 @@ private:
         bool over[most];
         for (int k = 0; k < n_; ++k) {
             const double before = s_[k], slope = (f[k] - f_[k]) * per_f_[k] / (next[k] - before);
-            // The last: a step below the rounding of the time is the end.
+            // The last condition: a step below the rounding of the time ends the walk.
             over[k] = (f[k] < 0) | (next[k] + f[k] * per_f_[k] >= T_[k]) | !(next[k] > before);
             slope_[k] = std::min(slope, flattest);
         }
@@ -175,9 +175,9 @@ private:
     std::size_t path_[most];
     double P_[3][most], v_[3][most], a_[3][most], T_[most];
     double s_[most], f_[most];  // time, s, and height above the level, m
-    double per_f_[most];        // s that are free, for each m of height
-    double least_[most];        // s, the shortest step
-    double slope_[most];        // of the field along the path, as a part of the steepest possible: -1 to 1
+    double per_f_[most];        // free time per metre of height, s/m
+    double least_[most];        // shortest step, s
+    double slope_[most];        // of the field along the path, as a fraction of the steepest possible: -1 to 1
     double level_[most];
 };
 

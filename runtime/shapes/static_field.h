@@ -1,11 +1,11 @@
-// A field at rest as one path meets it: what ContactWalk asks for, from a sampler (see ShapeOf).
+// Adapts the sampler of a static shape (see ShapeOf) to ContactWalk, as seen from one path.
 #pragma once
 
 #include "runtime/shapes/contact_walk.h"
 
 namespace rapid {
 
-// The error of a sampler's distance, m.
+// Returns the error of a sampler's distance, m.
 template <class Sampler>
 double rounding_of(const Sampler& sampler)
 {

@@ -1,4 +1,4 @@
-// A box with its edges along the axes.
+// An axis-aligned box.
 #include <fmt/format.h>
 
 #include <array>
@@ -23,8 +23,8 @@ struct BoxSampler {
         return most > 0 ? beyond.cwiseMax(0.0).norm() : most;
     }
 
-    // Outside, the gradient points away from the nearest point of the box; inside, out of the nearest face, the first
-    // of equally near ones.
+    // Outside, the gradient points away from the nearest point of the box. Inside, it points out of the nearest face,
+    // or the first one if several are equally near.
     double distance(const Vec3d& P, Vec3d& gradient) const
     {
         const Vec3d d = P - center, beyond = d.cwiseAbs() - half;
@@ -46,7 +46,7 @@ struct BoxSampler {
     double rounding() const { return 0x1p-50 * (half + center.cwiseAbs()).maxCoeff(); }
 };
 
-// Uniform by area, over the three pairs of faces, or by volume.
+// Samples uniformly by area, over the three pairs of faces, or by volume.
 class ScatterOnBox final : public Scatter {
 public:
     ScatterOnBox(const BoxSampler& box, bool inside) : box_(box), inside_(inside)
@@ -74,7 +74,7 @@ public:
 private:
     BoxSampler box_;
     bool inside_;
-    std::array<double, 2> up_to_;  // a uniform number below these means a face across x, y
+    std::array<double, 2> up_to_;  // a uniform number below these selects a face across x, y
 };
 
 class Box final : public ShapeOf<Box> {

@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 struct PlaneSampler {
-    Vec3d n;        // unit, out of the half space
+    Vec3d n;        // unit, points out of the half space
     double offset;  // m, along n
 
     double distance(const Vec3d& P) const { return n.dot(P) - offset; }
@@ -56,7 +56,7 @@ public:
             double vn = sampler.n.dot(path.v);
             const double an = sampler.n.dot(path.a), T = path.duration;
             const double flush = flush_within(path.P, path.radius, rounding);
-            // By far the most points: above the plane all along.
+            // The most common case by far: the point stays above the plane throughout the step.
             if (f > flush && f + T * (vn + 0.5 * T * an) > 0 && (an <= 0 || vn >= 0)) continue;
 
             if (f <= flush && is_along(vn, path.v)) vn = 0;
@@ -84,14 +84,14 @@ private:
 
 ShapePtr make_plane(const Vec3d& normal, double offset)
 {
-    // Scaled first: the squares of the components may be beyond the range of a double.
+    // Scales first, because the squares of the components may be beyond the range of a double.
     const double largest = normal.cwiseAbs().maxCoeff();
     if (!(largest > 0) || !std::isfinite(largest))
         throw Error(
             fmt::format("normal of a plane = {{{:g}, {:g}, {:g}}} has no direction; any length but zero is right",
                         normal.x(), normal.y(), normal.z()));
     if (!std::isfinite(offset)) throw Error(fmt::format("offset of a plane = {:g}; it must be finite", offset));
-    // An axis stays itself to the bit: the weight of a point at rest on the plane then has no tangential part.
+    // An axis stays bit-identical, so that the weight of a point at rest on the plane has no tangential part.
     const Vec3d scaled = normal / largest;
     return std::make_shared<Plane>(scaled.normalized(), offset / largest / scaled.norm());
 }

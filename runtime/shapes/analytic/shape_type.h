@@ -1,5 +1,5 @@
-// The analytic shapes by name. Each declares itself and its parameters in its own file, and is by that
-// `rapid.shape.NAME` in scenes, with its checks, documentation and completion:
+// The analytic shapes by name. Each declares itself and its parameters in its own file. This makes it available to
+// scenes as `rapid.shape.NAME`, with checks, documentation and completion:
 //
 //   struct SphereType {
 //       double radius;
@@ -31,13 +31,13 @@ using ShapeValue = std::variant<double, Vec3d>;
 struct ShapeParam {
     std::string name, unit, doc;
     ShapeValue fallback;
-    bool positive = false;  // a number, or each component, must be above 0
+    bool positive = false;  // the number, or each component, must be above 0
 };
 
 struct ShapeType {
     std::string name, doc;
     std::vector<ShapeParam> params;
-    // values: of `params`, in their order.
+    // values: in the order of `params`.
     std::function<ShapePtr(std::span<const ShapeValue> values)> make;
 };
 
@@ -51,7 +51,7 @@ public:
         type_.doc = std::move(doc);
     }
 
-    // F: double or Vec3d.
+    // Adds a parameter. F: double or Vec3d.
     template <class F>
     ShapeDeclaration& param(F T::*field, std::string name, F fallback, std::string unit, std::string doc)
     {
@@ -61,7 +61,7 @@ public:
             [field, k](T& fields, std::span<const ShapeValue> values) { fields.*field = std::get<F>(values[k]); });
         return *this;
     }
-    // Metres, above 0.
+    // Adds a length in metres, above 0.
     template <class F>
     ShapeDeclaration& length(F T::*field, std::string name, F fallback, std::string doc)
     {
@@ -92,10 +92,10 @@ ShapeDeclaration<T> shape_type(std::string name, std::string doc)
     return ShapeDeclaration<T>(std::move(name), std::move(doc));
 }
 
-// All of them, in order of name.
+// Returns all analytic shapes, sorted by name.
 std::vector<ShapeType> shape_types();
 
-// Registers a type while the program starts; used through RAPID_SHAPE, in the shape's own file.
+// Registers a type at program start. Used through RAPID_SHAPE in the shape's own file.
 struct ShapeRegistration {
     explicit ShapeRegistration(ShapeType (*declare)());
 };

@@ -22,7 +22,7 @@ struct SphereSampler {
     {
         const Vec3d d = P - center;
         const double size = d.norm();
-        gradient = size > 0 ? Vec3d(d / size) : Vec3d(Vec3d::Zero());  // at the centre no direction is nearest
+        gradient = size > 0 ? Vec3d(d / size) : Vec3d(Vec3d::Zero());  // at the centre all directions are equally near
         return size - radius;
     }
     double slope_bound() const { return 1; }
@@ -37,7 +37,7 @@ Vec3d direction(double u1, double u2)
     return {out * std::cos(around), out * std::sin(around), z};
 }
 
-// Uniform by area, or by volume.
+// Samples uniformly by area or by volume.
 class ScatterOnSphere final : public Scatter {
 public:
     ScatterOnSphere(const SphereSampler& sphere, bool inside) : sphere_(sphere), inside_(inside) {}
@@ -71,7 +71,7 @@ public:
     ScatterPtr volume_scatter() const override { return std::make_shared<ScatterOnSphere>(sampler_, true); }
     MeshPtr surface() const override
     {
-        constexpr int divisions = 64;  // facets of 6 degrees: smooth to the eye in a picture 720 pixels high
+        constexpr int divisions = 64;  // facets of 6 degrees look smooth in a picture 720 pixels high
         return make_sphere(sampler_.radius, divisions, sampler_.center);
     }
 

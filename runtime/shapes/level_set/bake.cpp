@@ -16,7 +16,7 @@ using Place = BlockTable::Place;
 
 constexpr int block = BakedGrid::block, edge = BakedGrid::edge;
 
-// The block at a place and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
+// Returns the block at `place` and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
 std::array<BlockValues, 8> neighbourhood(const BlockTable::Reader& at, const Place& place)
 {
     std::array<BlockValues, 8> blocks;
@@ -32,9 +32,9 @@ void copy_block(const std::array<BlockValues, 8>& blocks, float* into)
                 *into++ = blocks[(i >> 3) << 2 | (j >> 3) << 1 | k >> 3].at(i & 7, j & 7, k & 7);
 }
 
-// Figures of the field from the cells of some blocks.
+// Statistics of the field over the cells of some blocks.
 struct Survey {
-    Eigen::AlignedBox3i crossed;  // voxels: the cells where the sign changes
+    Eigen::AlignedBox3i crossed;  // the cells where the sign changes, in voxels
     std::uint64_t crossings = 0;
     float steepest = 0;  // squared slope, m² per voxel²
 
@@ -46,9 +46,9 @@ struct Survey {
     }
 };
 
-// In a trilinear cell each component of the gradient is affine along each axis, so its squared length is convex along
-// each axis: the largest is at one of the cell's corners, where the components are the differences along the edges
-// that meet there.
+// Within a trilinear cell each component of the gradient is affine along each axis, so its squared length is convex
+// along each axis. The maximum is therefore at a corner of the cell, where the components are the differences along the
+// edges that meet there.
 Survey survey_block(const float* values, const Eigen::Vector3i& first)
 {
     Survey survey;
@@ -81,8 +81,8 @@ Survey survey_block(const float* values, const Eigen::Vector3i& first)
     return survey;
 }
 
-// Writes into the empty blocks of the index how many blocks lie between them and the nearest with values: the
-// chessboard distance less one, by the two passes of Rosenfeld and Pfaltz (1966).
+// Writes into each empty block of the index the number of blocks between it and the nearest block with values: the
+// chessboard distance minus one, by the two passes of Rosenfeld and Pfaltz (1966).
 void count_blocks_between(BakedGrid& baked)
 {
     const Eigen::Vector3i& n = baked.blocks;
@@ -98,7 +98,7 @@ void count_blocks_between(BakedGrid& baked)
                     std::int32_t& code = at(x, y, z);
                     if (code >= 0) continue;
                     int nearest = step > 0 ? n.maxCoeff() : BakedGrid::between(code) + 1;
-                    for (int neighbour = 0; neighbour < 13; ++neighbour) {  // those already visited
+                    for (int neighbour = 0; neighbour < 13; ++neighbour) {  // already visited
                         const int i = x + step * (neighbour / 9 - 1), j = y + step * (neighbour / 3 % 3 - 1),
                                   k = z + step * (neighbour % 3 - 1);
                         if (!within(i, 0) || !within(j, 1) || !within(k, 2)) continue;
@@ -138,7 +138,8 @@ public:
     }
 
 private:
-    // Blocks below the lowest with values hold the cells between them and the constant beyond.
+    // Extends the box by a block on the lower sides. These blocks store the cells between the lowest values and the
+    // constant beyond.
     void cover()
     {
         low_ = blocks_.with_values.min() - Place::Ones();
@@ -156,7 +157,7 @@ private:
         return {static_cast<int>(b / in_slab_), static_cast<int>(in / n_z), static_cast<int>(in % n_z)};
     }
 
-    // Calls f(block, reader) for all blocks, slabs of x in parallel.
+    // Calls f(block, reader) for all blocks, in parallel over slabs of x.
     template <class F>
     void for_each_block(const F& f) const
     {
@@ -186,8 +187,8 @@ private:
         return false;
     }
 
-    // Those with values, and their lower neighbours where the cells between vary. Each slab of x is numbered by itself,
-    // and moved up by those before it later: the numbers depend on the blocks alone.
+    // Numbers the blocks with values, and their lower neighbours if the cells between vary. Each slab of x is numbered
+    // separately and offset by the preceding slabs later, so that the numbers depend only on the blocks.
     void number_varying_blocks()
     {
         for_each_block([&](std::size_t b, const BlockTable::Reader& at) {
@@ -226,9 +227,9 @@ private:
 
     const BlockTable& blocks_;
     BakedGrid baked_;
-    Place low_ = Place::Zero();             // the lowest block
-    std::size_t in_slab_ = 0;               // blocks of one x
-    std::vector<std::uint8_t> has_values_;  // by block
+    Place low_ = Place::Zero();             // lowest block
+    std::size_t in_slab_ = 0;               // blocks per slab of x
+    std::vector<std::uint8_t> has_values_;  // per block
     std::vector<std::int32_t> varying_;     // blocks with values in the slabs before x, shape [blocks x + 1]
 };
 

@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-// The values of a block, shape [8, 8, 8], z fastest, or the one that all of it has; m.
+// The values of a block, shape [8, 8, 8], z fastest, m; or the one value shared by the whole block.
 struct BlockValues {
     const float* values = nullptr;
     float constant = 0;
@@ -22,10 +22,10 @@ struct BlockTable {
     using Place = Eigen::Vector3i;  // in blocks
     using Reader = std::function<BlockValues(const Place& place)>;
 
-    Eigen::AlignedBox3i with_values;  // the lowest and the highest of their places; empty where there are none
-    double voxel, background;         // m
-    std::function<Vec3d(const Vec3d& P)> to_world;  // m, of a place in voxels
-    std::function<Reader()> reader;                 // of any place; a thread's own
+    Eigen::AlignedBox3i with_values;                // range of the blocks with values; empty if there are none
+    double voxel, background;                       // m
+    std::function<Vec3d(const Vec3d& P)> to_world;  // position in m of a point in voxels
+    std::function<Reader()> reader;                 // creates a reader for any block; one per thread
 };
 
 BakedGrid bake(const BlockTable& blocks);

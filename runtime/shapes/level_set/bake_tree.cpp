@@ -1,4 +1,4 @@
-// Copies the tree of a level set for queries.
+// Bakes the tree of an OpenVDB level set for queries.
 #include <memory>
 
 #include "runtime/shapes/level_set/bake.h"

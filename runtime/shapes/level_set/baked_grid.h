@@ -1,15 +1,16 @@
-// A narrow-band level set copied for queries: every block of voxels with its upper neighbours' first ones, in one flat
-// table behind a coarse index. The eight corners of a cell are then always in one block, found by two loads.
+// A narrow-band level set in a form that is fast to query: every block of voxels, extended by the first layer of its
+// upper neighbours, in one flat table with a coarse index. The eight corners of a cell are then always in one block,
+// found by two loads.
 //
-// Between voxels the field is trilinear: the same as OpenVDB's BoxSampler everywhere in the band, to float rounding;
-// the gradient is the derivative of that interpolant. Beyond the band the distance is a bound of the right sign and the
+// Between voxels the field is trilinear: in the band it equals OpenVDB's BoxSampler up to float rounding, and the
+// gradient is the derivative of that interpolant. Beyond the band the distance is a bound of the right sign and the
 // gradient zero. In an empty block the bound is the half width of the band plus the width of the blocks between it and
-// the nearest with values; beyond the index, the distance to the box around the surface: so a walk from far away takes
-// few steps.
+// the nearest block with values. Outside the index it is the distance to the box around the surface. A walk from far
+// away therefore takes few steps.
 //
-// Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes a block, 1.4 times its own
-// voxels. index, shape [blocks x, y, z], z fastest, covers the box around the band: 4 bytes for each 8^3 voxels, empty
-// or not.
+// Layout: values, shape [blocks with values, 9, 9, 9], z fastest, metres: 2,916 bytes per block, 1.4 times the size of
+// its own voxels. index, shape [blocks x, y, z], z fastest, covers the box around the band: 4 bytes per 8^3 voxels,
+// empty or not.
 #pragma once
 
 #include <algorithm>
@@ -22,12 +23,12 @@
 namespace rapid {
 
 struct BakedGrid {
-    static constexpr int block = 8;  // voxels along the edge of a block, as of OpenVDB's leaves
-    static constexpr int edge = 9;   // values along it: the last is the upper neighbour's first
+    static constexpr int block = 8;  // voxels along the edge of a block, the same as OpenVDB's leaves
+    static constexpr int edge = 9;   // values along the edge; the last is the first of the upper neighbour
     static constexpr int block_values = edge * edge * edge;
 
-    // In `index`, a block of one value, beyond the band: outside - 2 k or inside - 2 k, with at least k blocks between
-    // it and the nearest with values.
+    // Index codes of blocks with a single value, beyond the band: outside - 2 k or inside - 2 k. At least k blocks lie
+    // between this block and the nearest one with values.
     static constexpr std::int32_t outside = -1, inside = -2;
     static bool is_outside(std::int32_t code) { return code & 1; }
     static int sign(std::int32_t code) { return 2 * (code & 1) - 1; }
@@ -35,19 +36,19 @@ struct BakedGrid {
 
     Vec3d origin = Vec3d::Zero();  // position of the box's lowest voxel, m
     double voxel = 0;              // m
-    double background = 0;         // the half width of the band, m
+    double background = 0;         // half width of the band, m
     Eigen::Vector3i blocks = Eigen::Vector3i::Zero();
     std::vector<std::int32_t> index;
     std::vector<float> values;
 
-    Box3d surface;                // around all cells where the sign changes, m
-    double slope = 0;             // the largest |gradient| in any cell
-    std::uint64_t crossings = 0;  // cells where the sign changes; 0: no surface
+    Box3d surface;                // bounds of all cells where the sign changes, m
+    double slope = 0;             // largest |gradient| in any cell
+    std::uint64_t crossings = 0;  // cells where the sign changes; 0 if there is no surface
 
     std::size_t bytes() const { return index.size() * sizeof(std::int32_t) + values.size() * sizeof(float); }
 };
 
-// Samples a BakedGrid, which must outlive it. Made once for a batch of points, so that its members are in registers.
+// Samples a BakedGrid, which must outlive it. Create one per batch of points, so that its members stay in registers.
 class BakedSampler {
 public:
     explicit BakedSampler(const BakedGrid& grid)
@@ -67,7 +68,7 @@ public:
     {
     }
 
-    // m; beyond the band a bound of the right sign.
+    // Returns the distance in m. Beyond the band it is a bound of the right sign.
     double distance(const Vec3d& P) const
     {
         const Cell cell = find(P);
@@ -81,7 +82,7 @@ public:
         return c0 + cell.x * (c1 - c0);
     }
 
-    // And the gradient, not normalised; zero beyond the band.
+    // Also computes the gradient, not normalised; zero beyond the band.
     double distance(const Vec3d& P, Vec3d& gradient) const
     {
         const Cell cell = find(P);
@@ -102,13 +103,13 @@ public:
         return c0 + cell.x * dx;
     }
 
-    // The same of up to `many` points at once, as vectors: to the bit what distance(P) gives.
+    // Vectorised distance(P) for up to `many` points at once, with bit-identical results.
     static constexpr int many = 64;
     void distances(int n, const double* X, const double* Y, const double* Z, double* phi) const
     {
         sample(n, X, Y, Z, phi, [](int, float, float, float) {});
     }
-    // And the slopes of the field along v, m/s: by its gradient, which is zero beyond the band.
+    // Also computes the slopes of the field along v, m/s, from the gradient, which is zero beyond the band.
     void distances_along(int n, const double* X, const double* Y, const double* Z, const double* vx, const double* vy,
                          const double* vz, double* phi, double* slope) const
     {
@@ -117,17 +118,18 @@ public:
         });
     }
 
-    // The largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where bands of
-    // two surfaces meet, anything for a field that is no distance. At least 1, the slope of the bounds beyond the band.
+    // The largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where the
+    // bands of two surfaces meet, anything for a field that is not a distance. At least 1, the slope of the bounds
+    // beyond the band.
     double slope_bound() const { return slope_; }
     // A wall thinner than this may have no voxel inside it, m.
     double smallest_feature() const { return voxel_; }
     // The half width of the band, m. Within √3 voxels of its edge a cell has corners beyond the band, and the field
-    // flattens: for a radius r ask for a band of r + 2 voxels.
+    // flattens: for a radius r, request a band of r + 2 voxels.
     double band() const { return background_; }
     // The error of a distance in single precision, m: seven interpolations of values up to the half width.
     double rounding() const { return 0x1p-21 * background_; }
-    // Outside it the distance is above 0, and not below the distance to it.
+    // Outside this box the distance is positive and at least the distance to the box.
     Box3d bounds() const
     {
         const Vec3d margin = Vec3d::Constant(voxel_);
@@ -144,7 +146,7 @@ private:
     struct Cell {
         const float* corner;  // the value at the cell's lowest corner; null beyond the band
         float x, y, z;        // position in the cell, 0 to 1
-        double bound;         // of the distance beyond the band, m
+        double bound;         // bound on the distance beyond the band, m
     };
 
     Cell find(const Vec3d& P) const
@@ -161,8 +163,8 @@ private:
                 static_cast<float>(x - i), static_cast<float>(y - j), static_cast<float>(z - k), 0};
     }
 
-    // The surface is in its box, and so at least as far away. The voxel taken off is for the level r > 0 of the field,
-    // which interpolation can put a little farther out than r.
+    // The surface lies in its box, so it is at least as far away as the box. One voxel is subtracted for the level r >
+    // 0 of the field, which interpolation can put slightly farther out than r.
     double far_outside(const Vec3d& P) const
     {
         const Vec3d beyond = (surface_.min() - P).cwiseMax(P - surface_.max()).cwiseMax(0.0);
@@ -174,7 +176,7 @@ private:
         return BakedGrid::sign(code) * (background_ + BakedGrid::between(code) * block_width_);
     }
 
-    Vec3d origin_, extent_, last_;  // the number of voxels in the box, and the last of them
+    Vec3d origin_, extent_, last_;  // size of the box in voxels, index of its last voxel
     double per_voxel_, voxel_, block_width_, background_, slope_;
     std::int64_t blocks_y_, blocks_z_;
     const std::int32_t* index_;
@@ -182,13 +184,13 @@ private:
     Box3d surface_;
 };
 
-// differences(i, dx, dy, dz): of the interpolant across its cell along the axes, m.
+// differences(i, dx, dy, dz) receives the differences of the interpolant across its cell along the axes, m.
 template <class Differences>
 void BakedSampler::sample(int n, const double* X, const double* Y, const double* Z, double* phi,
                           const Differences& differences) const
 {
     float x[many], y[many], z[many];       // position in the cell
-    std::int64_t block[many], cell[many];  // of the index; within its values
+    std::int64_t block[many], cell[many];  // index of the block; index within its values
     std::uint8_t within[many];
     int beyond = 0;
     for (int i = 0; i < n; ++i) {
@@ -217,7 +219,7 @@ void BakedSampler::sample(int n, const double* X, const double* Y, const double*
             corner[2 * k + 1][i] = rows[k][1];
         }
     }
-    // Copies, which no store below can alias.
+    // Local copies, which no store below can alias.
     const double background = background_, width = block_width_;
     for (int i = 0; i < n; ++i) {
         const float d00 = corner[1][i] - corner[0][i], d01 = corner[3][i] - corner[2][i];

@@ -9,7 +9,8 @@
 namespace rapid {
 namespace {
 
-// The value, made by the first call. Meanwhile the thread takes no other work, which might ask for the same.
+// Returns the value, which the first call creates. Isolation stops the thread from taking other work meanwhile, which
+// might need the same mutex.
 template <class Ptr, class Make>
 const Ptr& once(std::mutex& mutex, Ptr& value, const Make& make)
 {
@@ -35,7 +36,7 @@ MeshPtr BakedLevelSet::surface() const
 LevelSetPtr BakedLevelSet::with_band(double metres) const
 {
     if (metres <= band()) return shared_from_this();
-    // A little more, so that rounding to the grid's single precision leaves at least `metres`.
+    // The margin leaves at least `metres` after rounding to the grid's single precision.
     return source_.rebuild(metres * (1 + 1e-6));
 }
 

@@ -1,4 +1,4 @@
-// A level set for queries, on a BakedGrid; its OpenVDB grid is made when something asks for it.
+// A level set for queries, based on a BakedGrid. Its OpenVDB grid is created on demand.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace rapid {
 class BakedLevelSet final : public ShapeOf<BakedLevelSet, LevelSet>,
                             public std::enable_shared_from_this<BakedLevelSet> {
 public:
-    // Where it comes from.
+    // Functions that recreate the data that the baked grid lacks.
     struct Source {
         std::function<LevelSetGridPtr()> grid;
         std::function<LevelSetPtr(double half_width)> rebuild;  // the same surface with another half width, m
@@ -38,12 +38,12 @@ public:
     ScatterPtr surface_scatter() const override;
     ScatterPtr volume_scatter() const override;
 
-    const LevelSetGridPtr& grid() const;  // made by the first call
+    const LevelSetGridPtr& grid() const;  // created by the first call
     const BakedGrid& baked() const { return *baked_; }
     bool has_surface() const { return baked_->crossings > 0; }
 
 private:
-    std::shared_ptr<const BakedGrid> baked_;  // shared with the scatters made from this
+    std::shared_ptr<const BakedGrid> baked_;  // shared with the scatters of this level set
     std::uint64_t active_voxels_;
     Source source_;
     mutable std::mutex grid_mutex_, surface_mutex_;

@@ -15,7 +15,7 @@ void require_legal(const LevelSetOptions& options)
 {
     if (!(options.voxel > 0) || !std::isfinite(options.voxel))
         throw Error(fmt::format("voxel = {:g} m is out of range; it must be above 0", options.voxel));
-    // The gradient at the surface needs the values of the cells around it, on both sides.
+    // The gradient at the surface needs the values of the adjacent cells on both sides.
     if (!(options.half_width >= 2) || !std::isfinite(options.half_width))
         throw Error(fmt::format("half_width = {:g} voxels is out of range; it must be at least 2", options.half_width));
 }
@@ -23,18 +23,18 @@ void require_legal(const LevelSetOptions& options)
 void require_buildable(std::string_view what, double area, const Box3d& bounds, const LevelSetOptions& options)
 {
     constexpr double most = 2147483648.0;  // 2^31
-    // Of the blocks while they are built, and of the baked copy: 30 to 60 bytes a voxel of a smooth surface at half
+    // Covers the blocks during the build and the baked copy: 30 to 60 bytes per voxel of a smooth surface at half
     // widths of 3 to 10, where a third to two thirds of a leaf is in the band.
     constexpr double bytes_a_voxel = 64;
 
-    // Far from the surface leaves are whole.
+    // Far from the surface leaves are full.
     constexpr double bytes_a_voxel_around = 16;
 
-    // Of the index, and while it is made of that of the blocks as they were measured, and of which have values.
+    // Covers the index and, while it is built, the index of the measured blocks and the flags of blocks with values.
     constexpr double bytes_a_block = 2 * sizeof(std::int32_t) + 1;
 
-    // Of a convex body the band outside is area h + M h² + 4/3 pi h³ (Steiner's formula), and M is at most that of the
-    // bounds, pi times the sum of their edges.
+    // For a convex body the volume of the outer band is area h + M h² + 4/3 pi h³ (Steiner's formula). M is at most
+    // that of the bounds, pi times the sum of their edges.
     const double h = options.half_width;  // voxels
     const Vec3d size = bounds.sizes() / options.voxel, across = size + Vec3d::Constant(2 * h);
     const double in_band = area / (options.voxel * options.voxel) * 2 * h;
@@ -43,7 +43,7 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     const double indexed = (across / BakedGrid::block + Vec3d::Constant(2)).prod();
     const double bytes = near * bytes_a_voxel + (voxels - near) * bytes_a_voxel_around + indexed * bytes_a_block;
 
-    // The larger voxel for which the band (which shrinks with its square) and the index (with its cube) fit.
+    // The larger voxel at which the band (which shrinks with its square) and the index (with its cube) fit.
     const auto larger = [&](double band_excess, double index_excess) {
         return 1.02 * options.voxel * std::max({1.0, std::sqrt(band_excess), std::cbrt(index_excess)});
     };

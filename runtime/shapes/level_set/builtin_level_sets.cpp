@@ -1,4 +1,4 @@
-// Built-in level sets, from formulas of their distance: exact at every voxel of the band.
+// Built-in level sets, evaluated from distance formulas: exact at every voxel of the band.
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
@@ -23,17 +23,17 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// A surface with a distance that is exact, or at least has a slope of 1 at most.
+// A surface given by a function that is its exact distance, or at least has a slope of at most 1.
 struct Formula {
     std::string what;  // `a level set sphere of radius 2`
     std::function<double(const Vec3d& P)> distance;
     Box3d bounds;
     double area;       // m²
-    double thickness;  // m, of its thinnest part
+    double thickness;  // m, thickness of the thinnest part
 };
 
-// The blocks that the band may touch: an octree down to their size, without the cubes whose centre is farther from the
-// surface than the band and their half diagonal. Coordinates in blocks.
+// Finds the blocks that the band may touch. Descends an octree and prunes cubes whose centre is farther from the
+// surface than the half width plus half their diagonal. Coordinates are in blocks.
 void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_width, const VoxelBlocks::Place& lowest,
                  int size, std::vector<VoxelBlocks::Place>& found)
 {

@@ -19,14 +19,15 @@ namespace {
 
 using openvdb::FloatGrid;
 
-// Active voxels of one value: a voxel, or a tile of the tree.
+// Active voxels with one value: a single voxel, or a tile of the tree.
 struct Cell {
     openvdb::Coord origin;
     int edge;  // voxels
 };
 
-// A trilinear density is the sum over the voxels of d_i times a hat, whose integral is the same for all. A birth draws
-// a voxel by its value, and along each axis a place by the hat, which is the density of the sum of two uniform numbers.
+// A trilinear density is the sum over the voxels of d_i times a hat function with the same integral everywhere. A birth
+// draws a voxel by its value, then an offset from the hat along each axis. The sum of two uniform numbers has that
+// density.
 class ScatterInFog final : public Scatter {
 public:
     ScatterInFog(openvdb::math::Transform::ConstPtr transform, std::vector<Cell> cells, AliasTable chances)

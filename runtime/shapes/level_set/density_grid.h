@@ -1,4 +1,5 @@
-// A fog volume: an OpenVDB grid of floats, read from a file or made of points, in which points are born by density.
+// A fog volume: an OpenVDB float grid, read from a file or made from points. Points are born in it in proportion to its
+// density.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +19,7 @@ public:
     static constexpr std::string_view param_type = "fog";
     std::string_view kind() const override { return "fog"; }
 
-    // The density, trilinear between the centres of voxels; as of a vector grid (vector_grid.h).
+    // Samples the density, trilinear between voxel centres. The arguments are those of VectorGrid (vector_grid.h).
     virtual void sample(std::span<const Vec3d> P, std::span<double> values) const = 0;
     virtual void sample_at(std::span<const Vec3d> P, std::span<const double> time, std::span<double> values) const
     {
@@ -26,7 +27,7 @@ public:
         sample(P, values);
     }
 
-    // Births in proportion to the density. Of a fog that changes with time, at the end of the step that it is for.
+    // Births in proportion to the density. For a time-dependent fog: the density at the end of the step being computed.
     virtual const ScatterPtr& scatter() const = 0;
     // The integral of the density over all space, m³.
     virtual double total() const = 0;
@@ -34,8 +35,9 @@ public:
 
 using DensityGridPtr = std::shared_ptr<const DensityGrid>;
 
-// The grid of that name in a .vdb file; an empty name is the only fog of floats. Error: what is wrong with the file,
-// and which grids it has; a level set; a density below 0, or of 0 everywhere.
+// Reads the grid of that name from a .vdb file; an empty name selects the only float fog. Throws Error if the file is
+// damaged, if it has no such grid (the message lists those it has), or if the grid is a level set, has negative
+// densities, or is 0 everywhere.
 RAPID_DEFERRED(read_density_grid, DensityGridPtr(const std::filesystem::path& path, const std::string& name));
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// For readers of .vdb files: how the grids in a file are named and chosen.
+// Naming and selection of the grids in a .vdb file, for its readers.
 #pragma once
 
 #include <string>
@@ -7,10 +7,10 @@
 
 namespace rapid {
 
-// `"density" (float), "surface" (level set of float)`.
+// Returns a list for messages: `"density" (float), "surface" (level set of float)`.
 std::string grids_of(const openvdb::GridPtrVec& grids);
 
-// Error: no such grid; lists those that there are, and the nearest name.
+// Throws Error if there is no such grid. The message lists the grids and suggests the nearest name.
 openvdb::GridBase::Ptr grid_of_name(const std::string& path, const std::string& name, const openvdb::GridPtrVec& grids);
 
 }  // namespace rapid

@@ -1,6 +1,6 @@
-// Grids in a message between processes (files/read_apart.h): the tree's tiles and leaves, its map if that is linear,
-// its class and background. What comes back is checked: a grid has finite values, and fits the tables that are made of
-// it.
+// Grids in messages between processes (files/read_apart.h): the tree's tiles and leaves, its map if that is linear, its
+// class and background. The receiver checks them: values must be finite, and the grid must fit the tables that are
+// built from it.
 #pragma once
 
 #include <fmt/format.h>
@@ -16,14 +16,14 @@ namespace rapid {
 inline bool is_finite(float value) { return std::isfinite(value); }
 inline bool is_finite(const openvdb::Vec3s& value) { return value.isFinite(); }
 
-// Whether the map is a uniform scale, above 0, and a translation.
+// Returns true if the map is a translation and a positive uniform scale.
 bool is_uniform(const openvdb::Mat4R& map);
 bool is_uniform(const openvdb::math::Transform& transform);
 
-// Error: the map has no inverse.
+// Throws Error if the map has no inverse.
 openvdb::math::Transform::Ptr transform_of(const openvdb::Mat4R& map, const std::string& name);
 
-// Error: the boxes of 8^3 voxels around all leaves are more than a level set's index holds.
+// Throws Error if the 8^3 boxes around all leaves exceed the index of a level set.
 void check_extent(const openvdb::CoordBBox& leaves, const std::string& name);
 
 template <class Grid>
@@ -51,7 +51,7 @@ void send_grid(const typename Grid::Ptr& grid, MessageWriter& message)
         message.put(box.min().asVec3i());
         message.put<Value>(*tiles);
     }
-    message.put<std::uint8_t>(0);  // level 0: no more tiles
+    message.put<std::uint8_t>(0);  // level 0 ends the tiles
     message.put<std::size_t>(grid->tree().leafCount());
     for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
         message.put(leaf->origin().asVec3i());
@@ -104,7 +104,7 @@ typename Grid::Ptr receive_grid(MessageReader& message)
     return grid;
 }
 
-// Errors name the file.
+// Reads a grid in another process. Adds the file's name to errors.
 template <class Grid>
 typename Grid::Ptr read_grid_apart(const ApartReader<typename Grid::Ptr>& reader, const std::filesystem::path& path,
                                    const std::string& name)

@@ -22,7 +22,7 @@ using openvdb::Vec3SGrid;
 
 constexpr int leaf_edge = 8;  // voxels
 
-// A point that reaches into a leaf, by the leaf's number along each axis.
+// A point that reaches into a leaf. x, y, z: index of the leaf along each axis.
 struct Reach {
     std::int32_t x, y, z;
     std::uint32_t point;
@@ -31,14 +31,14 @@ struct Reach {
     auto operator<=>(const Reach&) const = default;
 };
 
-// The voxels that a point reaches, and how much each gets.
+// The voxels within a point's radius, and the share that each gets.
 class Spread {
 public:
     explicit Spread(const SpreadPoints& points) : points_(points) {}
 
     std::size_t size() const { return points_.P.size(); }
     float weight(std::size_t i) const { return points_.weight[points_.weight.size() == 1 ? 0 : i]; }
-    // In voxels. A smaller one might reach no centre of a voxel.
+    // Returns the radius in voxels, at least 1: a smaller one might reach no voxel centre.
     double radius(std::size_t i) const { return std::max(1.0, given_radius(i) / points_.voxel); }
     Vec3d place(std::size_t i) const { return points_.P[i].cast<double>() / points_.voxel; }
 
@@ -60,7 +60,7 @@ public:
     Eigen::Vector3i first(std::size_t i) const { return (place(i).array() - radius(i)).ceil().cast<int>().matrix(); }
     Eigen::Vector3i last(std::size_t i) const { return (place(i).array() + radius(i)).floor().cast<int>().matrix(); }
 
-    // Calls f(voxel, numerator of W) for those of a point's voxels that lie in a box; shape of a row: along z.
+    // Calls f(voxel, numerator of W) for the voxels of a point that lie in a box, z fastest.
     template <class F>
     void visit(std::size_t i, const Eigen::Vector3i& low, const Eigen::Vector3i& high, const F& f) const
     {
@@ -76,7 +76,7 @@ public:
                 }
     }
 
-    // w_i / S_i
+    // Returns w_i / S_i.
     double share(std::size_t i) const
     {
         double sum = 0;
@@ -102,7 +102,7 @@ void require_memory(const Spread& points, double bytes)
                             "give a larger voxel or a smaller radius");
 }
 
-// Which points reach into which leaves, sorted by leaf and then in the order of the points; without those of no weight.
+// Finds which points reach into which leaves, sorted by leaf, then by point. Skips points of weight 0.
 std::vector<Reach> reaches_of(const Spread& points)
 {
     std::vector<std::size_t> begin(points.size() + 1, 0);
@@ -134,7 +134,7 @@ std::vector<Reach> reaches_of(const Spread& points)
     return reaches;
 }
 
-// The sums of one leaf: Σ w W, and for vectors Σ w W v. A voxel's place in them is x 64 + y 8 + z.
+// The sums of one leaf: Σ w W, and Σ w W v for vectors. A voxel's index in them is x 64 + y 8 + z.
 struct Sums {
     std::vector<double> weight = std::vector<double>(leaf_edge * leaf_edge * leaf_edge);
     std::vector<Vec3d> vectors = {};
@@ -161,7 +161,7 @@ Sums sums_of(const Spread& points, const SpreadPoints& given, std::span<const do
     return sums;
 }
 
-// A grid whose voxels have value(sums, place) where something has reached them.
+// Builds a grid that has value(sums, index) in every voxel that a point reaches.
 template <class Grid, class F>
 typename Grid::Ptr grid_of(const SpreadPoints& given, const char* name, const F& value)
 {
@@ -175,7 +175,7 @@ typename Grid::Ptr grid_of(const SpreadPoints& given, const char* name, const F&
         for (std::size_t i = first; i < last; ++i) shares[i] = points.weight(i) > 0 ? points.share(i) : 0;
     });
 
-    std::vector<std::size_t> leaves;  // where each begins
+    std::vector<std::size_t> leaves;  // start of each leaf in `reaches`
     for (std::size_t i = 0; i < reaches.size(); ++i)
         if (i == 0 || !reaches[i].same_leaf(reaches[i - 1])) leaves.push_back(i);
     require_memory(points, static_cast<double>(leaves.size()) * sizeof(typename Leaf::ValueType) * Leaf::SIZE);

@@ -1,6 +1,6 @@
-// What of a level set is OpenVDB's: its grid, for files, tools and its surface as a mesh, made when one of them asks. A
-// scene that only collides with level sets of closed meshes never loads OpenVDB (runtime/deferred.h), as long as no
-// pieces overlap and no band is wider than five voxels.
+// The parts of a level set that need OpenVDB: its grid for files and tools, and its surface as a mesh. They are created
+// on demand. A scene that only collides with level sets of closed meshes never loads OpenVDB (runtime/deferred.h), as
+// long as no pieces overlap and no band is wider than five voxels.
 #pragma once
 
 #include <filesystem>
@@ -21,22 +21,22 @@ struct VoxelFrame;
 using LevelSetGridPtr = std::shared_ptr<const LevelSetGrid>;
 
 RAPID_DEFERRED(grid_of_blocks, LevelSetGridPtr(const VoxelBlocks& blocks));
-// Of a mesh with faces inside. blocks: as measured.
+// Builds the grid of a mesh with faces inside. blocks: as returned by measure().
 RAPID_DEFERRED(grid_without_faces_inside, LevelSetGridPtr(const MeshBlocks& blocks));
-// Of any mesh, and with a band of any width. half_width: m. Inside of a mesh that is not balanced
-// (Openness::unbalanced_edges), which has no winding number, is what is not connected to infinity in steps of a voxel
-// that cross no face.
+// Builds the grid of any mesh with a band of any width. half_width: m. A mesh that is not balanced
+// (Openness::unbalanced_edges) has no winding number. Its inside is then everything that is not connected to infinity
+// by steps of one voxel that cross no face.
 RAPID_DEFERRED(grid_of_mesh,
                LevelSetGridPtr(const Mesh& mesh, bool balanced, const VoxelFrame& frame, double half_width));
 
-// A level set of a grid. rebuild: its surface with another half width, m.
+// Creates a level set from a grid. rebuild: creates the same surface with another half width, m.
 RAPID_DEFERRED(level_set_of_grid,
                std::shared_ptr<const BakedLevelSet>(const LevelSetGridPtr& grid,
                                                     std::function<LevelSetPtr(double half_width)> rebuild));
 
-// The zero crossing.
+// Returns the zero crossing as a mesh.
 RAPID_DEFERRED(surface_of_grid, MeshPtr(const LevelSetGrid& grid));
-// Writes it to a .vdb. name: of the grid there.
+// Writes a .vdb file. name: name of the grid in it.
 RAPID_DEFERRED(write_level_set_grid,
                void(const LevelSetGrid& grid, const std::filesystem::path& path, const std::string& name));
 

@@ -15,11 +15,11 @@ std::optional<int> SequenceFiles::frame_of(std::int64_t frame) const
 SequenceFiles::Interval SequenceFiles::interval(std::int64_t frame) const
 {
     const std::optional<int> from = frame_of(frame), to = frame_of(frame + 1);
-    if (!from || !to) {  // from nothing, or to nothing: what holds is a file, at an end of the sequence
+    if (!from || !to) {  // the sequence begins or ends here: no interpolation towards nothing
         return {from, to, 0, 1};
     }
     const int low = std::min(*from, *to), high = std::max(*from, *to);
-    if (high - low > 1) return {*from, *to, 0, 1};  // from the last to the first
+    if (high - low > 1) return {*from, *to, 0, 1};  // the sequence wraps from its last frame to its first
     const int a = std::prev(files.upper_bound(low))->first, b = files.lower_bound(high)->first;
     const auto part = [&](int at) { return a == b ? 0 : static_cast<double>(at - a) / (b - a); };
     return {a, b, part(*from), part(*to)};

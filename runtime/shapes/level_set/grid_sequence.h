@@ -1,7 +1,7 @@
-// Grids that change with time: a .vdb file for each frame, or for some of them; between two files a value goes on a
-// straight line in time.
+// Time-dependent grids: a .vdb file for every frame, or for some of them. Between two files each value is interpolated
+// linearly in time.
 //
-// A file is read when a frame next to it is first needed, and the few most recent ones are kept.
+// Files are read when first needed, and the most recent few stay cached.
 #pragma once
 
 #include <deque>
@@ -20,20 +20,20 @@
 
 namespace rapid {
 
-// The files of a sequence, and which of them hold at a frame.
+// The files of a sequence, and their mapping to the scene's frames.
 struct SequenceFiles {
     std::map<int, std::filesystem::path> files;  // by frame; at least one
-    FrameSequence order = {};                    // what is beyond them; its ends are not used
+    FrameSequence order = {};                    // behaviour beyond the files; its first and last frame are not used
 
-    // From a whole frame to the next: the part of the way from file a to file b at its beginning and at its end.
-    // Without a or b there is nothing at that end.
+    // From a whole frame to the next: the interpolation parameters between files a and b at its beginning and end. An
+    // end without a or b has no grid.
     struct Interval {
         std::optional<int> a, b;
         double begin = 0, end = 1;
     };
     Interval interval(std::int64_t frame) const;
 
-    // The frame of the sequence, from its first to its last, that holds at a frame of the scene.
+    // Returns the frame of the sequence, within its range, that a frame of the scene shows.
     std::optional<int> frame_of(std::int64_t frame) const;
 };
 
@@ -43,7 +43,7 @@ class GridSequence final : public Object {
 public:
     using Grid = std::shared_ptr<const G>;
 
-    // read: from any thread.
+    // read: must be thread-safe.
     GridSequence(SequenceFiles files, std::function<Grid(const std::filesystem::path&)> read)
         : files_(std::move(files)), read_(std::move(read))
     {
@@ -56,10 +56,10 @@ public:
     bool varies() const override { return true; }
 
     struct Interval {
-        Grid a, b;  // null where there is nothing
+        Grid a, b;  // null if there is no grid
         double begin, end;
     };
-    // From a whole frame to the next. From any thread. Error: of a file.
+    // Returns the grids from a whole frame to the next. Thread-safe. Throws Error if a file cannot be read.
     Interval over(std::int64_t frame) const
     {
         const SequenceFiles::Interval files = files_.interval(frame);
@@ -78,7 +78,7 @@ private:
         return kept_.front().second;
     }
 
-    static constexpr std::size_t most_kept = 4;  // two for the frame, two that the next begins with
+    static constexpr std::size_t most_kept = 4;  // two for this frame, two for the start of the next
 
     SequenceFiles files_;
     std::function<Grid(const std::filesystem::path&)> read_;

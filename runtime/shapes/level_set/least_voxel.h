@@ -1,4 +1,4 @@
-// The least edge of a voxel of a grid that is made. OpenVDB refuses a map whose determinant is below 1e-15 m³.
+// The smallest voxel edge of a grid. OpenVDB refuses a map whose determinant is below 1e-15 m³.
 #pragma once
 
 namespace rapid {

@@ -1,7 +1,7 @@
 // A narrow-band level set: the general shape that particles collide with (paper §4).
 //
-// Queries run on a flat table of its blocks behind a coarse index (baked_grid.h), because a sample of OpenVDB's tree
-// costs several times more. Its grid is for tools and files, and is made when one asks for it (grid_on_demand.h).
+// Queries use a flat table of blocks with a coarse index (baked_grid.h), because a sample of OpenVDB's tree costs
+// several times more. The OpenVDB grid is for tools and files and is created on demand (grid_on_demand.h).
 #pragma once
 
 #include <filesystem>
@@ -27,30 +27,33 @@ public:
 
     virtual double voxel() const = 0;  // m
     virtual std::uint64_t active_voxels() const = 0;
-    MeshPtr surface() const override = 0;  // the zero crossing as a mesh
-    // The same surface with a band of at least `metres` on each side; this one where it is wide enough.
+    MeshPtr surface() const override = 0;  // the zero crossing
+    // Returns the same surface with a band of at least `metres` on each side, or this level set if its band is wide
+    // enough.
     virtual std::shared_ptr<const LevelSet> with_band(double metres) const = 0;
     virtual void write(const std::filesystem::path& path, const std::string& grid) const = 0;
 };
 
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
-// Inside is where the winding number of the mesh is not 0: pieces may overlap, and one that faces inwards inside
+// The inside is where the winding number of the mesh is not 0: pieces may overlap, and an inward-facing piece inside
 // another is a cavity. Holes smaller than a voxel are closed (see grid_on_demand.h).
 //
-// `warnings` collects what is doubtful but usable (a mesh with holes, faces turned inside out), with the numbers.
-// Errors: a voxel size that would take over 2^31 voxels, or that is larger than the mesh (which would vanish), an empty
-// mesh.
+// Problems that still give a usable level set (holes, faces turned inside out) are appended to `warnings`, with
+// numbers. Throws Error if the mesh is empty, or if the voxel size would need over 2^31 voxels or is larger than the
+// mesh, which would then vanish.
 LevelSetPtr level_set_from_mesh(const MeshPtr& mesh, const LevelSetOptions& options,
                                 std::vector<std::string>& warnings);
-// Of a mesh with the faces of an earlier one, whose openness is known; without its checks and warnings.
+// Builds the level set of a mesh with the faces of an earlier one, whose openness is known. Skips its checks and
+// warnings.
 LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& options, const Mesh::Openness& open);
 LevelSetPtr level_set_sphere(double radius, const Vec3d& center, const LevelSetOptions& options);
 LevelSetPtr level_set_box(const Vec3d& size, const Vec3d& center, const LevelSetOptions& options);
 LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, const LevelSetOptions& options);
 
-// grid: empty for the only level set in the file. Error: no such file, not a .vdb, no such grid (with the names that
-// there are), not a float level set, an empty grid, a map that is not uniform scale and translation.
+// grid: empty for the only level set in the file. Throws Error if the file does not exist or is not a .vdb, if it has
+// no such grid (the message lists those it has), or if the grid is empty, is not a float level set, or has a map other
+// than a uniform scale and translation.
 RAPID_DEFERRED(read_level_set, LevelSetPtr(const std::filesystem::path& path, const std::string& grid));
 
 }  // namespace rapid

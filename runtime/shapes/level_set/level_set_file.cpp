@@ -1,4 +1,4 @@
-// Level sets in .vdb files, by the names of their grids.
+// Reads level sets from .vdb files by grid name.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,8 +34,8 @@ openvdb::GridBase::Ptr choose_level_set(const std::string& path, const std::stri
                             grids_of(level_sets)));
 }
 
-// The metadata of all grids, and the values of the chosen one alone. All that may take as much memory as the file says
-// is done here, in the process that may.
+// Reads the metadata of all grids and only the values of the chosen one. All allocations whose size the file dictates
+// happen here, in the process that is allowed to fail.
 FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const std::string& name)
 {
     initialize_openvdb();
@@ -47,7 +47,7 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
             throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
                                     openvdb::GridBase::gridClassToString(chosen->getGridClass())));
-        // Exactly: a rotation, a shear or unequal scales would have to be resampled.
+        // Exact, because a rotation, a shear or unequal scales would require resampling.
         if (!is_uniform(chosen->transform()))
             throw Error(
                 fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "

@@ -1,4 +1,4 @@
-// Level sets from meshes, and the warnings about meshes that make doubtful ones.
+// Builds level sets from meshes and warns about meshes that make unreliable ones.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 std::shared_ptr<const BakedLevelSet> build(const MeshPtr& mesh, bool balanced, const LevelSetOptions& options)
 {
     const Box3d bounds = mesh->bounds().cast<double>();
-    constexpr double far = 2147483648.0;  // voxels; their whole numbers are exact, and OpenVDB's maps can be inverted
+    constexpr double far = 2147483648.0;  // voxels; up to here integers are exact and OpenVDB's maps invertible
     if (const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff();
         !(farthest <= far * options.voxel))
         throw Error(
@@ -38,7 +38,7 @@ std::shared_ptr<const BakedLevelSet> build(const MeshPtr& mesh, bool balanced, c
                                            BakedLevelSet::Source{grid, rebuild});
 }
 
-// The bounds of the connected parts of a mesh.
+// Returns the bounds of the connected parts of a mesh.
 std::vector<Box3f> pieces_of(const Mesh& mesh)
 {
     std::vector<std::int32_t> parent(mesh.positions.size());
@@ -58,7 +58,7 @@ std::vector<Box3f> pieces_of(const Mesh& mesh)
     return bounds;
 }
 
-// Warns of a mesh that is doubtful but usable.
+// Warns about a mesh that is questionable but usable.
 void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& options,
           std::vector<std::string>& warnings)
 {

@@ -1,4 +1,4 @@
-// Level sets around points: the union of their balls, exact outside of them.
+// Level sets from points: the union of their balls, exact outside.
 #include <fmt/format.h>
 #include <openvdb/tools/ParticlesToLevelSet.h>
 #include <openvdb/tools/Prune.h>
@@ -15,7 +15,7 @@ namespace {
 
 using openvdb::FloatGrid;
 
-// A list of points, as OpenVDB takes it.
+// A list of points in the form that OpenVDB requires.
 struct Balls {
     using PosType = openvdb::Vec3R;
 
@@ -34,7 +34,7 @@ struct Balls {
 
 LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius, const LevelSetOptions& options)
 {
-    constexpr double least = 1.5;  // voxels: a smaller ball can fall between the voxels
+    constexpr double least = 1.5;  // voxels; a smaller ball may contain no voxel centre
     require_legal(options);
     if (P.empty()) throw Error("there are no points to make a level set of");
     initialize_openvdb();
@@ -68,7 +68,8 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
         grid->setName("surface");
         openvdb::tools::ParticlesToLevelSet<FloatGrid> rasterizer(*grid);
         rasterizer.rasterizeSpheres(*balls);
-        // All that its finalize() does without attributes; that of others would be compiled with it, for a third more.
+        // The part of finalize() that matters without attributes. Calling finalize() would compile the attribute code
+        // too, which takes a third longer.
         openvdb::tools::pruneLevelSet(grid->tree());
         return grid;
     };

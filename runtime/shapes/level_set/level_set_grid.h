@@ -1,4 +1,5 @@
-// OpenVDB's grid of a level set, and the functions that build it. Includes OpenVDB; level_set.h is enough for queries.
+// The OpenVDB grid of a level set, and the functions that build it. Includes OpenVDB; level_set.h is enough for
+// queries.
 #pragma once
 
 #include <functional>
@@ -18,30 +19,30 @@ using BakedPtr = std::shared_ptr<const BakedLevelSet>;
 
 inline const openvdb::FloatGrid& grid_of(const BakedLevelSet& level_set) { return *level_set.grid()->grid; }
 
-// Copies the band of a level set for queries. The grid's map must be a uniform scale and a translation.
+// Bakes the band of a level set for queries. The grid's map must be a uniform scale and a translation.
 BakedGrid bake(const openvdb::FloatGrid& grid);
 
-// Builds the same surface with another half width, in metres: from the grid's own source if that is known.
+// Builds the same surface with another half width, in metres, from the grid's own source if that is known.
 using RebuildGrid = std::function<openvdb::FloatGrid::Ptr(double half_width)>;
 
-// The grid is shared from here on, and must not change.
+// The grid is shared from here on and must not change.
 BakedPtr level_set_of(openvdb::FloatGrid::ConstPtr grid, RebuildGrid rebuild);
 
-// Its tiles are all outside, and it has no class and no name: level_set_grid() mends that.
+// Returns a grid whose tiles are all outside, without class and name. level_set_grid() completes it.
 openvdb::FloatGrid::Ptr tree_of(const VoxelBlocks& blocks);
 
-// Sets the tiles inside or outside by the voxels beside them.
+// Sets tiles to inside or outside according to adjacent voxels.
 LevelSetGridPtr level_set_grid(const openvdb::FloatGrid::Ptr& grid);
 
-// A grid without a known source, widened from its own surface: new voxels get their distance to it as a mesh, and the
-// existing ones keep their values to the bit.
+// Widens the band of a grid without a known source, using its own surface as a mesh: new voxels get their distance to
+// the mesh, and existing ones stay bit-identical.
 openvdb::FloatGrid::Ptr widened(const openvdb::FloatGrid& grid, double half_width);
 
-// The surface of any level set on other voxels, by its mesh.
+// Resamples the surface of any level set to other voxels, through a mesh.
 openvdb::FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform,
                                      double half_width);
 
-// Registers OpenVDB's types; call it before the first grid is made or read.
+// Registers OpenVDB's types. Call it before the first grid is created or read.
 void initialize_openvdb();
 
 openvdb::math::Transform::Ptr transform_of(const VoxelFrame& frame);

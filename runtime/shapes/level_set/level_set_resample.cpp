@@ -1,4 +1,4 @@
-// Level sets on other voxels: by their surface as a mesh, which restores the distances.
+// Resamples level sets to other voxels through a mesh of their surface, which restores exact distances.
 #include <fmt/format.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/LevelSetRebuild.h>
@@ -17,20 +17,20 @@ namespace {
 
 using openvdb::FloatGrid;
 
-// m²: the band has voxels on both sides of the surface.
+// Estimates the area of the surface, m². The band has voxels on both sides of it.
 double area_of(const FloatGrid& grid)
 {
     return double(grid.activeVoxelCount()) * std::pow(grid.voxelSize()[0], 3) / (2 * grid.background());
 }
 
-// The grid of a level set, with its rotation if it has one.
+// Returns the grid of a level set, including its rotation.
 FloatGrid::ConstPtr grid_in_world(const LevelSetPtr& shape)
 {
     if (const auto grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape)) return grid->grid()->grid;
     const auto& turned = dynamic_cast<const PlacedLevelSet&>(*shape);
     const FloatGrid::ConstPtr rest = grid_in_world(turned.rest());
     const Eigen::Matrix4d pose = turned.pose().affine().matrix();
-    openvdb::Mat4R map;  // OpenVDB's vectors are rows
+    openvdb::Mat4R map;  // OpenVDB uses row vectors
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) map(j, i) = pose(i, j);
     const openvdb::Mat4R to_world = rest->transform().baseMap()->getAffineMap()->getMat4() * map;
@@ -76,7 +76,7 @@ LevelSetPtr resampled(const LevelSetPtr& shape, double voxel)
             "the level set vanishes with voxel = {:g} m: its size is {:.3g} x {:.3g} x {:.3g} m; use a voxel "
             "of at most {:.3g} m",
             voxel, size.x(), size.y(), size.z(), size.minCoeff() / 3));
-    // Before OpenVDB refuses the voxel size.
+    // Gives our own error before OpenVDB refuses the voxel size.
     require_buildable("the resampled level set", area_of(*grid_in_world(shape)), shape->bounds(), {voxel, half_width});
     const auto transform = transform_of(frame_around(shape->bounds(), voxel));
     const auto build = [=](double metres) { return resampled_to(shape, *transform, metres); };

@@ -21,12 +21,12 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-// Voxel sizes that differ by a smaller part are equal but for rounding.
+// Voxel sizes with a smaller relative difference are equal up to rounding.
 constexpr double same_size = 1e-6;
-// Voxels that are within this part of a voxel of each other coincide.
+// Voxels whose offset is below this fraction of a voxel coincide.
 constexpr double same_place = 1e-4;
 
-// On voxels along the axes: a rotated level set is resampled.
+// Returns a level set with axis-aligned voxels. A rotated level set is resampled.
 BakedPtr on_axes(const LevelSetPtr& shape)
 {
     if (auto grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape)) return grid;
@@ -41,15 +41,15 @@ LevelSetPtr finished(FloatGrid::Ptr grid, RebuildGrid rebuild, const std::string
     return result;
 }
 
-// A copy whose values are `scale` (phi - shift), within a band of `half_width` metres of the new ones, and whose voxels
-// lie by `by` farther along the axes. The band of `grid` must reach as far.
+// Returns a copy with values `scale` (phi - shift), in a band of `half_width` metres of the new values, with voxels
+// displaced by `by`. The band of `grid` must be wide enough.
 FloatGrid::Ptr rebanded(const FloatGrid& grid, const openvdb::math::Transform& transform, double scale, double shift,
                         double half_width, const Coord& by = Coord(0))
 {
     std::vector<const Leaf*> leaves;
     grid.tree().getNodes(leaves);
     const auto width = static_cast<float>(half_width);
-    // Leaves begin at multiples of 8: one of `grid` is split over several if the shift is no such multiple.
+    // Leaves begin at multiples of 8. If the displacement is not a multiple, a leaf of `grid` is split across several.
     auto result = FloatGrid::create(width);
     result->setTransform(transform.copy());
     result->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -85,7 +85,7 @@ FloatGrid::Ptr rebanded(const FloatGrid& grid, double shift, double half_width)
     return rebanded(grid, grid.transform(), 1, shift, half_width);
 }
 
-// The level set on the voxels of `like`, with a band of exactly `half_width` metres.
+// Returns the level set on the voxels of `like`, with a band of exactly `half_width` metres.
 FloatGrid::Ptr aligned(const LevelSetPtr& shape, const FloatGrid& like, double half_width)
 {
     const BakedPtr grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape);

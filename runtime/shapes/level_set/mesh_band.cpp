@@ -18,7 +18,7 @@ namespace {
 using Place = Eigen::Vector3i;
 using Corners = std::array<Vec3d, 3>;
 
-// In an order that does not depend on which way the face looks.
+// Returns the corners of a triangle in an order that does not depend on its orientation.
 Corners corners_of(const Mesh& mesh, std::int32_t triangle)
 {
     Mesh::Triangle t = mesh.triangles[triangle];
@@ -27,7 +27,7 @@ Corners corners_of(const Mesh& mesh, std::int32_t triangle)
             mesh.positions[t[2]].cast<double>()};
 }
 
-// A triangle that may be within the band of a block.
+// A triangle that may lie within the band of a block.
 struct Near {
     Place block;
     std::int32_t triangle;
@@ -39,7 +39,7 @@ struct Near {
     }
 };
 
-// The blocks of one triangle.
+// Finds the blocks whose band a triangle may touch.
 class Descent {
 public:
     Descent(const Corners& corners, double half_width)
@@ -81,10 +81,10 @@ private:
     Place lowest_, highest_;
 };
 
-// A triangle in single precision, as a row of voxels along z asks it.
+// A triangle in single precision, for distances from a row of voxels along z.
 class FloatTriangle {
 public:
-    // corners: from the block's lowest voxel.
+    // corners: relative to the block's lowest voxel.
     explicit FloatTriangle(const Corners& corners)
     {
         const Vec3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -94,14 +94,14 @@ public:
             corner_[k] = corners[k].cast<float>();
             edge_[k] = edge.cast<float>();
             per_length2_[k] = length2 > 0 ? static_cast<float>(1 / length2) : 0.0f;
-            // Of lengths that single precision holds, whatever the triangle's.
+            // Normalised, so that single precision suffices whatever the triangle's size.
             outward_[k] = edge.cross(n).stableNormalized().cast<float>();
         }
         up_ = n.stableNormalized().cast<float>();
         if (up_.isZero(0)) beside_ = std::numeric_limits<float>::infinity();
     }
 
-    // The squares of the distances of the voxels (x, y, 0) to (x, y, 7).
+    // Returns the squared distances of the voxels (x, y, 0) to (x, y, 7).
     Floats square_distances(float x, float y) const
     {
         constexpr Floats z = {0, 1, 2, 3, 4, 5, 6, 7};
@@ -128,7 +128,7 @@ public:
 private:
     Vec3f corner_[3], edge_[3], outward_[3], up_;
     float per_length2_[3];
-    float beside_ = 0;  // infinite where there is no plane
+    float beside_ = 0;  // infinite if the triangle has no plane
 };
 
 float largest(const Floats& x)
@@ -139,13 +139,13 @@ float largest(const Floats& x)
     return std::max(std::max(c[0], c[1]), std::max(c[2], c[3]));
 }
 
-// The nearest triangles of the rows of a block, as far as single precision tells.
+// The nearest triangles of each row of a block, in single precision.
 struct Rows {
     static constexpr int side = MeshBand::block;
 
     std::array<Floats, side * side> square;
     std::array<FloatFlags, side * side> nearest;
-    std::array<float, side * side> farthest;  // the largest square of a row
+    std::array<float, side * side> farthest;  // largest squared distance in each row
 
     explicit Rows(float square_half_width)
     {
@@ -223,7 +223,7 @@ void MeshBand::measure(std::size_t b, std::span<float, voxels> distance, std::sp
         for (Vec3d& corner : corners) corner -= from;
         return corners;
     };
-    // A little more, as single precision may be off.
+    // The margin covers the rounding of single precision.
     Rows rows(static_cast<float>(half_width_ * half_width_ * (1 + 1e-4)));
     for (std::size_t i = blocks_[b].first; i < blocks_[b].end; ++i)
         rows.take(corners_from_here(triangles_[i]), triangles_[i], half_width_);

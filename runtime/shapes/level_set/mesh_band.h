@@ -1,7 +1,7 @@
-// The voxels near a mesh, and how far each is from it: exact, by blocks of 8³ voxels.
+// The voxels near a mesh and their exact distances from it, in blocks of 8³ voxels.
 //
-// A triangle goes down through boxes of blocks, each halved, while it may be within the band of one of their voxels. In
-// a block each voxel takes the nearest of its triangles.
+// A triangle descends through boxes of blocks, halved at each level, while it may be within the band of one of their
+// voxels. Within a block each voxel takes the nearest of the block's triangles.
 #pragma once
 
 #include <array>
@@ -17,16 +17,16 @@ namespace rapid {
 class MeshBand {
 public:
     static constexpr int block = BakedGrid::block;
-    static constexpr std::size_t voxels = block * block * block;  // of a block: shape [x, y, z], z fastest
+    static constexpr std::size_t voxels = block * block * block;  // per block: shape [x, y, z], z fastest
 
-    // mesh: in voxels, those of whole numbers; outlives this. half_width: voxels.
+    // mesh: in voxel units, with voxel centres at integers; must outlive this. half_width: voxels.
     MeshBand(const Mesh& mesh, double half_width);
 
     std::size_t size() const { return blocks_.size(); }
-    // The lowest voxel of a block.
+    // Returns the lowest voxel of a block.
     Eigen::Vector3i origin(std::size_t b) const { return block * blocks_[b].place; }
-    // Of each voxel of a block the nearest triangle, and how far that is, in voxels: -1 and half_width where all are
-    // beyond the band. Of equally near ones the first.
+    // Computes, for each voxel of a block, the nearest triangle (the first one in a tie) and its distance in voxels. A
+    // voxel beyond the band gets -1 and half_width.
     void measure(std::size_t b, std::span<float, voxels> distance, std::span<std::int32_t, voxels> nearest) const;
 
 private:

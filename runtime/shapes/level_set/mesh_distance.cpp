@@ -1,9 +1,9 @@
-// The signed distance from a mesh, on a grid.
+// The signed distance from a mesh, as an OpenVDB grid.
 //
-// In a narrow band it is measured (mesh_blocks.h), and faces inside are left out here. The voxels of a wide one have
-// too many triangles about them to ask each: there the distance is OpenVDB's, whose triangle may be the wrong one
-// beyond two voxels (by up to 0.7 of a voxel), corrected to a thousandth of a voxel. The sign is that of the winding
-// number. A mesh without one has OpenVDB's distances and signs.
+// A narrow band is measured exactly (mesh_blocks.h); this file removes faces inside from it. In a wide band every voxel
+// would have too many triangles to test. It uses OpenVDB's distance, whose triangle may be the wrong one beyond two
+// voxels (error up to 0.7 voxels), and corrects it to a thousandth of a voxel. The sign comes from the winding number.
+// A mesh that has none gets OpenVDB's distances and signs.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ constexpr std::int32_t no_triangle = -1;
 
 Vec3d center(const Coord& voxel) { return {double(voxel.x()), double(voxel.y()), double(voxel.z())}; }
 
-// A mesh in voxels.
+// A mesh in voxel units.
 struct InVoxels {
     MeshPtr mesh;
 
@@ -73,11 +73,11 @@ FloatGrid::Ptr by_openvdb(const Mesh& mesh, const openvdb::math::Transform& tran
     return openvdb::tools::meshToVolume<FloatGrid>(never, adapter, transform, voxels, voxels, flags, nearest);
 }
 
-// A narrow band: the distance of each voxel, at first without a sign, and its nearest triangle.
+// A narrow band: the distance of each voxel, initially unsigned, and its nearest triangle.
 struct Band {
     FloatGrid::Ptr distance;
     Int32Grid::Ptr nearest;
-    std::vector<Leaf*> leaves;  // of the distances
+    std::vector<Leaf*> leaves;  // leaves of the distances
     double voxel;
 
     Band(FloatGrid::Ptr distances, Int32Grid::Ptr triangles)
@@ -107,14 +107,14 @@ Band measured_band(const MeshBlocks& measured)
     return {tree_of(blocks), nearest};
 }
 
-// A better distance (m) of a voxel, and its triangle.
+// A shorter distance (m) of a voxel, and its triangle.
 struct Update {
     Coord voxel;
     float distance;
     std::int32_t nearest;
 };
 
-// The 26 neighbours of a voxel, or the six across its faces alone, and their distances, in voxels.
+// Calls f for the 26 neighbours of a voxel, or only the six across its faces, with their distances in voxels.
 template <class F>
 void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
 {
@@ -128,8 +128,8 @@ void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
 }
 
 // Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the updates,
-// and repeats it around the voxels that have changed, until there are none. A voxel depends on the previous round
-// alone, never on an order. Distances only shrink.
+// and repeats around the changed voxels until nothing changes. A voxel depends only on the previous round, so the
+// result is independent of the order. Distances only shrink.
 template <class Improve>
 void improve_until_done(Band& band, const Improve& improve)
 {
@@ -171,8 +171,8 @@ void improve_until_done(Band& band, const Improve& improve)
     band.find_leaves();
 }
 
-// A voxel takes the triangle of a neighbour nearer to the mesh if that is nearer to it too, and voxels missing from the
-// band are added to it.
+// Gives a voxel the triangle of a neighbour if that is nearer than its own, and adds missing voxels to the band. Only
+// neighbours nearer to the mesh are considered.
 void shorten_distances(Band& band, const InVoxels& mesh)
 {
     std::vector<Prism> prisms;
@@ -181,11 +181,11 @@ void shorten_distances(Band& band, const InVoxels& mesh)
         const auto triangle = static_cast<std::int32_t>(t);
         prisms.emplace_back(mesh.corner(triangle, 0), mesh.corner(triangle, 1), mesh.corner(triangle, 2));
     }
-    // m: the least improvement. Half of it would end the rounds, and the rounding to single precision is 1e-6 of a
-    // voxel.
+    // The least improvement that counts, m. The rounding to single precision is 1e-6 of a voxel, and half the
+    // improvement would still end the rounds.
     const double worth = 1e-3 * band.voxel;
-    // m: OpenVDB tests each triangle against the voxels within √3/2 of it and all their neighbours, so nearer ones are
-    // right.
+    // OpenVDB tests each triangle against the voxels within √3/2 of it and all their neighbours, so distances below
+    // this (m) are exact.
     const double exact = 1.5 * band.voxel;
     const double half_width = band.distance->background();
     improve_until_done(band, [&](const Coord& voxel, double phi, const Accessor& accessor,
@@ -224,7 +224,7 @@ Band corrected_band(const InVoxels& mesh, const openvdb::math::Transform& transf
     return band;
 }
 
-// Returns whether any faces lie inside.
+// Returns true if any faces lie inside.
 bool sign_by_windings(Band& band, const RayCrossings& faces)
 {
     std::atomic<bool> overlap = false;
@@ -239,14 +239,14 @@ bool sign_by_windings(Band& band, const RayCrossings& faces)
     return overlap;
 }
 
-// Where pieces of a mesh overlap, the faces inside are no surface: voxels with such a nearest face take the nearest
-// other one, from their neighbours, or lie deeper than the band.
+// Removes the influence of faces inside a mesh of overlapping pieces, which are not part of the surface: voxels whose
+// nearest face is such a face take the nearest surface face from their neighbours, or count as deeper than the band.
 void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& faces)
 {
-    // Seen from inside, the nearest point of a face is on the surface if it is outside just behind it; for a voxel on
-    // the face, on either side of it.
+    // Seen from inside, the nearest point of a face is on the surface if the position just past it is outside. For a
+    // voxel on the face itself, either side may be outside.
     const auto is_surface = [&](std::int32_t triangle, const Coord& voxel) {
-        constexpr double behind = 1e-3;  // voxels; the positions have about 1e-4
+        constexpr double behind = 1e-3;  // voxels; positions have an error of about 1e-4
         const auto outside = [&](const Vec3d& P) { return faces.from(P).windings == 0; };
         const Vec3d there = mesh.nearest_on(triangle, voxel), to_face = there - center(voxel);
         if (to_face.norm() > behind) return outside(there + to_face * (behind / to_face.norm()));

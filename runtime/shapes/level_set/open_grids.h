@@ -1,4 +1,5 @@
-// Vector grids and fogs on OpenVDB grids. Includes OpenVDB; vector_grid.h and density_grid.h are enough for queries.
+// Vector grids and fogs backed by OpenVDB grids. Includes OpenVDB; vector_grid.h and density_grid.h are enough for
+// queries.
 #pragma once
 
 #include <openvdb/tools/Interpolation.h>
@@ -11,15 +12,15 @@
 
 namespace rapid {
 
-// Trilinear between the centres of voxels. from(value): what a value of the grid is to the caller.
+// Samples a grid, trilinear between voxel centres. from(value): converts a value of the grid for the caller.
 template <class Sampler, class Grid, class Value, class From>
 void sample_grid(const Grid& grid, std::span<const Vec3d> P, std::span<Value> values, const From& from)
 {
-    // Not registered with the tree, which would lock it for each batch.
+    // Not registered with the tree: registration would lock it for each batch.
     openvdb::tree::ValueAccessor<const typename Grid::TreeType, /*IsSafe=*/false> accessor(grid.tree());
     for (std::size_t i = 0; i < P.size(); ++i) {
         const openvdb::Vec3d at = grid.transform().worldToIndex({P[i].x(), P[i].y(), P[i].z()});
-        // Voxels have 32-bit coordinates; there are none farther out.
+        // Voxel coordinates have 32 bits, so no voxels lie farther out.
         constexpr double farthest = 1 << 30;
         typename Grid::ValueType value = grid.background();
         if (std::abs(at.x()) < farthest && std::abs(at.y()) < farthest && std::abs(at.z()) < farthest)
@@ -46,7 +47,7 @@ private:
     openvdb::Vec3SGrid::ConstPtr grid_;
 };
 
-// Error, before it is made: a density below 0, or of 0 everywhere.
+// Throws Error, before anything is created, if a density is negative or all are 0.
 ScatterPtr scatter_in_fog(const openvdb::FloatGrid& grid);
 
 class OpenDensityGrid final : public DensityGrid {

@@ -1,4 +1,4 @@
-// OpenVDB's distance from a mesh, without a tree that its header compiles in each file and that nobody here uses.
+// OpenVDB's mesh distance, without a tree type that its header would compile in each file and that is unused here.
 #pragma once
 
 #include <openvdb/tools/MeshToVolume.h>

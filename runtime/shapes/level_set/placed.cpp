@@ -54,7 +54,7 @@ Box3d PlacedOf<Base>::bounds() const
 template <class Base>
 void PlacedOf<Base>::distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const
 {
-    // Kernels query point by point, which must not allocate.
+    // Uses a fixed buffer: kernels query point by point and must not allocate.
     std::array<Vec3d, 64> X;
     for (std::size_t begin = 0; begin < P.size(); begin += X.size()) {
         const std::size_t n = std::min(X.size(), P.size() - begin);
@@ -119,7 +119,7 @@ void PlacedLevelSet::write(const std::filesystem::path& path, const std::string&
 
 ShapePtr placed(const ShapePtr& rest, const Pose& pose)
 {
-    constexpr int most = 1000;  // each asks the one that it moves, on the stack
+    constexpr int most = 1000;  // each level calls the next one on the stack
     int moves = 1;
     for (const Shape* shape = rest.get(); const auto* outer = dynamic_cast<const PlacedOf<Shape>*>(shape); ++moves)
         shape = outer->rest().get();

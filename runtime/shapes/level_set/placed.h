@@ -1,6 +1,6 @@
-// Shapes with a pose, queried in their rest frame: a rotated shape is not rebuilt.
+// Shapes with a pose, queried in their rest frame, so that a rotated shape is not rebuilt.
 //
-// A pose keeps angles, so paths stay parabolas and contacts are those of the rest shape.
+// A pose preserves angles, so paths stay parabolas and contacts are those of the rest shape.
 #pragma once
 
 #include <span>
@@ -50,10 +50,10 @@ public:
     void write(const std::filesystem::path& path, const std::string& grid) const override;
 };
 
-// The box around a moved box. An infinite one is infinite along all axes once it is rotated.
+// Returns the bounds of a moved box. An infinite box becomes infinite along all axes if it is rotated.
 Box3d moved(const Pose& pose, const Box3d& box);
 
-// A shape, other than a level set (see level_set_tools.h), moved by a pose.
+// Moves a shape that is not a level set (for those see level_set_tools.h) by a pose.
 ShapePtr placed(const ShapePtr& rest, const Pose& pose);
 
 }  // namespace rapid

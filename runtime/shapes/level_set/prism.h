@@ -1,4 +1,4 @@
-// A bound of the distance to a triangle.
+// A lower bound on the distance to a triangle.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// The plane of a triangle and those through its edges perpendicular to it: a bound of the distance in a few
-// multiplications. Beside an edge it is the distance, past a corner less.
+// The plane of a triangle and the planes through its edges perpendicular to it. They bound the distance with a few
+// multiplications. The bound is exact next to an edge and too small past a corner.
 class Prism {
 public:
     Prism(const Vec3d& a, const Vec3d& b, const Vec3d& c)
@@ -21,7 +21,7 @@ public:
         }
     }
 
-    // The square of a lower bound on the distance.
+    // Returns the square of a lower bound on the distance.
     double square_at_least(const Vec3d& P) const
     {
         const double h = up_.dot(P) - height_;
@@ -31,7 +31,7 @@ public:
     }
 
 private:
-    Vec3d up_, outward_[3];  // unit; zero where the triangle has no area
+    Vec3d up_, outward_[3];  // unit vectors; zero if the triangle has no area
     double height_, edge_[3];
 };
 

@@ -9,8 +9,8 @@
 namespace rapid {
 namespace {
 
-// Positions on the extracted mesh, moved along the gradient to where the field is zero: the mesh is flat between its
-// vertices, and up to voxel² / (8 radius) off.
+// Positions on the extracted mesh, moved along the gradient to the zero crossing of the field. The mesh is flat between
+// its vertices, with an error of up to voxel² / (8 radius).
 class ScatterOnLevelSet final : public Scatter {
 public:
     ScatterOnLevelSet(std::shared_ptr<const BakedGrid> grid, const MeshPtr& surface)
@@ -20,7 +20,8 @@ public:
 
     void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
     {
-        // Newton's method along the gradient. The field is nearly affine there: one or two steps, more only at creases.
+        // Newton's method along the gradient. The field is nearly affine there: one or two steps suffice, except at
+        // creases.
         constexpr int most_steps = 8;
         const double near = 1e-6 * grid_->voxel;  // m
         on_mesh_->place(key, first, out);
@@ -30,7 +31,7 @@ public:
             double phi = sampler.distance(P, gradient);
             for (int i = 0; i < most_steps && std::abs(phi) > near && gradient.squaredNorm() > 0; ++i) {
                 const Vec3d step = phi / gradient.squaredNorm() * gradient;
-                P -= step * std::min(1.0, grid_->voxel / step.norm());  // no farther than a voxel
+                P -= step * std::min(1.0, grid_->voxel / step.norm());  // at most one voxel
                 phi = sampler.distance(P, gradient);
             }
             birth.P = P.cast<float>();

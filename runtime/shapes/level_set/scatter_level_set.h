@@ -1,4 +1,4 @@
-// Births on and in a level set.
+// Birth positions on and in a level set.
 #pragma once
 
 #include "runtime/shapes/scatter/scatter.h"
@@ -7,7 +7,8 @@ namespace rapid {
 
 struct BakedGrid;
 
-// On `surface`, the zero crossing as a mesh, moved onto that of the field; a birth's element is -1.
+// Samples `surface`, the zero crossing as a mesh, and moves the positions onto the zero crossing of the field. Every
+// birth has the element -1.
 ScatterPtr scatter_on_surface(std::shared_ptr<const BakedGrid> grid, const MeshPtr& surface);
 ScatterPtr scatter_in_volume(std::shared_ptr<const BakedGrid> grid);
 

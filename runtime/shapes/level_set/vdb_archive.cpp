@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// As openvdb::io::File writes, to a stream.
+// Writes the format of openvdb::io::File to a stream.
 class Archive : public openvdb::io::Archive {
 public:
     void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const

@@ -1,4 +1,4 @@
-// Grids to .vdb files that get their names only when they are complete.
+// Writes grids to .vdb files, which get their names only when they are complete.
 #pragma once
 
 #include <filesystem>

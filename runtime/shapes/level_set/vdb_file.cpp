@@ -20,7 +20,7 @@ namespace vdb = openvdb;
 using vdb::GridBase;
 using vdb::io::GridDescriptor;
 
-// The first version that was published, and the first one with Blosc.
+// The first published version, and the first one with Blosc.
 constexpr std::uint32_t first_version = 220, first_packed_version = 223;
 
 class MemoryBuffer final : public std::streambuf {
@@ -46,7 +46,7 @@ protected:
     }
 };
 
-// Calls f, in which the stream throws at the end of the file.
+// Calls f. The stream throws at the end of the file.
 template <class F>
 auto read_checked(const F& f)
 {
@@ -99,7 +99,7 @@ private:
         metadata.readMeta(stream_);
     }
 
-    // Reads the descriptor of the next grid, and all of the grid if the file has no offsets.
+    // Reads the descriptor of the next grid, or the whole grid if the file has no offsets.
     void add_grid()
     {
         GridDescriptor descriptor;

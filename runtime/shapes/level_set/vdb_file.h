@@ -15,7 +15,7 @@ namespace rapid {
 class VdbFile {
 public:
     // Reads everything but the values of the grids. Throws Error if the file is cut or damaged, and openvdb::Exception
-    // if OpenVDB does not know what it holds.
+    // if OpenVDB does not know its contents.
     explicit VdbFile(const std::filesystem::path& path);
     ~VdbFile();
 

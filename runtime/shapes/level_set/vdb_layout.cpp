@@ -24,7 +24,7 @@ std::size_t bits_in(std::span<const unsigned char> mask)
     return count;
 }
 
-// Checks values that are packed together, or not packed.
+// Checks values that are stored together, packed or not.
 void check_data(VdbCursor& cursor, const VdbValues& values, std::size_t count)
 {
     const bool is_half = values.stored_bytes < values.bytes;
@@ -33,15 +33,15 @@ void check_data(VdbCursor& cursor, const VdbValues& values, std::size_t count)
     const bool has_blosc = (values.compression & openvdb::io::COMPRESS_BLOSC) != 0;
     if (!has_blosc && (values.compression & openvdb::io::COMPRESS_ZIP) == 0) return cursor.skip(unpacked);
     const auto packed = cursor.take<std::int64_t>();
-    if (packed <= 0) {  // the negative size of what could not be made smaller
+    if (packed <= 0) {  // the negated size of data that did not compress
         if (std::uint64_t{0} - static_cast<std::uint64_t>(packed) != unpacked) throw damaged_vdb();
         return cursor.skip(unpacked);
     }
     const auto chunk = cursor.bytes(static_cast<std::uint64_t>(packed));
-    if (has_blosc) check_packed(chunk, unpacked, Padding::None);  // zlib knows both sizes
+    if (has_blosc) check_packed(chunk, unpacked, Padding::None);  // zlib checks both sizes itself
 }
 
-// Checks the values of a node. Inactive ones are left out if they have at most two different values
+// Checks the values of a node. Inactive values are not stored if they have at most two different values
 // (openvdb::io::readCompressedValues).
 void check_values(VdbCursor& cursor, const VdbValues& values, std::size_t log2, std::size_t active)
 {
@@ -68,13 +68,13 @@ void check_node(VdbCursor& cursor, const VdbValues& values, std::size_t log2, st
     for (std::size_t child = 0; child < children; ++child) check_node(cursor, values, log2 - 1, active);
 }
 
-// Checks openvdb::io::DelayedLoadMetadata, which has a byte for each leaf and, if values are packed, the size of the
-// leaf's. Each array comes after its packed size, which is 0 if it is not packed.
+// Checks openvdb::io::DelayedLoadMetadata, which has a byte per leaf and, if values are packed, the size of the leaf's
+// values. Each array follows its packed size, which is 0 if it is not packed.
 void check_delayed_load(VdbCursor& cursor, std::uint32_t size)
 {
     if (size == 0) return;
     const auto leaves = cursor.take<std::uint32_t>();
-    std::uint64_t counted = 3 * sizeof size;  // as OpenVDB counts, to know whether anything follows
+    std::uint64_t counted = 3 * sizeof size;  // as OpenVDB counts it, to decide whether more follows
     const auto check_array = [&](std::uint32_t packed, std::uint64_t unpacked) {
         const auto chunk = cursor.bytes(packed > 0 ? packed : unpacked);
         if (packed > 0) check_packed(chunk, unpacked, Padding::To128);
@@ -92,7 +92,7 @@ void check_delayed_load(VdbCursor& cursor, std::uint32_t size)
 void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, Padding padding)
 {
     constexpr std::size_t padded_bytes = 128;
-    std::size_t known = 0;  // by the chunk's own header
+    std::size_t known = 0;  // from the chunk's own header
     if (blosc_cbuffer_validate(chunk.data(), chunk.size(), &known) != 0) throw damaged_vdb();
     const bool is_padded = padding == Padding::To128 && known == padded_bytes && unpacked <= padded_bytes;
     if (known != unpacked && !is_padded) throw damaged_vdb();
@@ -101,14 +101,14 @@ void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, 
 void check_metadata(VdbCursor& cursor)
 {
     for (auto left = cursor.take<std::uint32_t>(); left > 0; --left) {
-        cursor.text();  // its name
+        cursor.text();  // name
         const std::string type = cursor.text();
         const auto size = cursor.take<std::uint32_t>();
         if (type == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
             check_delayed_load(cursor, size);
             continue;
         }
-        // OpenVDB reads as many bytes as the type has, whatever the size.
+        // OpenVDB reads the size of the type, whatever the stated size.
         const bool has_own_size =
             openvdb::Metadata::isRegisteredType(type) && type != openvdb::StringMetadata::staticTypeName();
         if (has_own_size && openvdb::Metadata::createMetadata(type)->size() != size) throw damaged_vdb();
@@ -119,17 +119,17 @@ void check_metadata(VdbCursor& cursor)
 std::vector<std::uint16_t> check_topology(VdbCursor& cursor, const VdbValues& values)
 {
     using Origin = std::array<std::int32_t, 3>;
-    cursor.skip(sizeof(std::int32_t));  // the number of buffers, which no longer matters
-    cursor.skip(values.bytes);          // the background
+    cursor.skip(sizeof(std::int32_t));  // number of buffers, now unused
+    cursor.skip(values.bytes);          // background
     const auto tiles = cursor.take<std::uint32_t>(), children = cursor.take<std::uint32_t>();
     for (std::uint32_t tile = 0; tile < tiles; ++tile) {
         cursor.skip(sizeof(Origin) + values.bytes);
-        if (cursor.take<std::uint8_t>() > 1) throw damaged_vdb();  // whether it is active
+        if (cursor.take<std::uint8_t>() > 1) throw damaged_vdb();  // active flag
     }
     std::vector<std::uint16_t> active;
     Origin before;
     for (std::uint32_t child = 0; child < children; ++child) {
-        // OpenVDB sorts the children, and reads the leaves in that order.
+        // OpenVDB sorts the children and reads the leaves in that order.
         const auto origin = cursor.take<Origin>();
         if (child > 0 && origin <= before) throw damaged_vdb();
         before = origin;
@@ -141,7 +141,7 @@ std::vector<std::uint16_t> check_topology(VdbCursor& cursor, const VdbValues& va
 void check_voxels(VdbCursor& cursor, const VdbValues& values, std::span<const std::uint16_t> active)
 {
     for (const std::uint16_t count : active) {
-        cursor.skip(mask_bytes(leaf_log2));  // again
+        cursor.skip(mask_bytes(leaf_log2));  // mask, repeated
         check_values(cursor, values, leaf_log2, count);
     }
 }

@@ -1,10 +1,10 @@
 // Checks the sizes in a .vdb file on which OpenVDB relies.
 //
-// OpenVDB passes compressed data to Blosc, which reads as far as the header of the data says, and fills arrays as far
-// as the file says. A damaged size would therefore yield values from memory that was never written. These functions
-// walk over a grid without unpacking it and compare every size with the data that it describes.
+// OpenVDB passes compressed data to Blosc, which reads as far as the header of the data says, and fills arrays to the
+// length that the file says. A damaged size would therefore yield uninitialised memory as values. These functions walk
+// over a grid without unpacking it and compare every size with the data that it describes.
 //
-// They know the format versions 223 and 224. Older files have neither Blosc nor points; a stream that throws
+// They know the format versions 223 and 224. Older files have neither Blosc nor points, so a stream that throws
 // (vdb_file.h) is enough for them.
 #pragma once
 
@@ -19,10 +19,10 @@
 
 namespace rapid {
 
-// The error of a file that ends too early or contradicts itself.
+// Returns the error for a file that ends too early or contradicts itself.
 inline Error damaged_vdb() { return Error("can't be read: it is cut or damaged"); }
 
-// A position in the file. Every function throws Error if the file ends before.
+// A position in the file. Every function throws Error if it would read past the end of the file.
 class VdbCursor {
 public:
     VdbCursor(std::span<const unsigned char> file, std::size_t at) : file_(file), at_(at) {}
@@ -42,7 +42,7 @@ public:
         std::memcpy(&value, bytes(sizeof value).data(), sizeof value);
         return value;
     }
-    // A string after its length.
+    // Returns a string, which is stored after its length.
     std::string text()
     {
         const auto taken = bytes(take<std::uint32_t>());
@@ -56,12 +56,12 @@ private:
 
 // How the values of a grid are stored.
 struct VdbValues {
-    std::size_t bytes = 0;          // of a value in memory
-    std::size_t stored_bytes = 0;   // of a value in the file: half of it in 16-bit grids
+    std::size_t bytes = 0;          // per value in memory
+    std::size_t stored_bytes = 0;   // per value in the file: half of `bytes` in 16-bit grids
     std::uint32_t compression = 0;  // OpenVDB's flags (openvdb/io/Compression.h)
 };
 
-// Checks a chunk that Blosc has packed against its size when unpacked. Grids of points pad shorter data to 128 bytes.
+// Checks that a Blosc chunk unpacks to the expected size. Point grids pad shorter data to 128 bytes.
 enum class Padding { None, To128 };
 void check_packed(std::span<const unsigned char> chunk, std::uint64_t unpacked, Padding padding);
 

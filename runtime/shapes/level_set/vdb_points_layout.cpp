@@ -1,7 +1,7 @@
 // Checks the attributes of a grid of points (openvdb::points::PointDataLeafNode::readBuffers).
 //
-// They are stored in passes over the leaves: sizes, descriptors and arrays' metadata, the headers of each attribute's
-// pages, voxels, then the pages. A page holds the arrays of one attribute of several leaves.
+// They are stored in passes over the leaves: sizes, descriptors and array metadata, page headers of each attribute,
+// voxels, then the pages. A page holds the arrays of one attribute of several leaves.
 #include <openvdb/io/Compression.h>
 #include <openvdb/points/AttributeArray.h>
 
@@ -19,11 +19,11 @@ constexpr std::size_t voxels_of_leaf = 512;
 // One attribute of one leaf.
 struct StoredArray {
     std::uint64_t bytes = 0;     // as the file says
-    std::uint64_t expected = 0;  // by its type and number of values
+    std::uint64_t expected = 0;  // from its type and number of values
     bool is_paged = false, is_uniform = false;
 };
 
-// The attributes of a leaf, by the bytes that a stored value of each takes. All leaves usually share one list.
+// The attributes of a leaf: bytes of a stored value of each. All leaves usually share one list.
 using Descriptor = std::vector<std::size_t>;
 
 Descriptor take_descriptor(VdbCursor& cursor)
@@ -37,7 +37,7 @@ Descriptor take_descriptor(VdbCursor& cursor)
         value_bytes.push_back(AttributeArray::create({type, codec}, 1)->storageTypeSize());
     }
     for (std::uint64_t a = 0; a < attributes; ++a) {
-        cursor.text();  // the name
+        cursor.text();  // name
         if (cursor.take<std::uint64_t>() >= attributes) throw damaged_vdb();
     }
     for (auto groups = cursor.take<std::uint64_t>(); groups > 0; --groups) {
@@ -52,7 +52,7 @@ StoredArray take_array(VdbCursor& cursor, std::size_t value_bytes)
 {
     enum : std::uint8_t { Strided = 1, Uniform = 2, Paged = 8 };
     constexpr std::uint8_t constant_stride = 0x8;
-    // The size of the array counts what OpenVDB once wrote after it.
+    // The stated size of an array includes fields that OpenVDB once wrote after it.
     constexpr std::uint64_t counted = sizeof(std::uint16_t) + sizeof(std::uint32_t);
     const auto bytes = cursor.take<std::uint64_t>();
     const auto flags = cursor.take<std::uint8_t>(), stored = cursor.take<std::uint8_t>();
@@ -72,10 +72,10 @@ public:
     {
         const auto passes = cursor_.take<std::uint16_t>();
         if (leaves_.empty()) return;
-        // A pass for sizes, one for metadata, one for voxels and one to clean up; two for each attribute.
+        // One pass each for sizes, metadata, voxels and cleanup, and two for each attribute.
         if (passes < 4 || passes % 2 != 0) throw damaged_vdb();
         attributes_ = (passes - 4u) / 2;
-        cursor_.skip(leaves_.size() * sizeof(std::uint16_t));  // the packed sizes of voxels, which come again
+        cursor_.skip(leaves_.size() * sizeof(std::uint16_t));  // packed sizes of the voxels, which are repeated later
         take_metadata();
         std::vector<std::vector<Page>> pages;
         for (std::size_t a = 0; a < attributes_; ++a) pages.push_back(take_pages(a));
@@ -102,7 +102,7 @@ private:
                 if ((header & Skipped) != 0) cursor_.skip(cursor_.take<std::uint64_t>());
                 is_shared = (header & Shared) != 0;
             }
-            if (descriptor.size() > attributes_) throw damaged_vdb();  // OpenVDB would leave arrays without values
+            if (descriptor.size() > attributes_) throw damaged_vdb();  // OpenVDB would leave arrays uninitialised
             for (const std::size_t value_bytes : descriptor) arrays.push_back(take_array(cursor_, value_bytes));
         }
     }
@@ -137,13 +137,13 @@ private:
         return pages;
     }
 
-    // Checks the voxels of each leaf, which hold the index after their last point.
+    // Checks the voxels of each leaf. Each holds the index past its last point.
     void check_voxels()
     {
         constexpr std::uint16_t not_packed = 0xffff;
         constexpr std::uint64_t unpacked = voxels_of_leaf * sizeof(std::uint32_t);
         for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
-            cursor_.skip(voxels_of_leaf / 8);  // its mask, again
+            cursor_.skip(voxels_of_leaf / 8);  // mask, repeated
             if (const auto packed = cursor_.take<std::uint16_t>(); packed == not_packed)
                 cursor_.skip(unpacked);
             else
@@ -169,7 +169,7 @@ private:
         });
     }
 
-    // Checks an array that is in no page.
+    // Checks an array that is not in a page.
     void check_single(const StoredArray& array)
     {
         const bool is_packed = !array.is_uniform && cursor_.take<std::uint8_t>() == 1;

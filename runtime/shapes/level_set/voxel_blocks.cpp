@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// The numbers of the blocks in the box around them, or the side of the surface where there is none.
+// The indices of the blocks within their bounding box. Positions without a block have the side of the surface instead.
 class Around {
 public:
     explicit Around(const VoxelBlocks& blocks)
@@ -32,7 +32,7 @@ public:
     }
 
     const Eigen::AlignedBox3i& box() const { return box_; }
-    // A block's number, or BakedGrid::outside or inside.
+    // Returns a block's index, or BakedGrid::outside or inside.
     std::int32_t operator[](const VoxelBlocks::Place& place) const
     {
         return box_.contains(place) ? index_[at(place)] : BakedGrid::outside;

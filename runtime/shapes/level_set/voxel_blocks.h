@@ -1,7 +1,7 @@
-// The narrow band of a level set as it is measured: the blocks of 8³ voxels that have some of it. A level set for
-// queries is baked from it, and OpenVDB's grid made (grid_on_demand.h).
+// The narrow band of a level set as it is measured: the blocks of 8³ voxels that contain parts of it. Both the level
+// set for queries and the OpenVDB grid (grid_on_demand.h) are built from it.
 //
-// Layout: by block, each shape [8, 8, 8], z fastest, as of OpenVDB's leaves.
+// Layout: one array per block, shape [8, 8, 8], z fastest, the same as OpenVDB's leaves.
 #pragma once
 
 #include <array>
@@ -16,15 +16,15 @@ namespace rapid {
 
 struct VoxelBlocks {
     static constexpr int edge = BakedGrid::block;
-    static constexpr std::size_t voxels = edge * edge * edge;  // of a block
+    static constexpr std::size_t voxels = edge * edge * edge;  // per block
     using Place = Eigen::Vector3i;                             // in blocks
-    using Flags = std::array<std::uint64_t, voxels / 64>;      // a bit a voxel
+    using Flags = std::array<std::uint64_t, voxels / 64>;      // one bit per voxel
 
     VoxelFrame frame;
     double half_width;           // m
-    std::vector<Place> places;   // each once
-    std::vector<float> values;   // m; the background, with the right sign, beyond the band
-    std::vector<Flags> in_band;  // the others are beyond it
+    std::vector<Place> places;   // distinct
+    std::vector<float> values;   // m; beyond the band, the background with the right sign
+    std::vector<Flags> in_band;  // voxels in the band
 
     std::size_t size() const { return places.size(); }
     float background() const { return static_cast<float>(half_width); }
@@ -35,9 +35,9 @@ struct VoxelBlocks {
     }
     std::uint64_t voxels_in_band() const;
 
-    // Space for so many blocks; their values and places are to be set.
+    // Makes space for that many blocks. The caller sets their values and places.
     void resize(std::size_t blocks);
-    // Leaves out the blocks without voxels in the band. moved(from, to): of a block that has.
+    // Removes the blocks without voxels in the band. Calls moved(from, to) for each other block whose index changes.
     template <class Moved>
     void drop_empty(const Moved& moved)
     {
@@ -56,8 +56,8 @@ private:
     void move_block(std::size_t from, std::size_t to);
 };
 
-// A copy for queries. Beyond the band is inside or outside by the blocks before, along z, as signs change only within
-// the band.
+// Bakes a copy for queries. Beyond the band, inside or outside follows from the preceding blocks along z, as signs
+// change only within the band.
 BakedGrid bake(const VoxelBlocks& blocks);
 
 }  // namespace rapid

@@ -4,7 +4,7 @@ namespace rapid {
 
 VoxelFrame frame_around(const Box3d& bounds, double voxel)
 {
-    // Beyond this the corners of a mesh, in single precision, would be off by more than 1/2048 of a voxel.
+    // Beyond this, mesh corners in single precision would have an error of more than 1/2048 of a voxel.
     constexpr double far = 16384;  // voxels
     VoxelFrame frame{voxel};
     const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff() / voxel;

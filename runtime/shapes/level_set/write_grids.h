@@ -1,4 +1,4 @@
-// Fogs and vector grids to .vdb files.
+// Writes fogs and vector grids to .vdb files.
 #pragma once
 
 #include <filesystem>
@@ -10,8 +10,8 @@
 
 namespace rapid {
 
-// Several grids in one file, each under its name. Error: an object that is neither a fog nor a vector grid, or is a
-// sequence of them; a full disk.
+// Writes several grids to one file, each under its name. Throws Error if an object is neither a fog nor a vector grid,
+// if it is a sequence of them, or if the disk is full.
 RAPID_DEFERRED(write_grids, void(const std::filesystem::path& path, const std::map<std::string, ObjectPtr>& grids));
 
 }  // namespace rapid

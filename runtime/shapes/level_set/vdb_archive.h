@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-// A grid under another name; the tree is shared. Error: an empty name.
+// Returns a grid under another name that shares the tree. Throws Error if the name is empty.
 template <class Grid>
 openvdb::GridBase::ConstPtr named_grid(const Grid& grid, const std::string& name)
 {
@@ -18,7 +18,7 @@ openvdb::GridBase::ConstPtr named_grid(const Grid& grid, const std::string& name
     return grid.copyGridReplacingMetadata(metadata);
 }
 
-// Error: the file, and what is wrong; a grid without a name.
+// Throws Error if the file cannot be written or a grid has no name.
 void write_archive(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids);
 
 }  // namespace rapid

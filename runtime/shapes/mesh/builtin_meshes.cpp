@@ -1,4 +1,4 @@
-// Meshes from a formula, or from given points and faces.
+// Meshes generated from a formula, or from given points and faces.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -20,7 +20,7 @@ void require_length(const char* mesh, const char* name, double value)
 
 void require_divisions(const char* mesh, int divisions, int least)
 {
-    // Two triangles a square of divisions: more would not fit 32-bit vertex numbers.
+    // Each square of divisions has two triangles: more divisions would overflow 32-bit vertex numbers.
     constexpr int most = 32000;
     if (divisions < least || divisions > most)
         throw Error(fmt::format("divisions of a mesh {} = {} is out of range; it must be from {} to {}", mesh,
@@ -35,8 +35,8 @@ void add_quad(Mesh& mesh, std::int32_t a, std::int32_t b, std::int32_t c, std::i
 
 }  // namespace
 
-// Rings of latitude from the north pole (+y) to the south pole, half as many as there are meridians. All vertices are
-// on the sphere, so the mesh is inside it.
+// Builds rings of latitude from the north pole (+y) to the south pole, half as many as there are meridians. All
+// vertices are on the sphere, so the mesh is inside it.
 MeshPtr make_sphere(double radius, int divisions, const Vec3d& center)
 {
     require_length("sphere", "radius", radius);
@@ -111,7 +111,7 @@ MeshPtr make_torus(double radius, double tube, int divisions, const Vec3d& cente
         throw Error(fmt::format("tube of a mesh torus = {:g} is out of range; it must be below its radius, {:g}", tube,
                                 radius));
 
-    // The tube's edges are about as long as the ring's, but never fewer than three.
+    // The tube's edges are about as long as the ring's, but there are at least three.
     const int around = divisions;
     const int across = std::max(3, static_cast<int>(std::lround(divisions * tube / radius)));
     auto mesh = std::make_shared<Mesh>();

@@ -24,7 +24,7 @@ constexpr std::uint32_t json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
 struct Component {
     int number;
     ScalarType type;
-    double largest;  // of a normalized one
+    double largest;  // the largest value, if normalized
 };
 constexpr Component components[] = {
     {5120, ScalarType::Int8, 127},     {5121, ScalarType::UInt8, 255},  {5122, ScalarType::Int16, 32767},
@@ -52,7 +52,7 @@ public:
         GltfAttributes all;
         const auto meshes = document_.find("meshes");
         if (meshes == document_.end()) return all;
-        for (const json& mesh : *meshes)  // not a copy: of lists within lists it would fill the stack
+        for (const json& mesh : *meshes)  // by reference: copying deeply nested lists would overflow the stack
             for (const json& primitive : mesh.at("primitives")) {
                 GltfAttributes::Primitive& one = all.primitives.emplace_back();
                 const json& named = primitive.at("attributes");
@@ -70,7 +70,7 @@ public:
     }
 
 private:
-    // The text of a binary file; its buffer is the first one.
+    // Returns the JSON text of a binary file and sets the first buffer.
     std::span<const unsigned char> take_chunks(std::span<const unsigned char> file)
     {
         constexpr std::size_t header = 12, head = 8;
@@ -106,7 +106,7 @@ private:
         return found->second;
     }
 
-    // Nothing for other than as many numbers or vectors of three as there are vertices, one after the other in a
+    // Returns the values, or nothing unless they are numbers or vectors of three, one per vertex, contiguous in a
     // buffer.
     std::optional<Mesh::VertexValues> values_of(const json& accessor, std::size_t vertices)
     {

@@ -1,4 +1,4 @@
-// The attributes of vertices that a glTF file names by itself (glTF 2.0, 3.7.2.1: _NAME), which Assimp does not read.
+// The custom vertex attributes of a glTF file (glTF 2.0, 3.7.2.1: _NAME), which Assimp does not read.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,13 @@ namespace rapid {
 struct GltfAttributes {
     struct Primitive {
         std::size_t vertices = 0;
-        std::map<std::string, Mesh::VertexValues> values;  // by what follows the _; each of shape [vertices]
+        std::map<std::string, Mesh::VertexValues> values;  // by NAME, without the _; each of shape [vertices]
     };
-    std::vector<Primitive> primitives;  // of the file's meshes, in its order
-    std::vector<std::string> left_out;  // attributes that are no numbers and no vectors of three
+    std::vector<Primitive> primitives;  // of all meshes, in file order
+    std::vector<std::string> left_out;  // attributes that are neither numbers nor vectors of three
 };
 
-// Of a .gltf with its buffers, or a .glb. Error: a number that leads out of the file.
+// Reads a .gltf with its buffers, or a .glb. Throws Error if an index or offset points outside the file.
 GltfAttributes read_gltf_attributes(const std::filesystem::path& path);
 
 }  // namespace rapid

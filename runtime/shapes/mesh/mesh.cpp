@@ -24,9 +24,9 @@ double Mesh::area() const
     return twice / 2;
 }
 
-// The sum over the faces of the tetrahedra (origin, a, b, c), by the divergence theorem. For a closed mesh any origin
-// gives the same; the centre of the bounds loses the fewest digits far from the world's origin, and makes the result
-// for an open mesh independent of its position.
+// Sums the tetrahedra (origin, a, b, c) over the faces (divergence theorem). For a closed mesh every origin gives the
+// same result. The centre of the bounds loses the fewest digits far from the world's origin, and makes the result for
+// an open mesh independent of its position.
 double Mesh::signed_volume() const
 {
     if (positions.empty()) return 0;
@@ -43,7 +43,7 @@ double Mesh::signed_volume() const
 
 Mesh::Openness Mesh::openness() const
 {
-    // An edge is its two vertices, lower first; the lowest bit is the direction of its face along it.
+    // An edge is a pair of vertices, lower index first, plus the direction of its face along it in the lowest bit.
     struct Side {
         std::uint64_t edge;
         bool forward;
@@ -84,7 +84,7 @@ void turn_normals(DetailedMesh::Values& values, const Eigen::Matrix3d& normal_ma
     }
 }
 
-// Of the second and third corner of each face.
+// Swaps the values of the second and third corner of each face.
 void swap_corners(DetailedMesh::Values& values)
 {
     for (auto& [name, any] : values)

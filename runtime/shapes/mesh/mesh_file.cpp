@@ -1,9 +1,8 @@
-// Meshes from files, by Assimp: OBJ, STL and glTF.
+// Reads meshes with Assimp: OBJ, STL and glTF.
 //
-// Vertex colours become Cd, and Alpha if any is not 1; normals N (of STL they are those of the faces, and are left
-// out); texture coordinates uv, and uv2, uv3, ...; _NAME of glTF is NAME; faces are in groups by the names of their
-// part, of the node that has it, and of their material. Skins, animations and morph targets, lights and cameras are
-// left out.
+// Vertex colours become Cd, and Alpha if any is not 1. Normals become N, except for STL, which only has face normals.
+// Texture coordinates become uv, uv2, uv3, ..., and _NAME in glTF becomes NAME. Faces are in groups named after their
+// part, the node that has it, and their material. Skins, animations, morph targets, lights and cameras are ignored.
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -34,7 +33,7 @@ T zero()
         return 0;
 }
 
-// A value of each corner, so far 0 for corners without one.
+// Appends a value per corner. Earlier corners without one get 0.
 template <class T>
 void append_list(const std::string& name, const std::vector<T>& list, std::size_t first, MeshFile& corners)
 {
@@ -67,7 +66,7 @@ void append_values(const aiMesh& part, const aiMatrix4x4& to_world, std::size_t 
     append("N", [&](unsigned i) { return (turn * part.mNormals[i]).NormalizeSafe(); });
 }
 
-// Of the triangles from `first` on.
+// Adds the triangles from `first` on to a group.
 void join_group(const std::string& name, std::size_t first, MeshFile& corners)
 {
     if (name.empty()) return;
@@ -76,7 +75,7 @@ void join_group(const std::string& name, std::size_t first, MeshFile& corners)
     members.resize(corners.triangles.size(), 1);
 }
 
-// The further attributes of each part, by its number.
+// The additional attributes of each part, by its index.
 using PartValues = std::vector<std::map<std::string, Mesh::VertexValues>>;
 
 void append(const aiScene& scene, unsigned number, const std::string& node, const aiMatrix4x4& to_world,
@@ -101,7 +100,7 @@ void append(const aiScene& scene, unsigned number, const std::string& node, cons
     const bool mirrored = to_world.Determinant() < 0;
     for (unsigned f = 0; f < part.mNumFaces; ++f) {
         const aiFace& face = part.mFaces[f];
-        if (face.mNumIndices != 3) continue;  // lines and points, which have no surface
+        if (face.mNumIndices != 3) continue;  // lines and points have no surface
         Mesh::Triangle t;
         for (int k = 0; k < 3; ++k) {
             if (face.mIndices[k] >= part.mNumVertices)
@@ -137,7 +136,7 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_pare
         append(scene, *node.mChildren[i], to_world, with_normals, values, corners);
 }
 
-// What is appended later has none of what comes before it.
+// Pads all lists to the current number of corners and triangles. Parts appended later do not inherit these values.
 void complete(MeshFile& corners)
 {
     const std::size_t n = corners.positions.size();
@@ -150,7 +149,7 @@ void complete(MeshFile& corners)
     for (auto& [name, members] : corners.face_groups) members.resize(corners.triangles.size(), 0);
 }
 
-// A glTF file names others, which are to be files as well: reading from a pipe might never end.
+// Accepts regular files only. A glTF file may refer to other files, and reading from a pipe might never end.
 class RegularFiles : public Assimp::DefaultIOSystem {
 public:
     Assimp::IOStream* Open(const char* file, const char* mode) override
@@ -160,7 +159,7 @@ public:
     }
 };
 
-// Of glTF the attributes that Assimp does not read, where its parts are the file's.
+// Returns the glTF attributes that Assimp does not read, if its parts match those of the file.
 PartValues further_values(const std::filesystem::path& path, const aiScene& scene, MeshFile& corners)
 {
     PartValues values;
@@ -198,7 +197,7 @@ MeshFile import(const std::filesystem::path& path)
 {
     check_text_end(path);
     Assimp::Importer importer;
-    importer.SetIOHandler(new RegularFiles);  // the importer's from here on
+    importer.SetIOHandler(new RegularFiles);  // owned by the importer
     const aiScene* scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
     if (!scene) refuse(importer);
     MeshFile corners;

@@ -10,10 +10,10 @@
 namespace rapid {
 namespace {
 
-// The spline of a frame and the jumps around it need six; two more carry over to the next frame.
+// The spline of a frame and the jumps around it need six meshes. Two more serve the next frame.
 constexpr std::size_t most_kept_meshes = 8;
 
-// Corners of one vertex may differ by this part of the mesh's size, by the rounding of an exporter.
+// Corners of one vertex may differ by this fraction of the mesh's size, because of an exporter's rounding.
 constexpr double same_corner = 1e-6;
 
 }  // namespace

@@ -1,7 +1,7 @@
-// A mesh that deforms: a file for each frame, all with the same faces between the same vertices.
+// A deforming mesh: one file per frame, all with the same vertices and faces in the same order.
 //
-// Beyond the first and the last frame goes what a FrameSequence says. A file is read when its frame is first needed,
-// and the few most recent ones are kept.
+// FrameSequence determines the mesh beyond the first and last frame. Files are read when first needed, and the most
+// recent few stay cached.
 #pragma once
 
 #include <cstdint>
@@ -20,22 +20,21 @@ namespace rapid {
 
 class MeshSequence {
 public:
-    // Reads the first file. `name`: the pattern, for messages. Error: no files, a frame missing between others, and
-    // what read_mesh throws.
-    // order: of the frames; its first and last are those of the files, whatever they were.
+    // Reads the first file. `name`: the pattern, for messages. order: first and last are replaced by those of the
+    // files. Throws Error if there are no files, if a frame is missing in between, or if read_mesh() does.
     MeshSequence(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order = {});
 
     const std::string& name() const { return name_; }
-    int first() const { return files_.begin()->first; }  // file
+    int first() const { return files_.begin()->first; }  // frame of the first file
     int last() const { return files_.rbegin()->first; }
     const FrameSequence& order() const { return order_; }
-    const MeshPtr& rest() const { return rest_; }  // the first file's
+    const MeshPtr& rest() const { return rest_; }  // mesh of the first file
 
-    // Whether there is a mesh at this frame.
+    // Returns true if the sequence has a mesh at this frame.
     bool has(std::int64_t frame) const { return order_.file_of(frame).has_value(); }
-    // The mesh of the file of this frame, with the faces of the first one; its values are its own. Where there is none,
-    // that of the nearest file. From any thread. Error: another number of vertices or faces than in the first file
-    // (with the frame and both counts).
+    // Returns the mesh of this frame, with the faces of the first file and its own values. If there is none, returns
+    // that of the nearest file. Thread-safe. Throws Error if the number of vertices or faces differs from the first
+    // file (the message has the frame and both counts).
     MeshPtr at(std::int64_t frame) const;
 
 private:
@@ -44,8 +43,8 @@ private:
     std::map<int, std::filesystem::path> files_;
     std::string name_;
     FrameSequence order_;
-    std::size_t corners_, faces_;          // of each file
-    std::vector<std::int32_t> vertex_of_;  // corners to vertices
+    std::size_t corners_, faces_;          // in each file
+    std::vector<std::int32_t> vertex_of_;  // maps corners to vertices
     MeshPtr rest_;
 
     mutable std::mutex mutex_;

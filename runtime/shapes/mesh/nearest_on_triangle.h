@@ -1,4 +1,4 @@
-// The place of a triangle that is nearest to a point.
+// The position on a triangle that is nearest to a point.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-// The weights of the corners b and c there (Ericson 2005, 5.1.5). Corners may be in one place.
+// Returns the weights of corners b and c at that position (Ericson 2005, 5.1.5). Corners may coincide.
 inline std::array<double, 2> nearest_weights(const Vec3d& P, const Vec3d& a, const Vec3d& b, const Vec3d& c)
 {
     const Vec3d ab = b - a, ac = c - a;

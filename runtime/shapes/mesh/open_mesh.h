@@ -1,9 +1,9 @@
-// Meshes with edges of one face, which enclose nothing.
+// Advice for meshes with boundary edges, which enclose no volume.
 #pragma once
 
 namespace rapid {
 
-// What messages advise.
+// Part of error messages.
 inline constexpr char how_to_close_a_mesh[] =
     "close it: a ground, by a copy of its outer edge lower down, faces between the two, and a bottom";
 

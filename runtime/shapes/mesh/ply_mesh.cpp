@@ -1,7 +1,7 @@
-// Meshes from PLY files: the element "vertex" with x y z and, where there are some, red green blue (alpha), and any
-// other number: nx ny nz is N, NAMEx NAMEy NAMEz a vec3, the others are floats; the element "face" with a list of
-// indices, vertex_indices or vertex_index, its numbers in the same way, and uchar group_NAME as a group of faces. Other
-// lists of faces, and other elements, are left out.
+// Reads meshes from PLY files. The element "vertex" has x y z, optionally red green blue (alpha), and any other
+// numbers: nx ny nz becomes N, NAMEx NAMEy NAMEz a vec3, the rest floats. The element "face" has a list of indices,
+// vertex_indices or vertex_index; its numbers are read in the same way, and uchar group_NAME is a group of faces. Other
+// lists of faces and other elements are ignored.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,10 +18,10 @@
 namespace rapid {
 namespace {
 
-// A column of the vertices, as floats; colours of integers are parts of the largest.
+// A column of the vertices, as floats. Integer colours are divided by the largest value of their type.
 class Property {
 public:
-    Property() = default;  // none
+    Property() = default;  // reads as missing
     Property(const PlyProperty& property, std::size_t offset, const PlyRecords& records, bool colour)
         : records_(&records), offset_(offset), type_(property.type)
     {
@@ -47,7 +47,7 @@ private:
     double scale_ = 1;
 };
 
-// Those of an element without lists, by their places in it.
+// The properties of an element without lists, by index.
 class Properties {
 public:
     Properties(const PlyElement& element, const PlyRecords& records) : element_(element), records_(records)
@@ -78,15 +78,15 @@ private:
     std::vector<std::size_t> offsets_;
 };
 
-// What is read apart from the others, or is none of a vertex alone.
+// Returns true for properties that are read separately.
 bool is_known(const std::string& name)
 {
     static const std::set<std::string> names = {"x", "y", "z", "red", "green", "blue", "alpha"};
     return names.count(name) != 0;
 }
 
-// The name of a vec3 whose components are this property and the two after it, NAMEx NAMEy NAMEz; nx ny nz is N. Empty
-// where they are none.
+// Returns the name of the vec3 whose components are this property and the next two, NAMEx NAMEy NAMEz; nx ny nz is N.
+// Empty if they do not form one.
 std::string vec3_name(const std::vector<PlyProperty>& properties, std::size_t at)
 {
     const std::string& first = properties[at].name;
@@ -145,12 +145,12 @@ void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
 
 constexpr std::string_view group_prefix = "group_";
 
-// What the faces have besides their corners, in the file's rows.
+// Reads the values of the faces, row by row.
 class FaceValues {
 public:
     FaceValues(const PlyElement& face, std::size_t indices, MeshFile& mesh) : mesh_(mesh)
     {
-        std::vector<PlyProperty> numbers;  // without lists, so that vectors are found among them
+        std::vector<PlyProperty> numbers;  // without lists, so that vectors are consecutive
         std::vector<std::size_t> places;
         for (std::size_t p = 0; p < face.properties.size(); ++p) {
             const PlyProperty& property = face.properties[p];
@@ -178,7 +178,7 @@ public:
         }
     }
 
-    // For each triangle of a row.
+    // Appends the values of the current row once per triangle.
     void append(const PlyFile& file, std::size_t triangles)
     {
         for (const Part& part : parts_) {
@@ -199,7 +199,7 @@ public:
 private:
     struct Part {
         Mesh::VertexValues* values;
-        std::vector<std::size_t> places;  // of properties
+        std::vector<std::size_t> places;  // property indices
         double scale;
     };
     void add(const std::string& name, std::vector<std::size_t> places, double scale)
@@ -233,7 +233,7 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
                 throw Error(fmt::format("face {} has the vertex {}; there are {}, from 0", row, corner, vertices));
             corners.push_back(static_cast<std::int32_t>(corner));
         }
-        // Of one or two corners it is a point or a line, which has no surface.
+        // A face with one or two corners is a point or a line and has no surface.
         const std::size_t before = mesh.triangles.size();
         if (corners.size() >= 3 && !cutter.append(mesh.positions, corners, mesh.triangles))
             throw Error(

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Twice the area, along the direction from which the corners are counter-clockwise (Newell).
+// Returns twice the area, along the direction from which the corners are counter-clockwise (Newell).
 Vec3d normal_of(std::span<const Vec3f> positions, std::span<const std::int32_t> corners)
 {
     Vec3d normal = Vec3d::Zero();
@@ -20,7 +20,8 @@ Vec3d normal_of(std::span<const Vec3f> positions, std::span<const std::int32_t> 
     return normal;
 }
 
-// Most polygons are. Of four corners that all turn left none is in the triangle of the others.
+// Returns true for a convex quad, the most common polygon. If all four corners turn left, none is in the triangle of
+// the others.
 bool is_convex_quad(std::span<const Vec3f> positions, std::span<const std::int32_t> corners)
 {
     if (corners.size() != 4) return false;
@@ -33,13 +34,13 @@ bool is_convex_quad(std::span<const Vec3f> positions, std::span<const std::int32
 
 }  // namespace
 
-// The corners in the plane, counter-clockwise. False where there is no area, or one is not finite.
+// Projects the corners to the plane, counter-clockwise. Returns false if the area is 0 or not finite.
 bool PolygonCutter::flatten(std::span<const Vec3f> positions, std::span<const std::int32_t> corners)
 {
     const Vec3d normal = normal_of(positions, corners);
     const double size = normal.norm();
     if (!(size > 0 && std::isfinite(size))) return false;
-    // Along the axes where the normal is along one: coordinates are then those of the file.
+    // If the normal is along an axis, the plane's axes are too, and coordinates are exactly those of the file.
     int least;
     normal.cwiseAbs().minCoeff(&least);
     const Vec3d x = Vec3d::Unit(least).cross(normal / size).normalized(), y = (normal / size).cross(x);
@@ -52,7 +53,7 @@ bool PolygonCutter::flatten(std::span<const Vec3f> positions, std::span<const st
     return true;
 }
 
-// Sorts the places [begin, end) so far that each box of the tree has corners that are near each other.
+// Sorts the range [begin, end) of order_ so that the corners in each box of the tree are near each other.
 void PolygonCutter::split(std::int32_t begin, std::int32_t end)
 {
     if (end - begin == leaf) return;
@@ -87,7 +88,7 @@ void PolygonCutter::fill_boxes()
         boxes_[k] = {boxes_[2 * k].box.merged(boxes_[2 * k + 1].box), boxes_[2 * k].left + boxes_[2 * k + 1].left};
 }
 
-// Twice the area of a triangle, positive where it is counter-clockwise.
+// Returns twice the area of a triangle, positive if it is counter-clockwise.
 double PolygonCutter::turn(std::int32_t a, std::int32_t b, std::int32_t c) const
 {
     const Eigen::Vector2d p = corners_[b].P - corners_[a].P, q = corners_[c].P - corners_[a].P;
@@ -103,7 +104,7 @@ bool PolygonCutter::is_in(std::int32_t corner, const Ear& ear) const
     return turn(before, at, corner) >= 0 && turn(at, after, corner) >= 0 && turn(after, before, corner) >= 0;
 }
 
-// False where all of a box is on the right of one of the triangle's edges, or beside its box.
+// Returns false if the box is completely to the right of an edge of the triangle, or does not meet its bounding box.
 bool PolygonCutter::meets(const Eigen::AlignedBox2d& box, const Ear& ear) const
 {
     if (!box.intersects(ear.box)) return false;
@@ -116,7 +117,7 @@ bool PolygonCutter::meets(const Eigen::AlignedBox2d& box, const Ear& ear) const
     return is_left(ear.before, ear.at) && is_left(ear.at, ear.after) && is_left(ear.after, ear.before);
 }
 
-// The first place of a corner in the triangle, of those [begin, end) of a box, from `from` on.
+// Returns the first index, at least `from`, of a corner in the triangle. [begin, end) is the range of the box `node`.
 std::int32_t PolygonCutter::first_in(const Ear& ear, std::int32_t from, std::int32_t node, std::int32_t begin,
                                      std::int32_t end)
 {
@@ -135,7 +136,8 @@ std::int32_t PolygonCutter::first_in(const Ear& ear, std::int32_t from, std::int
     return none;
 }
 
-// Or else it waits for the one that is in its triangle, or for a neighbour.
+// Returns true if the corner is an ear. Otherwise makes it wait, for a corner that lies in its triangle or for a
+// neighbour.
 bool PolygonCutter::is_ear(std::int32_t corner)
 {
     Corner& at = corners_[corner];
@@ -197,7 +199,7 @@ void PolygonCutter::cut_off(std::int32_t corner)
     while (at.first_waiting != none) make_ready(at.first_waiting);
     for (const std::int32_t neighbour : {at.before, at.after}) {
         corners_[neighbour].look_from = 0;
-        if (neighbour != 0) make_ready(neighbour);  // the first is never cut off
+        if (neighbour != 0) make_ready(neighbour);  // the first corner is never cut off
     }
 }
 
@@ -224,7 +226,7 @@ bool PolygonCutter::append(std::span<const Vec3f> positions, std::span<const std
         }
         if (looks_ > most_looks * corners.size()) return false;
     }
-    // A triangle; or it crosses itself, or has no area.
+    // The rest is a triangle, crosses itself, or has no area.
     for (std::int32_t i = corners_[0].after; corners_[i].after != 0; i = corners_[i].after)
         triangles.emplace_back(corners[0], corners[i], corners[corners_[i].after]);
     return true;

@@ -1,4 +1,4 @@
-// Polygons as triangles.
+// Splits polygons into triangles.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -10,38 +10,40 @@
 
 namespace rapid {
 
-// Cuts ears off a polygon: corners that turn left and whose triangle, with the two neighbours, holds no other corner.
+// Cuts ears off a polygon: corners that turn left and whose triangle with their two neighbours contains no other
+// corner.
 //
-// A corner in whose triangle another one is waits until that one is cut off: until then nothing but a neighbour that is
-// cut off makes it an ear. So each of at most 3 n triangles looks at each corner once, and boxes around neighbouring
-// corners leave out most of these: n log n for polygons as they are drawn, n^2 at worst, of which no more than
-// `most_looks` n are taken.
+// If a corner's triangle contains another corner, it waits until that corner is cut off; only cutting a neighbour can
+// make it an ear earlier. Each of at most 3 n triangles therefore tests each corner once, and a tree of boxes around
+// nearby corners skips most of the tests. This takes n log n for typical polygons and n^2 at worst, limited to
+// `most_looks` n.
 class PolygonCutter {
 public:
     static constexpr std::size_t most_corners = 1 << 20, most_looks = 1024;
 
-    // The triangles of a polygon of three corners or more, from its second corner on: a convex one becomes a fan about
-    // its first. It need not be convex, nor quite flat; what is left of one that crosses itself is a fan. The corners
-    // index `positions`. False: it has more than the most corners, or takes more than the most looks.
+    // Appends the triangles of a polygon with three or more corners, starting at its second corner, so that a convex
+    // polygon becomes a fan about its first. It need not be convex or exactly flat. The rest of a self-intersecting
+    // polygon becomes a fan. The corners index `positions`. Returns false if the polygon exceeds most_corners or takes
+    // more than most_looks per corner.
     bool append(std::span<const Vec3f> positions, std::span<const std::int32_t> corners,
                 std::vector<Mesh::Triangle>& triangles);
 
 private:
     static constexpr std::int32_t none = -1;
-    static constexpr std::int32_t leaf = 8;  // corners below a box that has no others below it
+    static constexpr std::int32_t leaf = 8;  // corners per leaf box
 
     struct Corner {
         Eigen::Vector2d P;  // in the plane of the polygon
         std::int32_t before, after;
-        std::int32_t place = 0;      // in order_
-        std::int32_t look_from = 0;  // corners at places before it are not in the triangle
+        std::int32_t place = 0;      // index in order_
+        std::int32_t look_from = 0;  // corners before this index in order_ are not in the triangle
         bool left = true, ready = true;
-        std::int32_t first_waiting = none;                            // for this one to be cut off
-        std::int32_t waits_for = none, previous = none, next = none;  // in the list of that one
+        std::int32_t first_waiting = none;  // head of the list of corners that wait for this one to be cut off
+        std::int32_t waits_for = none, previous = none, next = none;  // links of the list that this corner waits in
     };
     struct Box {
         Eigen::AlignedBox2d box;
-        std::int32_t left = 0;  // corners
+        std::int32_t left = 0;  // remaining corners
     };
     struct Ear {
         std::int32_t before, at, after;
@@ -63,10 +65,10 @@ private:
     std::int32_t take_ready();
 
     std::vector<Corner> corners_;
-    std::vector<std::int32_t> order_;  // corners by place: those below a box are near each other
-    std::vector<Box> boxes_;           // of a binary tree: those below [k] are [2 k] and [2 k + 1]
+    std::vector<std::int32_t> order_;  // corners sorted so that those in a box are near each other
+    std::vector<Box> boxes_;           // a binary tree: the children of [k] are [2 k] and [2 k + 1]
     std::int32_t first_leaf_ = 1;      // in boxes_
-    std::vector<std::int32_t> ready_;  // corners that may be ears, a heap with the first on top
+    std::vector<std::int32_t> ready_;  // heap of corners that may be ears, lowest index on top
     std::size_t looks_ = 0;
 };
 

@@ -6,9 +6,9 @@
 namespace rapid {
 namespace {
 
-// Whether a line along x at (y, z) meets the triangle: if, in that plane, a ray from there along +y crosses an odd
-// number of its sides. The crossing of a side is computed from its lower end to its upper one, so that both its faces
-// find the same to the bit.
+// Returns true if a line along x at (y, z) meets the triangle, that is, if in that plane a ray along +y crosses an odd
+// number of its sides. The crossing of a side is computed from its lower end to its upper one, so that both adjacent
+// faces get bit-identical results.
 bool meets(const Vec3d (&corners)[3], double y, double z)
 {
     bool within = false;
@@ -25,7 +25,7 @@ bool meets(const Vec3d (&corners)[3], double y, double z)
 
 RayCrossings::RayCrossings(MeshPtr mesh) : mesh_(std::move(mesh)), bounds_(mesh_->bounds().cast<double>())
 {
-    // About one triangle a bin if they are spread evenly.
+    // About one triangle per bin if they are evenly distributed.
     bins_ = std::clamp(static_cast<int>(std::sqrt(double(mesh_->triangles.size()))), 1, 2048);
     per_metre_ = Vec3d::Constant(bins_).cwiseQuotient(bounds_.sizes().cwiseMax(1e-30));
 
@@ -84,7 +84,7 @@ void RayCrossings::along_x(double y, double z, std::vector<Crossing>& crossings)
         const auto& [a, b, c] = corners;
         const Vec3d normal = (b - a).cross(c - a);
         const double x = a.x() - (normal.y() * (y - a.y()) + normal.z() * (z - a.z())) / normal.x();
-        // For a triangle seen edge-on, x is decided by rounding; it is at least between its corners.
+        // For a triangle seen edge-on, rounding decides x. The clamp keeps it between the corners.
         const double lowest = std::min({a.x(), b.x(), c.x()}), highest = std::max({a.x(), b.x(), c.x()});
         crossings.push_back({x >= lowest ? std::min(x, highest) : lowest, normal.x() > 0 ? 1 : -1, triangles_[i]});
     }

@@ -1,7 +1,7 @@
-// Winding numbers in a mesh, by the faces that a ray along +x crosses.
+// Winding numbers in a mesh, from the faces that a ray along +x crosses.
 //
-// A vertex or an edge on the ray belongs to exactly one of the faces around it, so that none is counted twice or
-// missed, whatever the origin.
+// A vertex or edge on the ray belongs to exactly one of the adjacent faces, so that none is counted twice or missed,
+// whatever the origin.
 #pragma once
 
 #include <vector>
@@ -15,16 +15,16 @@ public:
     explicit RayCrossings(MeshPtr mesh);
 
     struct Count {
-        int faces = 0;     // crossed: odd inside, if each edge of the mesh has an even number of faces
-        int windings = 0;  // the winding number: 0 outside, if each edge is balanced
+        int faces = 0;     // faces crossed; odd inside if every edge has an even number of faces
+        int windings = 0;  // winding number; 0 outside if every edge is balanced
     };
     Count from(const Vec3d& P) const;
 
-    // Of a whole line along x: the faces that it crosses, and by how much each changes the winding number towards lower
-    // x, in ascending order of x.
+    // Finds the crossings of a whole line along x, in ascending order of x. Each has the change of the winding number
+    // towards lower x.
     struct Crossing {
         double x;
-        int turn;  // 1 out of a face, -1 into it
+        int turn;  // 1 when leaving through the face in the direction of +x, -1 when entering
         std::int32_t triangle;
     };
     void along_x(double y, double z, std::vector<Crossing>& crossings) const;
@@ -40,10 +40,10 @@ private:
 
     MeshPtr mesh_;
     Box3d bounds_;
-    int bins_;  // along y, and along z
+    int bins_;  // along each of y and z
     Vec3d per_metre_;
-    std::vector<std::size_t> first_;       // shape [bins y, bins z, + 1]: where a bin's triangles begin
-    std::vector<std::int32_t> triangles_;  // by bin
+    std::vector<std::size_t> first_;       // shape [bins y, bins z, + 1]: first triangle of each bin
+    std::vector<std::int32_t> triangles_;  // sorted by bin
 };
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Meshes from files: chooses the reader, checks what it gives, merges vertices by position, drops faces without area.
+// Reads mesh files: selects the reader, checks its result, merges vertices by position, and drops faces without area.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -92,7 +92,7 @@ const ApartReader<MeshFile> importer(
 MeshFile read_any(const std::filesystem::path& path, const std::string& extension)
 {
     if (extension == ".ply") return read_ply_mesh(path);
-    DeferredFunctions::find("import_mesh");  // loaded here, and not again in each process that reads a file
+    DeferredFunctions::find("import_mesh");  // loads the library once, instead of in each process that reads a file
     return importer(path);
 }
 
@@ -105,7 +105,7 @@ void check(const MeshFile& file)
                 fmt::format("a face has the vertices {}, {} and {}; there are {}, from 0", t[0], t[1], t[2], vertices));
 }
 
-// Whether corners that are one vertex have values of their own.
+// Returns true if corners of the same vertex have different values.
 template <class T>
 bool differ_at_vertices(const std::vector<T>& of_corners, const std::vector<std::int32_t>& vertex_of,
                         const std::vector<std::size_t>& first_corners)
@@ -181,7 +181,7 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
     std::vector<float> alphas;
     std::vector<std::size_t> first_corners;  // of each vertex
     for (std::size_t i = 0; i < file.positions.size(); ++i) {
-        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not the first of its vertex
+        if (vertex_of[i] != static_cast<std::int32_t>(mesh->positions.size())) continue;  // not its first corner
         mesh->positions.push_back(file.positions[i]);
         first_corners.push_back(i);
         if (!file.colours.empty()) {
@@ -189,11 +189,11 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
             alphas.push_back(file.alphas[i]);
         }
     }
-    std::vector<std::size_t> kept;  // triangles
+    std::vector<std::size_t> kept;  // indices of the remaining triangles
     for (std::size_t f = 0; f < file.triangles.size(); ++f) {
         const Mesh::Triangle& t = file.triangles[f];
         const Mesh::Triangle joined(vertex_of[t[0]], vertex_of[t[1]], vertex_of[t[2]]);
-        // A face with merged corners is a line, and its edges cancel: the mesh is as closed without it.
+        // A face with merged corners is a line and its edges cancel, so removing it does not open the mesh.
         if (joined[0] == joined[1] || joined[1] == joined[2] || joined[2] == joined[0]) continue;
         mesh->triangles.push_back(joined);
         kept.push_back(f);

@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-// Up to `most` bytes at a position of a file.
+// Returns up to `most` bytes from a position of the file.
 std::string read_at(std::ifstream& file, std::size_t position, std::size_t most)
 {
     std::string bytes(most, '\0');
@@ -24,7 +24,7 @@ std::string read_at(std::ifstream& file, std::size_t position, std::size_t most)
     return bytes;
 }
 
-// The last line that is not white space. Of a longer one the end.
+// Returns the last line that is not white space, or its end if it is longer than the text.
 std::string last_line(std::string_view end_of_text)
 {
     const std::string_view text = end_of_text.substr(0, end_of_text.find_last_not_of(" \t\r\n") + 1);

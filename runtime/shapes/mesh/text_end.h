@@ -1,11 +1,11 @@
-// The end of mesh files that are text. Assimp takes a cut one for a whole one.
+// Checks the end of text mesh files, because Assimp accepts truncated ones.
 #pragma once
 
 #include <filesystem>
 
 namespace rapid {
 
-// Throws Error if an .stl that is text does not end with "endsolid". Other files pass.
+// Throws Error if a text .stl does not end with "endsolid". Accepts all other files.
 void check_text_end(const std::filesystem::path& path);
 
 }  // namespace rapid

@@ -1,5 +1,5 @@
-// Meshes and shapes that change with time: the results of `:transform` with a motion, and sequences of files. They have
-// no pose of their own; users ask for it at the frames that they need.
+// Time-dependent meshes and shapes: the results of `:transform` with a motion, and file sequences. They have no pose of
+// their own; users evaluate them at the frames they need.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace rapid {
 
-// A mesh that moves rigidly, deforms, or both. Its topology stays the same.
+// A mesh that moves rigidly, deforms, or both. Its topology is constant.
 class AnimatedMesh : public Object {
 public:
     static constexpr std::string_view param_type = "moving mesh";
@@ -25,27 +25,27 @@ public:
     bool varies() const override { return true; }
 
     bool deforms() const { return sequence_ != nullptr; }
-    const MeshPtr& rest() const { return rest_; }  // the first file of a sequence, without the motion
+    const MeshPtr& rest() const { return rest_; }  // mesh of the first file of a sequence, without the motion
     const MotionPtr& motion() const { return motion_; }
     FrameRange range() const;
 
-    // Whether there is a mesh at a whole frame: a sequence may say that there is nothing beyond its files.
+    // Returns true if there is a mesh at a whole frame. A sequence may have none beyond its files.
     bool has(std::int64_t frame) const { return !sequence_ || sequence_->has(frame); }
-    // And on the whole way between two frames, in frames.
+    // Returns true if there is a mesh throughout the time between two frames, which may be fractional.
     bool has(double from, double to) const
     {
         return has(static_cast<std::int64_t>(std::floor(from))) && has(static_cast<std::int64_t>(std::ceil(to)));
     }
 
-    // With another motion after its own.
+    // Adds another motion after its own.
     std::shared_ptr<const AnimatedMesh> transformed(const MotionPtr& motion) const;
 
-    // The mesh at a whole frame. On one thread: the motion may be a script.
+    // Returns the mesh at a whole frame. Single-threaded, because the motion may be a script.
     MeshPtr at(const FrameClock& clock, std::int64_t frame) const;
 
 private:
     MeshPtr rest_;
-    MeshSequencePtr sequence_;  // null where the mesh does not deform
+    MeshSequencePtr sequence_;  // null if the mesh does not deform
     MotionPtr motion_;
 };
 

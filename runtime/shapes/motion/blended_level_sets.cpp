@@ -1,4 +1,4 @@
-// A pair of level sets of a sequence through an interval (level_set_sequence.h).
+// A pair of level sets of a sequence during an interval (level_set_sequence.h).
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr double least_slope2 = 0.25;  // where the gradients of both cancel, the surface has no finite velocity
+constexpr double least_slope2 = 0.25;  // near 0 the two gradients cancel, and the surface velocity would be unbounded
 
 class BlendedDistance {
 public:
@@ -45,8 +45,8 @@ public:
         return a + part_of(time) * (b - a);
     }
 
-    // Where the material at P is later, or was before: along its velocity, by steps of a fraction of a voxel, and back
-    // to the distance that it keeps.
+    // Returns the position at `to` of the material that is at P at `from`: integrates its velocity in steps of a
+    // fraction of a voxel, then restores its distance from the surface.
     Vec3d flow(Vec3d P, double from, double to) const
     {
         const double level = distance(P, from);
@@ -63,14 +63,14 @@ public:
         return slope2 > least_slope2 ? Vec3d(P - (there.phi - level) / slope2 * there.gradient) : P;
     }
 
-    // How the velocity changes for what goes from P with v, m/s².
+    // Returns the rate of change of the surface velocity along a point that moves from P with v, m/s².
     Vec3d change(const Vec3d& P, const Vec3d& v, double time) const
     {
         if (!(duration_ > 0)) return Vec3d::Zero();
         const double h = duration_ / 32, from = std::max(0.0, time - h), to = std::min(duration_, time + h);
         return (at(P + (to - time) * v, to).vc - at(P + (from - time) * v, from).vc) / (to - from);
     }
-    // The same along the surface alone, at one time.
+    // Returns the part of it due to motion `way` along the surface at a fixed time.
     Vec3d change_along(const Vec3d& P, const Vec3d& way, double time) const
     {
         const double speed = way.norm();
@@ -86,7 +86,7 @@ public:
     double voxel() const { return std::max(a_->voxel(), b_->voxel()); }
     double rounding() const { return 0x1p-21 * std::max(a_->band(), b_->band()); }  // m
     double most_change() const { return travel_ * std::abs(rate_); }                // bound on |dphi/dt|, m/s
-    double fastest() const { return most_change() / std::sqrt(least_slope2); }      // and on the surface's speed
+    double fastest() const { return most_change() / std::sqrt(least_slope2); }      // bound on the surface's speed, m/s
     double most_curved(double speed) const { return 2 * slope_bound() * std::abs(rate_) * speed; }  // m/s²
     std::uint64_t active_voxels() const { return a_->active_voxels() + b_->active_voxels(); }
     Box3d bounds() const { return a_->bounds().merged(b_->bounds()); }
@@ -98,11 +98,11 @@ private:
     }
 
     std::shared_ptr<const BakedLevelSet> a_, b_;
-    double begin_, end_, duration_, rate_;  // parts of b; s; 1/s
+    double begin_, end_, duration_, rate_;  // weight of b; weight of b; s; 1/s
     double travel_;                         // m
 };
 
-// The same as one path meets it: what ContactWalk asks for.
+// Adapts BlendedDistance to ContactWalk, as seen from one path.
 struct BlendedField {
     using Hint = NoHint;
     struct Sample {
@@ -144,7 +144,7 @@ struct BlendedField {
 
     double top_speed() const { return std::max(path.velocity(0).norm(), path.velocity(path.duration).norm()); }
 
-    // Free of the surface, or a quarter of a voxel of the path relative to it.
+    // The step is free of the surface, or a quarter of a voxel of relative travel.
     double step(double, const Sample& here) const
     {
         const double closing = body.slope_bound() * top_speed() + body.most_change();
@@ -193,7 +193,7 @@ public:
     }
     Vec3d velocity_at(const Vec3d& P, double time) const override { return body_.at(P, time).vc; }
 
-    // The surface turns under what slips along it, twice as for what keeps to it: Coriolis's part.
+    // The surface turns under a point that slips along it. As with the Coriolis acceleration, the slip counts twice.
     Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
     {
         const Vec3d vc = velocity_at(P, time);

@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// A jump: this many times the travel in the frames around, and this part of the body's size.
+// A jump travels this many times as far as in the surrounding frames, and this fraction of the body's size.
 constexpr double jump_factor = 8, jump_size = 0.5;
 
 using Map = Eigen::Matrix<double, 3, 4>;
@@ -21,7 +21,7 @@ Map map_at(const Motion& motion, const FrameClock& clock, std::int64_t frame)
     return motion.at(clock.at_step(frame)).affine().matrix().topRows<3>();
 }
 
-// The normal of a surface after a linear map: by the cofactors of the map, as normals transform.
+// Returns the normal of a surface after a linear map. Normals transform by the cofactors of the map.
 Vec3f mapped_normal(const Eigen::Matrix3d& map, const Vec3f& normal)
 {
     const Vec3d n = normal.cast<double>();
@@ -50,7 +50,7 @@ private:
     Cubic<Map> map_;
 };
 
-// Along the curves of all vertices of a mesh.
+// Carries births along the curves of all vertices of a mesh.
 class DeformingPath final : public BodyPath {
 public:
     DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> curves, PlacesOn on)
@@ -97,7 +97,7 @@ private:
         if (normals) birth.N = (B - A).cross(C - A).normalized().cast<float>();
     }
 
-    // Of the point at (y, z) of a triangle of the mesh at the frame.
+    // Returns the curve of the point at (y, z) of a triangle of the mesh at the frame.
     Cubic<Vec3d> curve_on(std::int32_t t, const Vec3d& P) const
     {
         const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(t)];
@@ -123,7 +123,7 @@ private:
         crossings_->along_x(P.y(), P.z(), crossings);
         const auto behind = std::find_if(crossings.begin(), crossings.end(),
                                          [&](const RayCrossings::Crossing& crossing) { return crossing.x > P.x(); });
-        // Rounded to single precision it may be on the last face of its line, or a little beyond it.
+        // Rounding to single precision may put P on the last face of its line, or slightly beyond it.
         if (crossings.empty()) return curve_nearest(P);
         const auto& high = behind == crossings.end() ? crossings.back() : *behind;
         const auto& low = behind == crossings.begin() ? crossings.front() : *std::prev(behind);
@@ -132,7 +132,7 @@ private:
         return mix(curve_on(low.triangle, P), curve_on(high.triangle, P), t);
     }
 
-    // That of the nearest vertex, from P.
+    // Returns the curve of the nearest vertex, displaced to start at P.
     Cubic<Vec3d> curve_nearest(const Vec3d& P) const
     {
         const auto nearest =
@@ -146,7 +146,7 @@ private:
 
     MeshPtr mesh_;  // at the frame
     PlacesOn on_;
-    std::vector<Cubic<Vec3d>> curves_;  // by vertex
+    std::vector<Cubic<Vec3d>> curves_;  // per vertex
     std::optional<RayCrossings> crossings_;
 };
 
@@ -170,7 +170,7 @@ private:
     double begin_, length_;
 };
 
-// The same in steps of the clock. A script's motion has none before the first.
+// Converts a range of frames to steps of the clock. A script's motion has none before the first.
 FrameRange in_steps(FrameRange range, const FrameClock& clock)
 {
     const auto start = static_cast<double>(clock.start);
@@ -179,7 +179,7 @@ FrameRange in_steps(FrameRange range, const FrameClock& clock)
     return range;
 }
 
-// Cuts are given for frames: a jump to a frame happens in its last step.
+// Converts cuts to steps. A jump to a frame happens in its last step.
 PathOptions in_steps(PathOptions options, const FrameClock& clock)
 {
     if (!options.cuts) return options;

@@ -1,15 +1,15 @@
 // The curves along which the points of a moving body travel in one frame (paper §3.2): cubic Hermite splines through
-// their positions at the frames around it, and the derivatives of these.
+// their positions at the surrounding frames, and the derivatives of these.
 //
-//   p(t) = (1+2t)(1-t)² p_{f-1} + t(1-t)² m0 + t²(3-2t) p_f + t²(t-1) m1,   m0 = α (p_f - p_{f-2}), m1 = α (p_{f+1} -
-//   p_{f-1})
+//   p(t) = (1+2t)(1-t)² p_{f-1} + t(1-t)² m0 + t²(3-2t) p_f + t²(t-1) m1,
+//   m0 = α (p_f - p_{f-2}),   m1 = α (p_{f+1} - p_{f-1})
 //
-// with t from 0 at frame f-1 to 1 at frame f. Where the motion begins or ends, or jumps, a tangent is one-sided:
-// m0 = α (-3 p_{f-1} + 4 p_f - p_{f+1}), and mirrored; beyond its ends the body is at rest.
-// Frames are the steps of the clock that is given.
+// with t from 0 at frame f-1 to 1 at frame f. If the motion begins, ends or jumps, a tangent is one-sided:
+// m0 = α (-3 p_{f-1} + 4 p_f - p_{f+1}), and its mirror image for m1. Beyond its ends the body is at rest. Frames are
+// the steps of the given clock.
 //
 // The paper prints the first term of the derivative as 6t³, the last pair of indices as t+1 and t-1, and omits that the
-// derivative is per frame. A body at rest has the velocity 0 to the bit: everything is built from differences of
+// derivative is per frame. A body at rest has a velocity of exactly 0, because everything is built from differences of
 // positions.
 #pragma once
 
@@ -28,19 +28,19 @@
 namespace rapid {
 
 struct PathOptions {
-    enum Kind { Spline, Linear, None };  // None: at rest where it is at the end of the frame
+    enum Kind { Spline, Linear, None };  // None: at rest at its position at the end of the frame
     Kind kind = Spline;
     double alpha = 0.5;
-    // The motion jumps between f-1 and f for each frame f of these; if not given, jumps are detected (FramePath::find).
+    // Frames f with a jump of the motion between f-1 and f. If not given, jumps are detected (FramePath::find).
     std::optional<std::set<std::int64_t>> cuts;
 };
 
-// The body travels `distance` metres between two frames, and at most `usual` in the frames around.
+// The body travels `distance` metres between two frames, and at most `usual` metres in the surrounding frames.
 struct Jump {
     double distance, usual;
 };
 
-// For a message: "jumps by 3 m to frame 12, 40 times as far as in the frames around".
+// Returns a description for messages: "jumps by 3 m to frame 12, 40 times as far as in the frames around".
 std::string describe(const Jump& jump, std::int64_t frame);
 
 // A cubic in t.
@@ -55,25 +55,25 @@ struct Cubic {
 // How the points of a body travel from frame f-1 to frame f.
 struct FramePath {
     enum Kind {
-        Still,     // as at f
+        Still,     // positions at f
         AfterCut,  // straight to the positions at f, with the velocity after f: nothing is born along a jump
         Straight,
         Curved,
     };
     Kind kind = Still;
     double alpha = 0.5;
-    bool before = false, after = false;  // whether f-2, and f+1, belong to the same motion
+    bool before = false, after = false;  // f-2, respectively f+1, belongs to the same motion
     std::optional<Jump> jump = {};       // detected between f-1 and f
 
-    // travel(i): how far the body travels between frame i-1 and i (root mean square), m. size: its diagonal, m.
+    // travel(i): distance that the body travels between frame i-1 and i (root mean square), m. size: its diagonal, m.
     //
-    // A jump is detected if a body travels more than 8 times as far as in both frames around (in one, where the motion
-    // begins or ends), and more than half its size.
+    // A jump is detected if a body travels more than 8 times as far as in both surrounding frames (in one, if the
+    // motion begins or ends there), and more than half its size.
     static FramePath find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,
                           const std::function<double(std::int64_t)>& travel);
 
-    // Through the positions at f-2, f-1, f, f+1. T: a vector, or an affine map, whose cubic moves every point along its
-    // own.
+    // Returns the cubic through the positions at f-2, f-1, f, f+1. T: a vector, or an affine map, whose cubic moves
+    // every point along its own curve.
     template <class T>
     Cubic<T> through(const T& p0, const T& p1, const T& p2, const T& p3) const
     {
@@ -97,39 +97,39 @@ struct FramePath {
     }
 };
 
-// Carries births along with a body: from where a scatter placed them to where they are at the time of birth.
+// Carries births along with a body, from their positions in the scatter to those at the time of birth.
 class BodyPath {
 public:
     virtual ~BodyPath() = default;
 
-    // To t[i] of the frame's interval: moves the births, and their normals if `normals`, and gives the velocities, in
-    // metres a frame. All of shape [n]. From any thread.
+    // Moves the births to time t[i] of the frame's interval, including their normals if `normals`, and computes their
+    // velocities in metres per frame. All have shape [n]. Thread-safe.
     virtual void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                        std::span<Vec3d> velocity) const = 0;
 };
 
 using BodyPathPtr = std::shared_ptr<const BodyPath>;
 
-// For a rigid motion; births are given on the rest body.
+// Returns the path of a rigid motion. Births are given on the rest body.
 BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64_t frame, const FramePath& path);
 
-// For a mesh that deforms; births are given on the mesh at the frame.
+// Returns the path of a deforming mesh. Births are given on the mesh at the frame.
 enum class PlacesOn {
     Faces,     // element: a triangle, with barycentric weights
     Vertices,  // element: a vertex
-    Volume,    // P alone: it keeps its ratio between the faces before and behind it along x
+    Volume,    // only P; keeps its ratio between the adjacent faces along x
 };
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
                            PlacesOn on);
 
-// The curves of the vertices of a mesh that deforms.
+// Returns the curves of the vertices of a deforming mesh.
 std::vector<Cubic<Vec3d>> vertex_curves(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,
                                         const FramePath& path);
 
-// A part of a path as one of its own: from t = begin on, of this length in t.
+// Returns a section of a path, starting at t = begin, with this length in t.
 BodyPathPtr part_of(BodyPathPtr path, double begin, double length);
 
-// How a body travels in the interval of a frame. On one thread, as it evaluates the motions.
+// Determines how a body travels in the interval of a frame. Single-threaded, as it evaluates the motions.
 FramePath path_of(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
 FramePath path_of(const Motion& motion, const Box3d& rest, const FrameClock& clock, std::int64_t frame,
                   const PathOptions& options);

@@ -1,4 +1,4 @@
-// A cubic between two of its times, as one from 0 to 1.
+// Reparametrises the section of a cubic between two times to the range 0 to 1.
 #pragma once
 
 #include "runtime/shapes/motion/body_path.h"

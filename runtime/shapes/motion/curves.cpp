@@ -77,13 +77,14 @@ public:
 
 private:
     MeshPtr mesh_;
-    std::vector<Cubic<Vec3d>> curves_;  // by point
+    std::vector<Cubic<Vec3d>> curves_;  // per point
 };
 
-// u at both ends of each line, three values a face: 1 at the end of a closed curve, whose first point has 0.
+// Returns u at both ends of each line, three values per face. The end of a closed curve has 1, although it is the first
+// point, which has 0.
 std::vector<float> parts_of_length(const Mesh& mesh, const CurveLines& lines)
 {
-    std::vector<double> begins, lengths;  // of each line, from the beginning of its curve; of its curve
+    std::vector<double> begins, lengths;  // start of each line along its curve; length of each curve
     std::vector<std::size_t> curve;       // of each line
     for (const CurveLines::Line& line : lines.lines) {
         const auto at = [&](std::int32_t k) { return mesh.positions[static_cast<std::size_t>(k)].cast<double>(); };

@@ -1,9 +1,10 @@
-// Level sets of a mesh that deforms: colliders from a sequence of files (paper §4.4).
+// Level sets of a deforming mesh: colliders from a sequence of files (paper §4.4).
 //
-// One level set is built a frame. Between two of them the surface moves with its faces, each vertex along the cubic
-// Hermite curve that births on it follow: a position is taken into the frame of its nearest face, and the level sets at
-// both ends are sampled where that face is then. So sub-steps need no level sets of their own, points cannot pass
-// through parts that are thinner than their travel in a frame, and at the ends the shape is the level set, to the bit.
+// One level set is built per frame. In between, the surface moves with its faces, and each vertex follows the cubic
+// Hermite curve that births on it use. A position is expressed in the frame of its nearest face, and the level sets at
+// both ends are sampled where that face is then. Sub-steps therefore need no level sets of their own, points cannot
+// pass through parts that are thinner than their travel in a frame, and at both ends the shape is bit-identical to the
+// level set.
 #pragma once
 
 #include <limits>
@@ -25,7 +26,7 @@ class DeformingLevelSet : public Object {
 public:
     static constexpr std::string_view param_type = "deforming level set";
 
-    // Builds the level set of the first frame, for the errors and warnings of level_set_from_mesh.
+    // Builds the level set of the first frame, for the errors and warnings of level_set_from_mesh().
     DeformingLevelSet(std::shared_ptr<const AnimatedMesh> mesh, const LevelSetOptions& options,
                       std::vector<std::string>& warnings);
 
@@ -34,13 +35,13 @@ public:
 
     const AnimatedMesh& mesh() const { return *mesh_; }
     double voxel() const { return options_.voxel; }
-    const Box3d& bounds() const { return bounds_; }  // of the first frame's surface
+    const Box3d& bounds() const { return bounds_; }  // surface of the first frame
     std::shared_ptr<const DeformingLevelSet> transformed(const MotionPtr& motion) const;
 
-    // The level set of the mesh with other positions. Its band is at least so wide, m.
+    // Builds the level set of the mesh with other positions and a band of at least `band` m.
     LevelSetPtr build(const MeshPtr& mesh, double band) const;
-    // That at a whole frame. Where somebody has it still, with such a band, it is not built again: several nodes share
-    // those of a body. From any thread, but where the motion is a script.
+    // Returns the level set of a whole frame. Reuses one that is still in use and has a wide enough band: several nodes
+    // share those of a body. Thread-safe unless the motion is a script.
     LevelSetPtr at(const FrameClock& clock, std::int64_t frame, double band) const;
     const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
@@ -48,10 +49,10 @@ private:
     std::shared_ptr<const AnimatedMesh> mesh_;
     LevelSetOptions options_;
     Box3d bounds_;
-    Mesh::Openness open_;  // of all frames
+    Mesh::Openness open_;  // same for all frames
     std::shared_ptr<const TriangleTree> tree_;
 
-    // What is in use; by fps, start and frame.
+    // Level sets in use, by fps, start and frame.
     struct Built {
         std::mutex mutex;
         std::map<std::tuple<double, std::int64_t, std::int64_t>, std::weak_ptr<const LevelSet>> by_frame;
@@ -61,26 +62,27 @@ private:
 
 using DeformingLevelSetPtr = std::shared_ptr<const DeformingLevelSet>;
 
-// Advances a deforming level set through the frames, and keeps what the next interval needs.
+// Advances a deforming level set through the frames and caches the data that the next interval needs.
 class Deformation {
 public:
     explicit Deformation(DeformingLevelSetPtr body = nullptr) : body_(std::move(body)) {}
 
     struct Interval {
-        ShapePtr shape;            // times are in seconds since its beginning
-        std::optional<Jump> jump;  // detected in its frame
+        ShapePtr shape;            // times are in seconds since the beginning of the interval
+        std::optional<Jump> jump;  // detected in the frame of the interval
     };
-    // Between two times in one frame (`to` may be its end), in frames; with `motion` after its own unless that is null.
-    // The band of the level sets is at least so wide, m. On one thread, as the motion may be a script.
+    // Returns the shape between two times in one frame (`to` may be its end), in frames. `motion` is applied after its
+    // own, unless it is null. The band of the level sets is at least `band` m. Single-threaded, as the motion may be a
+    // script.
     Interval over(const FrameClock& clock, double from, double to, const MotionPtr& motion, const PathOptions& options,
                   double band);
 
-    // Whether it is of this body; or of a snapshot, and has none yet.
+    // Returns true if the state belongs to this body, or comes from a snapshot and has no body yet.
     bool is_of(const DeformingLevelSetPtr& body) const { return !body_ || body_ == body; }
     void set_body(DeformingLevelSetPtr body) { body_ = std::move(body); }
     const LevelSetPtr& at_end() const { return at_end_; }  // of the last interval
 
-    // That of the last interval is built again, as wide as it was.
+    // The level set of the last interval is rebuilt with the same band.
     template <class Archive>
     void serialize(Archive& keep)
     {
@@ -91,9 +93,9 @@ private:
     LevelSetPtr build(const MeshPtr& mesh, double band);
 
     DeformingLevelSetPtr body_;
-    double end_ = std::numeric_limits<double>::quiet_NaN();  // of the last interval
+    double end_ = std::numeric_limits<double>::quiet_NaN();  // end of the last interval
     LevelSetPtr at_end_;
-    double band_ = 0;  // m, that it was asked to have
+    double band_ = 0;  // requested band, m
 };
 
 }  // namespace rapid

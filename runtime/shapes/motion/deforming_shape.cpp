@@ -15,8 +15,8 @@ namespace {
 
 using BakedPtr = std::shared_ptr<const BakedLevelSet>;
 
-// The acceleration of a point that keeps to a face, by a difference of velocities, which are polynomials of second
-// degree but for the turning normal; m an interval².
+// Returns the acceleration of a point fixed to a face, as a difference of velocities; m per interval². The velocities
+// are polynomials of second degree, apart from the turning normal.
 Vec3d by_difference(const MovingTriangles& faces, const MaterialPoint& point, double t)
 {
     constexpr double step = 0x1p-10;
@@ -24,10 +24,10 @@ Vec3d by_difference(const MovingTriangles& faces, const MaterialPoint& point, do
            (2 * step);
 }
 
-// The distance from a surface that goes from one level set to the next along the curves of its vertices.
+// The distance from a surface that moves from one level set to the next along the curves of its vertices.
 class DeformingDistance {
 public:
-    // begin: null where the interval begins with a jump; then the end's is carried back along the curves.
+    // begin: null if the interval begins with a jump; the end's level set is then carried back along the curves.
     DeformingDistance(BakedPtr begin, BakedPtr end, MovingTriangles faces, double duration)
         : begin_(std::move(begin)),
           end_(std::move(end)),
@@ -40,16 +40,16 @@ public:
 
     struct Sample {
         double phi;
-        Vec3d gradient;             // of about length 1; zero where phi is only a bound, outside
-        std::int32_t nearest = -1;  // triangle, where one was searched for
+        Vec3d gradient;             // length about 1; zero outside if phi is only a bound
+        std::int32_t nearest = -1;  // triangle, if one was searched for
         Vec3d vc = Vec3d::Zero();   // velocity of the surface, m/s
     };
 
-    // At a time. Outside, a distance above `exact` may be a bound, which costs less. hint: a triangle that is near.
+    // Samples at a time. Outside, a distance above `exact` may be a cheaper bound. hint: a nearby triangle.
     Sample at(const Vec3d& P, double time, double exact, std::int32_t hint = -1) const
     {
         const double t = part_of(time);
-        // At either end the surface is elsewhere by its speed and the time till then at most.
+        // The surface at either end differs from that at `time` by at most its speed times the time in between.
         double least = end_->sampler().distance(P) - fastest_ * (duration_ - time);
         if (begin_) least = std::max(least, begin_->sampler().distance(P) - fastest_ * time);
         if (least > exact) return {least, Vec3d::Zero()};
@@ -74,7 +74,7 @@ public:
             sample.phi /= weight;
             sample.gradient /= weight;
         } else {
-            // At both ends other parts of the body are nearer: the face alone says which side this is.
+            // At both ends other parts of the body are nearer, so only the face decides the side.
             const double side = (P - place.P).dot(now.col(2)) < 0 ? -1 : 1;
             sample.phi = side * place.distance;
         }
@@ -90,7 +90,7 @@ public:
         return faces_.velocity(faces_.nearest(P, t), t) / duration_;
     }
 
-    // Of a point that keeps to a face; and of one that slips along the nearest face at a constant rate of its edges.
+    // Returns the motion of a point fixed to a face.
     MovingBody::State follow(const MaterialPoint& point, double time) const
     {
         const double t = part_of(time);
@@ -124,7 +124,7 @@ public:
     double voxel() const { return end_->voxel(); }
     double rounding() const { return 0x1p-21 * end_->band(); }  // m
     double fastest() const { return fastest_; }                 // bound on the faces' speed, m/s
-    double most_curved() const { return most_curved_; }         // and on their acceleration, m/s²
+    double most_curved() const { return most_curved_; }         // bound on the faces' acceleration, m/s²
     Box3d bounds() const
     {
         const Vec3d margin = Vec3d::Constant(voxel());
@@ -139,10 +139,11 @@ private:
 
     double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
 
-    // The level set at one end of the interval, at the position that P has then in the frame of its nearest face.
+    // A sample of the level set at one end of the interval, at the position that P then has in the frame of its nearest
+    // face.
     struct EndSample {
         double phi = 0;
-        Vec3d gradient = Vec3d::Zero();  // as turned to now
+        Vec3d gradient = Vec3d::Zero();  // rotated to the current orientation
         bool agrees = false;             // no other part of the body is nearer
     };
     EndSample sample_end(const BakedLevelSet& level_set, const MovingTriangles::Place& place, const Vec3d& P,
@@ -160,7 +161,7 @@ private:
         sample.gradient = turn.transpose() * sample.gradient;
         const double band = level_set.band();
         sample.agrees = std::abs(sample.phi) >= std::min(place.distance, band) - level_set.voxel();
-        // Beyond the band the faces know better.
+        // Beyond the band the distance to the face is more accurate.
         if (sample.gradient.isZero(0)) sample.phi = std::copysign(std::max(band, place.distance), sample.phi);
         return sample;
     }
@@ -168,12 +169,12 @@ private:
     BakedPtr begin_, end_;
     MovingTriangles faces_;
     double duration_;               // s
-    double fastest_, most_curved_;  // of the faces: m/s, m/s²
+    double fastest_, most_curved_;  // bounds for the faces: m/s, m/s²
 };
 
-// The same as one path meets it: what ContactWalk asks for.
+// Adapts DeformingDistance to ContactWalk, as seen from one path.
 struct DeformingField {
-    using Hint = std::int32_t;  // the nearest triangle
+    using Hint = std::int32_t;  // nearest triangle
     struct Sample {
         double height;
         Vec3d X, gradient, velocity, vc;
@@ -228,8 +229,8 @@ struct DeformingField {
         return contact;
     }
 
-    // Free of the surface, or a quarter of a voxel of the path relative to the nearest part of it; but no farther than
-    // a voxel where another part may come.
+    // The step is free of the surface, or a quarter of a voxel of travel relative to its nearest part. It is at most a
+    // voxel, in case another part approaches.
     double step(double s, const Sample& here) const
     {
         const double fastest = std::max(path.velocity(s).norm(), path.velocity(path.duration).norm()) + body.fastest();
@@ -299,7 +300,7 @@ private:
     Box3d bounds_;
 };
 
-// The surface of a mesh, without an inside.
+// The surface of a mesh without an inside.
 class DeformingSurface final : public MovingBody {
 public:
     DeformingSurface(MovingTriangles faces, double duration) : faces_(std::move(faces)), duration_(duration) {}
@@ -347,7 +348,7 @@ public:
                 acceleration(point, t)};
     }
 
-    // Nothing is kept out of what has no inside.
+    // Without an inside there are no contacts.
     void first_contact(std::span<const Path>, std::span<Contact> contacts) const override
     {
         std::fill(contacts.begin(), contacts.end(), Contact());
@@ -356,7 +357,7 @@ public:
 private:
     double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
 
-    // On the surface the gradient is the normal of the face.
+    // On the surface itself the gradient is the normal of the face.
     void sample(std::size_t i, std::span<const Vec3d> P, double time, std::span<double> phi,
                 std::span<Vec3d> gradient) const
     {

@@ -10,11 +10,11 @@
 namespace rapid {
 namespace {
 
-// Two files as read, and both widened twice: as it is first asked, and for the radius of points.
+// Two files as read and two widened versions of both: for the first query, and for the radius of points.
 constexpr std::size_t most_kept_level_sets = 8;
-constexpr double most_voxels = 0x1p27;  // of a widened level set
+constexpr double most_voxels = 0x1p27;  // in a widened level set
 
-// How far the vertices of a surface are from the other level set, as far as its band tells.
+// Returns the largest distance of one surface's vertices from the other level set, limited by its band.
 double farthest(const LevelSet& from, const LevelSet& other)
 {
     const MeshPtr surface = from.surface();
@@ -60,7 +60,7 @@ LevelSetPtr LevelSetSequence::widened(int file, double band) const
     return found;
 }
 
-// In whole steps of four voxels, so that the same width serves many pairs.
+// Bands are multiples of four voxels, so that the same width serves many pairs.
 LevelSetSequence::Pair LevelSetSequence::pair(int a, int b, double band) const
 {
     Pair found;
@@ -116,7 +116,7 @@ ShapePtr LevelSetSequence::over(const FrameClock& clock, double from, double to)
 {
     const double whole = std::floor(from);
     const SequenceFiles::Interval interval = files_.interval(static_cast<std::int64_t>(whole));
-    // Where the files begin or end, what is there at the end of the step is there throughout.
+    // At the first or last file, the grid at the end of the step applies throughout.
     if (const std::optional<int> last = from == to ? interval.a : interval.b; !interval.a || !interval.b)
         return last ? read(*last) : nullptr;
     SequenceFiles::Interval part = interval;

@@ -1,10 +1,11 @@
-// Level sets that change with time: a .vdb file for each frame, or for some of them; between two files distances go on
-// straight lines in time (numerics.md, Level sets between files).
+// Time-dependent level sets: a .vdb file for every frame, or for some of them. Distances are interpolated linearly in
+// time between two files (numerics.md, Level sets between files).
 //
 //   φ(x, t) = (1 - t) φ_a(x) + t φ_b(x),    velocity of the surface  v = -∂φ/∂t ∇φ / max(|∇φ|², 1/4)
 //
-// Both are widened until their bands overlap: by the farthest that the one surface is from the other. Where that is
-// more than half of the size of both, or takes too many voxels, the sequence jumps: the later file holds.
+// Both are widened until their bands overlap, that is, by the largest distance of one surface from the other. If that
+// distance is more than half the size of the larger one, or needs too many voxels, the sequence jumps and the later
+// file applies.
 #pragma once
 
 #include <deque>
@@ -23,12 +24,12 @@
 
 namespace rapid {
 
-// A pair of level sets through an interval. Its material goes along the normals of the surface.
+// A pair of level sets during an interval. Its material moves along the normals of the surface.
 class BlendedLevelSets : public MovingBody {
 public:
     virtual double voxel() const = 0;  // m
     virtual std::uint64_t active_voxels() const = 0;
-    // The same with a band of at least `metres` in which distances are known at all times.
+    // Returns the same with a band of at least `metres` in which distances are exact at all times.
     virtual std::shared_ptr<const BlendedLevelSets> with_band(double metres) const = 0;
 };
 
@@ -39,22 +40,22 @@ public:
     bool varies() const override { return true; }
 
     using Read = std::function<LevelSetPtr(const std::filesystem::path&)>;
-    // read: from any thread. name: the pattern, for messages.
+    // read: must be thread-safe. name: the pattern, for messages.
     LevelSetSequence(SequenceFiles files, std::string name, Read read);
 
-    // Through a part of the time from one whole frame to the next, in frames; times are in seconds since its beginning.
-    // A LevelSet where nothing changes, else BlendedLevelSets; null where there is nothing at the end. From any
-    // thread. Error: of a file.
+    // Returns the shape during a part of the time from one whole frame to the next, in frames; its times are in seconds
+    // since the beginning of that part. The result is a LevelSet if nothing changes, BlendedLevelSets otherwise, and
+    // null if there is no file at the end. Thread-safe. Throws Error if a file cannot be read.
     ShapePtr over(const FrameClock& clock, double from, double to) const;
-    // The file of a whole frame; null where there is nothing. Error: of a file; there is none for this frame, but
-    // others around it.
+    // Returns the level set of a whole frame, or null if the sequence has none there. Throws Error if the file cannot
+    // be read, or is missing between others.
     LevelSetPtr at(std::int64_t frame) const;
 
 private:
-    // Level sets of two files, with such a band where the distances between them are known.
+    // The level sets of two files, with the requested band around all intermediate surfaces.
     struct Pair {
         LevelSetPtr a, b;
-        double travel = 0;  // m, the farthest that the one surface is from the other
+        double travel = 0;  // m, largest distance of one surface from the other
         bool jumps = false;
     };
     Pair pair(int a, int b, double band) const;
@@ -67,21 +68,21 @@ private:
     std::string name_;
     Read read_;
 
-    // Of the last users, most recent first.
+    // Recently used level sets, most recent first.
     struct Kept {
         int file;
-        double band;  // m, that was asked for; 0 as read
+        double band;  // m, as requested; 0 as read
         LevelSetPtr level_set;
     };
     mutable std::mutex mutex_;
     mutable std::deque<Kept> kept_;
-    mutable std::map<std::pair<int, int>, Pair> pairs_;  // without level sets
+    mutable std::map<std::pair<int, int>, Pair> pairs_;  // without the level sets
 };
 
 using LevelSetSequencePtr = std::shared_ptr<const LevelSetSequence>;
 
-// The pair through an interval of `duration` seconds, in which the part of b goes from begin to end. travel: m. tag:
-// of the interval, from 0; its material is that of no interval with another. widen: for with_band().
+// The pair during an interval of `duration` seconds, in which the weight of b changes from begin to end. travel: m.
+// tag: identifies the interval, from 0; its material is valid in no interval with another tag. widen: for with_band().
 struct BlendedInterval {
     LevelSetPtr a, b;
     double begin, end, duration, travel;

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// rest: the mesh of the same faces for which the tree is built.
+// rest: the mesh with the same faces for which the tree is built.
 MovingBodyPtr still_surface(const Mesh& mesh, const MeshPtr& rest)
 {
     std::vector<Cubic<Vec3d>> curves;

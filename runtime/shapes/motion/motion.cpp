@@ -12,9 +12,9 @@
 namespace rapid {
 namespace {
 
-// Of the distance that the body travels in the interval, and in rad.
+// Maximum error, relative to the distance that the body travels in the interval, and in rad.
 constexpr double track_error = 1e-5;
-constexpr double least_piece = 1.0 / 64;  // of the interval
+constexpr double least_piece = 1.0 / 64;  // fraction of the interval
 
 class ConstantMotion final : public Motion {
 public:
@@ -28,7 +28,7 @@ private:
     std::optional<Turns> turns_;
 };
 
-// 1 if two axes are the same, -1 if they are opposite, 0 if they are neither.
+// Returns 1 if two axes are equal, -1 if they are opposite, 0 otherwise.
 int sense(const Vec3d& a, const Vec3d& b)
 {
     constexpr double rounding = 1e-12;  // of the product of two unit vectors
@@ -36,7 +36,8 @@ int sense(const Vec3d& a, const Vec3d& b)
     return along > 1 - rounding ? 1 : along < rounding - 1 ? -1 : 0;
 }
 
-// Nothing if one of them is unknown, or if there are more than anybody writes: a product in a loop.
+// Concatenates rotations. Returns nothing if one is unknown, or if there are more than a scene would state, as in a
+// product in a loop.
 std::optional<Turns> in_turn(std::optional<Turns> first, const std::optional<Turns>& second)
 {
     constexpr std::size_t most = 8;
@@ -56,7 +57,7 @@ public:
     ProductMotion(MotionPtr first, MotionPtr second)
         : first_(std::move(first)), second_(std::move(second)), factors_(factors_of(*first_) + factors_of(*second_))
     {
-        // Each asks its factors, one inside of the other: the stack of a thread has room for some thousands.
+        // Factors are evaluated recursively, and the stack of a thread has room for some thousands.
         constexpr double most = 1000;
         if (factors_ > most)
             throw Error(
@@ -80,7 +81,7 @@ private:
     }
 
     MotionPtr first_, second_;
-    double factors_;  // a product with itself has twice as many
+    double factors_;  // a double, because a product with itself doubles the count
 };
 
 class BackwardMotion final : public Motion {
@@ -130,15 +131,15 @@ public:
     }
 
 private:
-    // The rotation between two keys that turn about the same axes, by half a turn or more about one of them. Nothing
-    // between others, which the shorter way joins.
+    // Returns the rotation between two keys that turn about the same axes, by half a turn or more about one of them.
+    // Returns nothing for other keys, whose rotation takes the shorter way.
     std::optional<Eigen::Quaterniond> turned_far(std::int64_t before, std::int64_t after, double t) const
     {
         const auto from = turns_.find(before), to = turns_.find(after);
         if (from == turns_.end() || to == turns_.end()) return std::nullopt;
         const Turns &a = from->second, &b = to->second;
         if (a.size() != b.size() && !a.empty() && !b.empty()) return std::nullopt;
-        constexpr double half = EIGEN_PI - 1e-9;  // rad; at half a turn both ways are as short
+        constexpr double half = EIGEN_PI - 1e-9;  // rad; at half a turn both ways are equally short
         bool far = false;
         Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
         for (std::size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
@@ -156,7 +157,7 @@ private:
     std::map<std::int64_t, Turns> turns_;
 };
 
-// The rotation vector from a to b, the shorter way round, rad.
+// Returns the rotation vector of the shorter way from a to b, rad.
 Vec3d turn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
 {
     Eigen::Quaterniond q = b * a.conjugate();
@@ -165,7 +166,7 @@ Vec3d turn(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b)
     return sine > 0 ? Vec3d(2 * std::atan2(sine, q.w()) / sine * q.vec()) : Vec3d(Vec3d::Zero());
 }
 
-// The piece through three poses, the second in the middle of the time.
+// Returns the piece through three poses; `middle` is at half the time.
 MotionTrack::Piece through(double begin, double end, const Pose& from, const Pose& middle, const Pose& to)
 {
     const double T = end - begin;
@@ -173,7 +174,7 @@ MotionTrack::Piece through(double begin, double end, const Pose& from, const Pos
     if (!(T > 0)) return piece;
     const Vec3d chord = to.translation - from.translation;
     Vec3d sag = from.translation + to.translation - 2 * middle.translation;
-    // The rounding of a straight translation is no acceleration.
+    // The rounding of a straight translation must not become an acceleration.
     if (sag.cwiseAbs().maxCoeff() <=
         0x1p-49 * from.translation.cwiseAbs().cwiseMax(to.translation.cwiseAbs()).maxCoeff())
         sag.setZero();
@@ -186,7 +187,7 @@ MotionTrack::Piece through(double begin, double end, const Pose& from, const Pos
     return piece;
 }
 
-// Evaluates a motion, and bisects the interval until its pieces are near enough.
+// Evaluates a motion and bisects the interval until its pieces are accurate enough.
 class TrackBuilder {
 public:
     TrackBuilder(const Motion& motion, const FrameClock& clock, double from, double to)
@@ -211,7 +212,7 @@ private:
     {
         const double seconds = (to_ - from_) / clock_.fps, half = 0.5 * (begin + end);
         const MotionTrack::Piece piece = through(begin * seconds, end * seconds, first, middle, last);
-        // Two times between which no number of whole turns can hide.
+        // Compares at two times, so that no number of whole turns can go unnoticed.
         const double off = begin + 0.381966 * (end - begin);
         if (end - begin <= least_piece || (near(piece.at(half * seconds), middle, last.scale) &&
                                            near(piece.at(off * seconds), at(off), last.scale))) {

@@ -1,6 +1,7 @@
-// Motions: the pose of a body at each time. A constant, a product, keys, or a script's function.
+// Motions: the pose of a body as a function of time. A motion is a constant, a product, keyframes, or a script's
+// function.
 //
-// A motion is evaluated ahead, on one thread, because it may be a script; worker threads read the poses of a
+// A motion is evaluated in advance on one thread, because it may be a script. Worker threads read the poses of a
 // MotionTrack.
 #pragma once
 
@@ -16,7 +17,7 @@
 
 namespace rapid {
 
-// The frames between which a motion moves. Beyond them it is at rest.
+// The range of frames in which a motion moves. It is at rest outside.
 struct FrameRange {
     double first = std::numeric_limits<double>::infinity(), last = -std::numeric_limits<double>::infinity();
 
@@ -33,9 +34,9 @@ public:
     static constexpr std::string_view param_type = "motion";
     std::string_view kind() const override { return "motion"; }
 
-    // On one thread. Error: that of a script.
+    // Single-threaded. Throws Error if the script does.
     virtual Pose at(const Frame& frame) const = 0;
-    // Empty for a constant; infinite for a script.
+    // Empty for a constant, infinite for a script.
     virtual FrameRange range() const = 0;
     bool varies() const override { return !range().empty(); }
 };
@@ -43,34 +44,35 @@ public:
 using MotionPtr = std::shared_ptr<const Motion>;
 
 MotionPtr constant_motion(const Pose& pose);
-// First `second`, then `first`.
+// Returns the composition: `second` is applied first, then `first`.
 MotionPtr product(const MotionPtr& first, const MotionPtr& second);
-// The motion up to a frame at which a body has arrived by a jump: what `motion` does after that frame, backwards. At
-// rest if it does not go on.
+// Returns the motion up to a frame that a body reached by a jump: it mirrors in time the motion after that frame. It is
+// at rest if `goes_on` is false.
 MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on);
-// Interpolated between the given frames, and at rest outside them. Error: no keys.
+// Interpolates between the given frames; at rest outside them. Throws Error if there are no keys.
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys);
 
-// A motion over an interval of time, as pieces in which the translation is a parabola, the angular velocity is constant
-// and the scale is linear. A constant, keys, a uniform acceleration and a uniform spin are one exact piece; others are
-// bisected, into up to 64 pieces, until the error is within 1e-5 of the distance that the body travels in the interval.
+// A motion over a time interval, as pieces with a parabolic translation, a constant angular velocity and a linear
+// scale. A constant, keys, a uniform acceleration and a uniform spin are one exact piece. Other motions are bisected
+// into up to 64 pieces, until the error is within 1e-5 of the distance that the body travels in the interval.
 class MotionTrack {
 public:
     struct Piece {
         double begin, end;  // s
-        Pose pose;          // at its beginning
-        Vec3d v, a;         // of the translation: m/s at its beginning, m/s²
+        Pose pose;          // at `begin`
+        Vec3d v, a;         // of the translation: m/s at `begin`, m/s²
         Vec3d spin;         // angular velocity, rad/s
-        Vec3d axis;         // unit vector along the spin; 0 where there is none
+        Vec3d axis;         // unit vector along the spin, or 0
         double rate;        // rad/s about the axis
-        double growth;      // of the scale, 1/s
+        double growth;      // rate of change of the scale, 1/s
 
         Pose at(double s) const;
         VelocityField velocity_at(double s) const;
         bool only_translates() const { return spin.isZero(0) && growth == 0; }
     };
 
-    // Between two frames, whole or not. Times are in seconds since `from`. On one thread.
+    // Evaluates the motion between two frames, which may be fractional. Times are in seconds since `from`.
+    // Single-threaded.
     MotionTrack(const Motion& motion, const FrameClock& clock, double from, double to);
 
     std::span<const Piece> pieces() const { return pieces_; }  // in order; at least one

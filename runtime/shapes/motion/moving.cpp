@@ -38,7 +38,7 @@ public:
     {
         if (P.empty()) return;
         std::vector<Vec3d> X(P.size());
-        std::vector<Pose> poses;  // of each point; one if all have the same time
+        std::vector<Pose> poses;  // one per point, or a single one if all have the same time
         const bool at_once = std::all_of(time.begin(), time.end(), [&](double t) { return t == time.front(); });
         const std::size_t each = at_once ? 0 : 1;
         for (std::size_t i = 0; i < (at_once ? 1 : P.size()); ++i) poses.push_back(track_.at(time[i]));
@@ -50,7 +50,7 @@ public:
 
     bool moves() const override { return true; }
     Vec3d velocity_at(const Vec3d& P, double time) const override { return track_.velocity_at(time).at(P); }
-    // Of x = T + k R X with X' constant: centripetal, Coriolis, and those by growth.
+    // Differentiates x = T + k R X with constant X': centripetal, Coriolis and growth terms.
     Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
     {
         const Piece& piece = track_.piece_at(time);
@@ -81,7 +81,7 @@ public:
             if (may_reach(paths[i], bounds_)) open.push_back(i);
         const std::span<const Piece> pieces = track_.pieces();
         for (std::size_t k = 0; k < pieces.size() && !open.empty(); ++k) {
-            // Paths that begin before the interval, or end after it, go by its first and last piece.
+            // Paths that begin before the interval or end after it use its first or last piece.
             const bool first = k == 0, last = k + 1 == pieces.size();
             RigidContacts in_piece(rest_, pieces[k], paths, contacts);
             for (const std::size_t i : open) {
@@ -95,12 +95,12 @@ public:
         }
     }
 
-    // At the end.
+    // Returns the surface at the end.
     MeshPtr surface() const override { return placed(rest_.shape, track_.at(track_.duration()))->surface(); }
 
 private:
-    // What a spin that changes adds to the acceleration of a body's point: the pieces of the track turn at a constant
-    // rate each, and the rate at a moment is interpolated between their middles.
+    // Returns the contribution of a changing spin to the acceleration of a body's point. Each piece of the track has a
+    // constant spin, and the spin at a time is interpolated between the middles of the pieces.
     Vec3d euler_acceleration(const Vec3d& P, double time) const
     {
         const std::span<const Piece> pieces = track_.pieces();
@@ -121,7 +121,7 @@ private:
         return least;
     }
 
-    // The box swept by that of the rest shape in a piece.
+    // Returns the box that the rest shape's box sweeps during a piece.
     Box3d swept(const Piece& piece) const
     {
         const Box3d rest = rest_.shape->bounds();
@@ -130,10 +130,10 @@ private:
         Box3d box = moved(begin, rest);
         box.extend(moved(end, rest));
         if (box.isEmpty()) return box;
-        double arm = 0;  // of the farthest corner, m
+        double arm = 0;  // distance of the farthest corner, m
         for (int k = 0; k < 8; ++k) arm = std::max(arm, rest.corner(static_cast<Box3d::CornerType>(k)).norm());
         const double turn = piece.spin.norm() * T;
-        // The sagitta of an arc, 1 - cos(turn / 2); 0 for a body that does not turn, which may be infinite.
+        // The sagitta of an arc, 1 - cos(turn / 2). It is 0 for a body that does not turn, which may be infinite.
         const double sine = std::sin(std::min<double>(turn, 2 * EIGEN_PI) / 4);
         const double grown = std::abs(end.scale - begin.scale);
         const double arc = turn > 0 ? arm * (std::max(begin.scale, end.scale) * 2 * sine * sine + grown) : 0;

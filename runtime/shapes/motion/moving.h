@@ -1,5 +1,5 @@
-// A rigid shape that moves during an interval of time (paper §4.4): the rest shape, queried in its own frame at each
-// point's own time, with the velocity of the surface at the contact. It is never rebuilt.
+// A rigid shape that moves during a time interval (paper §4.4). The rest shape is queried in its own frame at each
+// point's own time, and contacts include the velocity of the surface. It is never rebuilt.
 #pragma once
 
 #include "runtime/shapes/motion/body_path.h"
@@ -8,16 +8,16 @@
 
 namespace rapid {
 
-// A MovingBody, which may also grow, between two frames, whole or not; times (Path::begin, distance_at) are in seconds
-// since `from`. distance() is that at the end. On one thread, as the motion is evaluated here, ahead; the result may be
-// queried from any.
+// Returns a MovingBody, which may also grow, between two frames, which may be fractional. Times (Path::begin,
+// distance_at) are in seconds since `from`, and distance() applies to the end. Single-threaded, as it evaluates the
+// motion in advance; the result is thread-safe.
 //
-// Contacts are those of the path with the track of the motion (MotionTrack): to rounding, at any speed. Where the shape
-// only translates, the path is a parabola in its frame too, and the rest shape finds the contact; where it turns or
-// grows, a walk by a bound on the acceleration in that frame does, and passes no wall of two features.
+// Contacts with the track of the motion (MotionTrack) are exact up to rounding, at any speed. If the shape only
+// translates, the path is a parabola in its frame too, and the rest shape finds the contact. If it turns or grows, a
+// walk with a bound on the acceleration in that frame finds it, and passes no wall as thick as two features.
 ShapePtr moving(const ShapePtr& rest, const Motion& motion, const FrameClock& clock, double from, double to);
 
-// The same through a step; after a jump in it as it goes on from there, backwards.
+// Does the same for a step. A step with a jump uses the motion after the jump, mirrored in time.
 struct MovingStep {
     ShapePtr shape;
     std::optional<Jump> jump;  // detected in the step

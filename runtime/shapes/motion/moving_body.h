@@ -1,12 +1,12 @@
-// A shape whose surface is material that can be followed while it moves: a rigid body, or a mesh that deforms.
+// A shape whose surface is material that can be followed while it moves: a rigid body or a deforming mesh.
 #pragma once
 
 #include "runtime/shapes/shape.h"
 
 namespace rapid {
 
-// A point of a body. Of a rigid one (face -1) its place in the body's frame; of a mesh its place over a face: P = p0 +
-// x (p1 - p0) + y (p2 - p0) + z n, which may be outside of the face.
+// A point of a body. For a rigid body (face -1), its position in the body's frame. For a mesh, its position relative to
+// a face, P = p0 + x (p1 - p0) + y (p2 - p0) + z n, which may lie outside the face.
 struct MaterialPoint {
     static constexpr std::int32_t rigid = -1;
 
@@ -16,14 +16,14 @@ struct MaterialPoint {
 
 class MovingBody : public Shape {
 public:
-    // The acceleration, m/s², of a point at P with velocity v (m/s) that moves uniformly in the frame of the body, or
-    // of the face nearest to it: any other acceleration presses it to the surface, or draws it off. time: s since the
-    // interval began.
+    // Returns the acceleration, m/s², of a point at P with velocity v (m/s) that moves uniformly in the frame of the
+    // body, or of its nearest face. Any other acceleration presses the point to the surface or pulls it off. time: s
+    // since the beginning of the interval.
     virtual Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const = 0;
 
-    // The point of the body that is at P.
+    // Returns the point of the body that is at P.
     virtual MaterialPoint material_at(const Vec3d& P, double time) const = 0;
-    // Whether a point of this kind belongs to the body.
+    // Returns true if the point belongs to this body.
     virtual bool has(const MaterialPoint& point) const = 0;
 
     struct State {

@@ -1,4 +1,4 @@
-// The first contact of a path with a body of which samples are known at any place and time.
+// Finds the first contact of a path with a body that can be sampled at any position and time.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// Body has at(P, time, exact) with phi, gradient and vc, and rounding(); Field is what ContactWalk asks for, made of
-// {body, path, level}.
+// Body has at(P, time, exact), which returns phi, gradient and vc, and rounding(). Field is the field for ContactWalk,
+// constructed from {body, path, level}.
 template <class Field, class Body>
 Contact first_contact_of(const Body& body, const Path& path)
 {
@@ -25,7 +25,7 @@ Contact first_contact_of(const Body& body, const Path& path)
         contact.depth = slope > 0 ? -f / slope : -f;
         return contact;
     }
-    // A point that rounding left a little below the surface goes by the level that it is on.
+    // A point slightly below the surface by rounding uses its own height as the level to touch at.
     field.level = path.radius + std::min(f, 0.0);
     ContactWalk walk(field, field.sample(0, std::max(f, 0.0), start), 0, path.duration);
     if (f <= flush) walk.leave_surface(2 * flush);

@@ -27,7 +27,7 @@ struct Ordering {
         box.sizes().maxCoeff(&axis);
         const std::int32_t middle = first + (last - first) / 2;
         const auto at = [&](std::int32_t i) { return tree.order.begin() + i; };
-        // Ties are ordered too, so that the tree depends on the mesh alone.
+        // Ties are ordered too, so that the tree depends only on the mesh.
         std::nth_element(at(first), at(middle), at(last), [&](std::int32_t a, std::int32_t b) {
             const float x = middles[static_cast<std::size_t>(a)][axis], y = middles[static_cast<std::size_t>(b)][axis];
             return x < y || (x == y && a < b);
@@ -60,7 +60,7 @@ MovingTriangles::MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::
         // A cubic minus its chord is -t(1-t) (c2 + c3 (1+t)).
         const Vec3d off = 0.25 * (curve.c2 + curve.c3).cwiseAbs().cwiseMax((curve.c2 + 2 * curve.c3).cwiseAbs());
         of_vertex.push_back({curve.c0, curve.c0, curve.at(1), curve.at(1), off});
-        // The derivative is in the convex hull of its Bézier points.
+        // The derivative lies in the convex hull of its Bézier points.
         for (const Vec3d& v : {curve.c1, Vec3d(curve.c1 + curve.c2), curve.derivative(1)})
             fastest_ = std::max(fastest_, v.norm());
         curved_ = std::max({curved_, 2 * curve.c2.norm(), (2 * curve.c2 + 6 * curve.c3).norm()});
@@ -117,7 +117,7 @@ void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, doub
 MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const
 {
     Place place;
-    place.triangle = tree_->order.front();  // for a P that is no number, which is near to none
+    place.triangle = tree_->order.front();  // also for a P that is NaN, which is near nothing
     double best = std::numeric_limits<double>::infinity();
     if (hint >= 0) test(hint, P, t, best, place);
 
@@ -125,7 +125,7 @@ MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::i
         std::int32_t node;
         double squared;
     };
-    Open open[64];  // the tree is balanced: as deep as the number of faces has bits
+    Open open[64];  // the tree is balanced, so its depth is at most the number of bits of the face count
     int depth = 0;
     open[depth++] = {0, boxes_[0].squared_distance(P, t)};
     while (depth > 0) {
@@ -168,7 +168,7 @@ std::array<Vec3d, 3> MovingTriangles::rates(std::int32_t triangle, double t) con
 
 namespace {
 
-// The weights x, y of x e1 + y e2, the part of d in the plane of both; zero where they span none.
+// Returns the weights x, y of x e1 + y e2, the projection of d onto the plane of both; zero if they span none.
 Eigen::Vector2d weights(const Vec3d& e1, const Vec3d& e2, const Vec3d& d)
 {
     const double a = e1.squaredNorm(), b = e1.dot(e2), c = e2.squaredNorm(), area2 = a * c - b * b;

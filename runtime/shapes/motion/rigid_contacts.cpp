@@ -22,7 +22,7 @@ void RigidContacts::find()
         walk();
 }
 
-// A contact at once, or a walker.
+// Writes an immediate contact or starts a walk.
 void RigidContacts::begin(const Beginning& b, const RelativePath::State& here, double phi, const Vec3d& gradient)
 {
     const Path& path = paths_[b.path];
@@ -41,14 +41,14 @@ void RigidContacts::begin(const Beginning& b, const RelativePath::State& here, d
         walkers_.push_back({b.path, b.to, walk});
 }
 
-// The rest shape says how to get out, to a path that goes straight on.
+// The rest shape finds the way out, for a path that goes straight on.
 Contact RigidContacts::inside(const Beginning& b, const RelativePath::State& here) const
 {
     const Path& path = paths_[b.path];
     const Path now{here.X, here.velocity, Vec3d::Zero(), 0, path.radius / here.scale};
     Contact contact;
     rest_.shape->first_contact({&now, 1}, {&contact, 1});
-    // Flush with the surface in its own frame, where the shape rests farther from the origin than it is now.
+    // The point counts as flush in the rest frame, where the shape is farther from the origin and the tolerance larger.
     if (contact.time == Contact::none) return contact_at(RigidField(rest_, b.relative, path.radius), 0, {});
     contact.time = 0;
     contact.n = here.rotation * contact.n;
@@ -58,7 +58,7 @@ Contact RigidContacts::inside(const Beginning& b, const RelativePath::State& her
     return contact;
 }
 
-// A parabola in the world is one in a frame that only translates.
+// A parabola in world space is also one in a frame that only translates.
 void RigidContacts::fly_straight()
 {
     std::vector<Path> relative;
@@ -78,13 +78,13 @@ void RigidContacts::fly_straight()
         contact.n = piece_.pose.rotation * contact.n;
         contact.vc = w.walk.field().path().surface_velocity(contact.time);
         contact.curvature /= piece_.pose.scale;
-        // The beginning was found to be outside, to the rounding of positions in the world.
+        // The start was classified as outside, up to the rounding of positions in world space.
         contact.depth = 0;
         contact.back = Contact::none;
     }
 }
 
-// A step of all walkers in turn, with one query of the rest shape.
+// Advances all walks step by step, with one query of the rest shape per step.
 void RigidContacts::walk()
 {
     std::vector<RelativePath::State> states;

@@ -1,4 +1,4 @@
-// The first contacts of paths with a shape that moves, within one piece of its motion.
+// Finds the first contacts of paths with a moving shape, within one piece of its motion.
 #pragma once
 
 #include <span>
@@ -10,20 +10,20 @@ namespace rapid {
 
 class RigidContacts {
 public:
-    // Both outlive it.
+    // Both must outlive this.
     RigidContacts(const RestShape& rest, const MotionTrack::Piece& piece, std::span<const Path> paths,
                   std::span<Contact> contacts)
         : rest_(rest), piece_(piece), paths_(paths), contacts_(contacts)
     {
     }
 
-    // Path i, between two of its times.
+    // Adds path i between two of its times.
     void add(std::size_t i, double from, double to)
     {
         beginnings_.push_back({i, RelativePath(piece_, paths_[i], from, to), from, to});
     }
 
-    // Writes the contacts of those that have one.
+    // Writes the contacts of the paths that have one.
     void find();
 
 private:

@@ -13,11 +13,11 @@ RelativePath::RelativePath(const MotionTrack::Piece& piece, const Path& path, do
     const Arm end = arm_at(last);
     const double k = std::min(begin.scale, end.scale), growth = std::abs(piece.growth) / k;
     const double turning = piece.spin.norm(), a = (path.a - piece.a).norm();
-    // The relative velocity is linear in time, so it is fastest at an end; the path between is off its chord by
-    // a T²/8 at most.
+    // The relative velocity is linear in time, so it is largest at an end. The path in between deviates from its chord
+    // by at most a T²/8.
     const double speed = std::max(begin.relative_velocity.norm(), end.relative_velocity.norm());
     const double sag = a * T * T / 8, arm = std::max(begin.arm.norm(), end.arm.norm()) + sag;
-    // From the axis: what lies along it does not turn.
+    // Distances from the axis: the part along it does not turn.
     const auto lever = [&](const Vec3d& x) { return x.cross(piece.spin).norm(); };
     const double turned = turning > 0 ? std::max(lever(begin.arm), lever(end.arm)) + turning * sag : 0;
     acceleration_ =

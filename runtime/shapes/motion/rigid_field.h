@@ -1,4 +1,4 @@
-// A rest shape that moves along one piece of its track, as one path meets it: what ContactWalk asks for.
+// Adapts a rest shape that moves along one piece of its track to ContactWalk, as seen from one path.
 #pragma once
 
 #include "runtime/shapes/contact_walk.h"
@@ -6,24 +6,24 @@
 
 namespace rapid {
 
-// A path as seen from the frame of a shape, within one piece of its motion. Lengths are in rest units: metres of the
-// rest shape.
+// A path in the frame of a shape, within one piece of its motion. Lengths are in rest units: metres of the rest shape.
 class RelativePath {
 public:
-    // Between two times of the path.
+    // Covers the path between two of its times.
     RelativePath(const MotionTrack::Piece& piece, const Path& path, double first, double last);
 
     struct State {
-        Vec3d X, velocity;  // rest units, and a second
-        double scale;       // m a rest unit
+        Vec3d X, velocity;  // rest units, rest units per s
+        double scale;       // m per rest unit
         Eigen::Quaterniond rotation;
-        double level_rate;  // 1/s: by how much 1/scale falls
+        double level_rate;  // 1/s: rate of decrease of 1/scale
     };
     State at(double s) const;
-    // Of the surface where the path is, m/s.
+    // Returns the velocity of the surface at the position of the path, m/s.
     Vec3d surface_velocity(double s) const { return piece_->velocity_at(path_->begin + s).at(path_->at(s)); }
 
-    // Bounds over the whole time; of a path that keeps a level above 0 (m), for its distance from that level.
+    // Bounds over the whole time. For a path that touches at a level above 0 (m), they apply to its distance from that
+    // level.
     double acceleration(double level) const { return acceleration_ + std::abs(level) * level_acceleration_; }
     double speed_beside(double level) const { return std::abs(level) * level_speed_; }
 
@@ -32,7 +32,7 @@ public:
 
 private:
     struct Arm {
-        Vec3d arm, relative_velocity;  // from and to the origin of the shape's frame, in the world
+        Vec3d arm, relative_velocity;  // relative to the origin of the shape's frame, in world space
         Eigen::Quaterniond rotation;
         double scale;
     };
@@ -41,17 +41,17 @@ private:
     const MotionTrack::Piece* piece_;
     const Path* path_;
     double first_;
-    Arm begin_;  // at the first time, which is asked for most
+    Arm begin_;  // at the first time, which is requested most often
     double acceleration_, level_speed_, level_acceleration_;
 };
 
-// The rest shape, with what is the same for all paths.
+// The rest shape and the values that all paths share.
 struct RestShape {
     explicit RestShape(ShapePtr rest);
 
     ShapePtr shape;
     double slope_bound, feature;
-    double rounding;  // of a distance, rest units
+    double rounding;  // error of a distance, rest units
 
     bool is_convex() const { return !(feature > 0); }
     double distance(const Vec3d& X, Vec3d& gradient) const
@@ -72,7 +72,7 @@ public:
     };
     static constexpr double kink = 0x1p-8;
 
-    // level: m, of the path over the surface where it counts as touching.
+    // level: height of the path above the surface, m, at which it touches.
     RigidField(const RestShape& rest, const RelativePath& path, double level) : rest_(&rest), path_(path), level_(level)
     {
     }
@@ -80,7 +80,7 @@ public:
     const RelativePath& path() const { return path_; }
     double level() const { return level_; }
 
-    // From the distance at a state of the path.
+    // Creates a sample from the distance at a state of the path.
     Sample sample(const RelativePath::State& state, double phi, const Vec3d& gradient) const
     {
         return {state, gradient, phi - level_ / state.scale, gradient.dot(state.velocity) + level_ * state.level_rate};
@@ -114,7 +114,7 @@ public:
         const double speed = here.velocity.norm() + path_.speed_beside(level_) / rest_->slope_bound;
         return general_step(here.height, rest_->slope_bound, rest_->feature, speed, acceleration());
     }
-    // Along a face of a convex shape, flush with it, the bound on the acceleration would give steps of nothing but
+    // Along a face of a convex shape and flush with it, the acceleration bound would shrink steps to the size of
     // rounding.
     double hop(const Sample& here) const
     {
@@ -135,7 +135,7 @@ public:
     Box3d bounds() const { return rest_->shape->bounds(); }
     bool open_ended() const { return false; }
 
-    // What counts as flush with the surface, m.
+    // Returns the height that counts as flush with the surface, m.
     double flush(double scale) const
     {
         return flush_within(path_.path().P, path_.path().radius, scale * rest_->rounding);

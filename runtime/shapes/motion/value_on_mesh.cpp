@@ -30,7 +30,7 @@ Corners corners_now(const Corners& rest, const MeshSurfaces& surfaces, std::int3
     return now;
 }
 
-// A tangent, the other one and the normal, of length 1, as columns.
+// Returns a tangent, the other one and the normal, of length 1, as columns.
 Eigen::Matrix3d frame_of(const Corners& corners)
 {
     const Vec3d edge = (corners[1] - corners[0]).normalized();
@@ -40,7 +40,7 @@ Eigen::Matrix3d frame_of(const Corners& corners)
     return frame;
 }
 
-// The value on a face, of the list that has a value for each of its corners at the places of these.
+// Interpolates values linearly on a face. places: indices of its corners in the list.
 template <class T>
 T linear(const std::vector<T>& list, const std::array<std::size_t, 3>& places, const std::array<double, 2>& weights)
 {

@@ -7,11 +7,11 @@
 
 namespace rapid {
 
-// Each of n equal columns holds the weight of its own item up to `keep`, and of one other above it.
+// Each of n equal columns holds the weight of its own item up to `keep`, and that of one other item above it.
 class AliasTable {
 public:
     AliasTable() = default;
-    // weights: at least 0; their sum: above 0.
+    // weights: at least 0, with a positive sum.
     AliasTable(const std::vector<double>& weights, double sum) : columns_(weights.size())
     {
         std::vector<std::int32_t> small, large;
@@ -30,7 +30,8 @@ public:
                 large.pop_back();
             }
         }
-        // The columns left are full but for rounding. None has weight 0, as then a giver would be left, too.
+        // The remaining columns are full up to rounding. None of them has weight 0, because then a column to take from
+        // would remain, too.
         for (const std::int32_t i : large) columns_[i].keep = 1;
         for (const std::int32_t i : small)
             if (columns_[i].keep > 0) columns_[i].keep = 1;
@@ -38,7 +39,7 @@ public:
 
     bool empty() const { return columns_.empty(); }
 
-    // From two numbers in [0, 1).
+    // Draws an item from two numbers in [0, 1).
     std::int32_t draw(double u, double w) const
     {
         const auto i = static_cast<std::int32_t>(u * double(columns_.size()));

@@ -12,8 +12,8 @@ namespace rapid {
 namespace {
 
 // A linear density is the sum over the corners of d_i λ_i, whose integrals over a face of area A are A d_i / 3. A birth
-// draws a face and a corner by these, then a place by the density λ_i: there λ has the distribution Dirichlet(2, 1, 1),
-// that of the spacings of three numbers in [0, 1) of which two are joined.
+// draws a face and a corner with these weights, then a position with the density λ_i. The weights λ then have the
+// distribution Dirichlet(2, 1, 1), that of the spacings of three uniform numbers in [0, 1) with two spacings joined.
 class ScatterByDensity final : public Scatter {
 public:
     ScatterByDensity(MeshPtr mesh, AliasTable corners) : mesh_(std::move(mesh)), corners_(std::move(corners)) {}
@@ -51,7 +51,7 @@ private:
     }
 
     MeshPtr mesh_;
-    AliasTable corners_;  // three of each face
+    AliasTable corners_;  // three per face
 };
 
 }  // namespace

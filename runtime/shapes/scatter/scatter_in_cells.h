@@ -1,7 +1,7 @@
-// Births in a region given by an inside test, uniform by volume.
+// Births in a region defined by an inside test, uniform by volume.
 //
-// Equal cells cover the region; a birth draws a cell and a position in it, by rejection, until the position is inside.
-// Cells that are wholly inside need no test, so the cost follows the region's surface, not its box.
+// Equal cells cover the region. A birth draws a cell, then positions in it until one is inside (rejection). Cells that
+// are wholly inside need no test, so the cost depends on the region's surface instead of its box.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,9 +19,9 @@ namespace rapid {
 
 struct ScatterCells {
     Vec3d origin = Vec3d::Zero(), edge = Vec3d::Ones();  // m
-    Eigen::Vector3i counts = Eigen::Vector3i::Zero();    // cells along each axis; z fastest in a cell's number
-    std::vector<std::uint32_t> cells;                    // those wholly inside, then those partly inside
-    std::size_t whole = 0;                               // how many are wholly inside
+    Eigen::Vector3i counts = Eigen::Vector3i::Zero();    // cells along each axis; cell numbers have z fastest
+    std::vector<std::uint32_t> cells;                    // those wholly inside come first, then those partly inside
+    std::size_t whole = 0;                               // number of cells wholly inside
 
     Vec3d low(std::uint32_t cell) const
     {
@@ -37,7 +37,7 @@ struct ScatterCells {
 template <class Inside>
 class ScatterInCells final : public Scatter {
 public:
-    // volume: of the region, m³. Error: it is so small a part of its cells that rejection would not end.
+    // volume: of the region, m³. Throws Error if it is too small a fraction of its cells for rejection to end.
     ScatterInCells(ScatterCells cells, Inside inside, double volume, const std::string& what)
         : cells_(std::move(cells)), inside_(std::move(inside))
     {
@@ -50,7 +50,7 @@ public:
 
     void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
     {
-        std::array<Numbers, 64> numbers;  // of the first trials
+        std::array<Numbers, 64> numbers;  // for the first trial of each birth
         for (std::size_t i = 0; i < out.size(); ++i) {
             const std::size_t k = i % numbers.size();
             if (k == 0) uniform4(key, first + i, 0, std::span(numbers).first(std::min(numbers.size(), out.size() - i)));
@@ -61,12 +61,12 @@ public:
 
 private:
     static constexpr double least_part = 1e-5;
-    // At the least part the probability of needing more is exp(-100).
+    // At the least fraction the probability of needing more is exp(-100).
     static constexpr std::uint64_t most_trials = 10'000'000;
 
     using Numbers = std::array<double, 4>;
 
-    // u: the numbers of the first trial.
+    // u: random numbers of the first trial.
     Vec3f draw(RandomKey key, std::uint64_t birth, Numbers u) const
     {
         for (std::uint64_t trial = 0; trial < most_trials; u = uniform4(key, birth, ++trial << 32)) {

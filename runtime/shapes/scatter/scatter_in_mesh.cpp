@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// Inside is a winding number that is not 0 or, for faces of inconsistent orientation, an odd number of crossings.
+// Tests for a nonzero winding number or, if faces are inconsistently oriented, an odd number of crossings.
 struct InMesh {
     RayCrossings crossings;
     bool by_winding;
@@ -23,7 +23,7 @@ struct InMesh {
     }
 };
 
-// The nearest cell; along an axis in which the mesh is flat there is one.
+// Returns the nearest cell. An axis in which the mesh is flat has a single cell.
 Eigen::Vector3i cell_at(const ScatterCells& cells, const Vec3d& P)
 {
     Eigen::Vector3i cell = Eigen::Vector3i::Zero();
@@ -34,7 +34,8 @@ Eigen::Vector3i cell_at(const ScatterCells& cells, const Vec3d& P)
     return cell;
 }
 
-// The cells that a face touches are partly inside; each of the others is wholly inside or outside, as its centre is.
+// Classifies the cells: those that a face touches are partly inside, and each other cell is wholly inside or outside
+// like its centre.
 ScatterCells cells_of(const Mesh& mesh, const InMesh& inside)
 {
     constexpr double about = 32768;  // cells in the box of a compact mesh
@@ -54,7 +55,7 @@ ScatterCells cells_of(const Mesh& mesh, const InMesh& inside)
         const Eigen::Vector3i from = cell_at(cells, a.cwiseMin(b).cwiseMin(c) - slack);
         const Eigen::Vector3i to = cell_at(cells, a.cwiseMax(b).cwiseMax(c) + slack);
         const Vec3d normal = (b - a).cross(c - a);
-        const double reach = normal.cwiseAbs().dot(cells.edge / 2 + slack);  // of a cell along the normal
+        const double reach = normal.cwiseAbs().dot(cells.edge / 2 + slack);  // extent of a cell along the normal
         for (int x = from.x(); x <= to.x(); ++x)
             for (int y = from.y(); y <= to.y(); ++y)
                 for (int z = from.z(); z <= to.z(); ++z) {
@@ -88,7 +89,7 @@ ScatterPtr scatter_in_volume(const MeshPtr& mesh)
             open.odd_edges));
     InMesh inside{RayCrossings(mesh), open.unbalanced_edges == 0};
     ScatterCells cells = cells_of(*mesh, inside);
-    // Pieces of opposite orientation reduce the sum, but not the cells that are wholly inside.
+    // Pieces of opposite orientation reduce the signed volume, but not the number of cells that are wholly inside.
     const double volume = std::max(std::abs(mesh->signed_volume()), double(cells.whole) * cells.edge.prod());
     if (!(volume > 0))
         throw Error(fmt::format("{} has {} faces and no volume; use its surface", what, mesh->triangles.size()));

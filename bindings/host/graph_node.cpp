@@ -66,10 +66,10 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     return kernels;
 }
 
-// The nodes of a type in the graph, and so many more.
-int count_nodes(lua_State* L, const NodeType& type, int more)
+// The nodes in the graph that are numbered together, and so many more.
+int count_nodes(lua_State* L, const std::string& stem, int more)
 {
-    constexpr char counts[] = "rapid.node_counts";  // in the registry, by type
+    constexpr char counts[] = "rapid.node_counts";  // in the registry, by stem
     lua_getfield(L, LUA_REGISTRYINDEX, counts);
     if (lua_isnil(L, -1)) {
         lua_pop(L, 1);
@@ -77,10 +77,10 @@ int count_nodes(lua_State* L, const NodeType& type, int more)
         lua_pushvalue(L, -1);
         lua_setfield(L, LUA_REGISTRYINDEX, counts);
     }
-    lua_getfield(L, -1, type.name.c_str());
+    lua_getfield(L, -1, stem.c_str());
     const int count = static_cast<int>(lua_tointeger(L, -1)) + more;
     lua_pushinteger(L, count);
-    lua_setfield(L, -3, type.name.c_str());
+    lua_setfield(L, -3, stem.c_str());
     lua_pop(L, 2);
     return count;
 }
@@ -131,14 +131,15 @@ int make_node(State& state)
         node->type = &type;
         node->location = where(state);
         node->serial = host.graph.nodes.size();
-        node->name = fmt::format("{}{}", type.name, count_nodes(state.lua(), type, 0) + 1);
+        const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
+        node->name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);
         name_errors(node->name, node->location, [&] {
             take_options(*node, *table_at(state, 2));
             for (const auto& [param, kernel] : kernels) node->arguments[param] = Value(kernel);
             take_inputs(state, *node);
         });
         host.graph.nodes.push_back(node);
-        count_nodes(state.lua(), type, 1);
+        count_nodes(state.lua(), stem, 1);
         return std::make_shared<NodeHandle>(node);
     });
 }

@@ -100,6 +100,7 @@ public:
     Declaration& stage(Stage stage) { return type_.stages.push_back(stage), *this; }
     Declaration& makes(AttributeSpec spec) { return type_.uses.makes.push_back(std::move(spec)), *this; }
     Declaration& varies() { return type_.varies = true, *this; }
+    Declaration& counted_as(std::string stem) { return type_.counted_as = std::move(stem), *this; }
 
     operator NodeType() const { return type_; }
 

@@ -77,6 +77,7 @@ enum class NodeKind {
 
 struct NodeType {
     std::string name, doc;
+    std::string counted_as;  // nodes without a name of their own are numbered as those of this type; empty: its own
     std::string defined_in;  // the file of a type written in Lua; empty for native types
     NodeKind kind = NodeKind::Points;
     std::vector<Param> params;

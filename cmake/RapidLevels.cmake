@@ -13,7 +13,7 @@ set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for
 
 # By the profile of the scenes of graphs and of tests/bench.
 set(rapid_hot_files
-  elementary.cpp noise.cpp power.cpp random.cpp lanes/lane_operations.cpp operators/emit/cone.cpp points/cell_grid.cpp
+  elementary.cpp noise.cpp power.cpp random.cpp lanes/lane_operations.cpp operators/births/draws.cpp points/cell_grid.cpp
   processor_levels/shared_types_of_level.cpp
   shapes/level_set/baked_level_set.cpp
   shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_field.cpp

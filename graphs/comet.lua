@@ -18,7 +18,7 @@ for k, motion in ipairs { "spline", "linear", "none" } do
   end
   scene = scene:emit {
     name = motion, source = rapid.mesh.sphere { radius = 0.02 }:transform(place), motion = motion, birth = "even",
-    rate = 24000, inherit = 0, life = 5 / 24, attributes = { Cd = {1, 0.75 - 0.2 * k, 0.2 * k} },
+    rate = 24000, inherit_velocity = 0, life = 5 / 24, attributes = { Cd = {1, 0.75 - 0.2 * k, 0.2 * k} },
   }
 end
 return scene:solve {}

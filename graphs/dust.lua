@@ -18,7 +18,7 @@ local pieces = rapid.create { fps = 24, seed = 6 }
   :solve   {}
 
 local dust = rapid.create { fps = 24, seed = 6 }
-  :emit       { source = pieces, rate = rapid.attr "dust", inherit_velocity = 0.25, velocity = {0, 0.25, 0},
+  :spawn      { from = pieces, rate = rapid.attr "dust", inherit_velocity = 0.25, velocity = {0, 0.25, 0},
                 spread = 180, life = {0.8, 1.8}, attributes = { pscale = 0.02, Alpha = 0, Cd = {0.62, 0.52, 0.42} } }
   :drag       { linear = 4 }
   :turbulence { amplitude = 3, size = 0.3, speed = 0.5 }

@@ -1,9 +1,9 @@
 -- fireworks: shells rise, burst at the top into stars, and stars draw trails of sparks.
 --
--- Each generation is a chain of its own, whose emitter has the chain before as its source: bursts are at the place and
+-- Each generation is a chain of its own, which is spawned from the chain before: bursts are at the place and
 -- moment of a shell's end, within the frame, and trails are streams without beads along the stars' paths.
 --
--- Shows:  a node as source, on = "death", a rate of each parent, inherit.
+-- Shows:  :spawn, on = "death", a rate of each parent, inherit.
 -- Proves: a star is born where its shell ends, on its parabola; the sparks of a star are on its path at even times
 --         (tests/graphs/test_fireworks.lua).
 -- Run:    rapid run graphs/fireworks.lua -f 1-96 --camera 0,9,25,0,8.6,0 -o /tmp/fireworks.####.png
@@ -22,12 +22,12 @@ local shells = rapid.create { fps = 24, seed = 4, points = mortars }
   :gravity {} :solve {}
 
 local stars = rapid.create { fps = 24, seed = 4 }
-  :emit    { source = shells, on = "death", count = stars_of_shell, inherit = { "Cd" }, inherit_velocity = 0.3,
+  :spawn   { from = shells, on = "death", count = stars_of_shell, inherit = { "Cd" }, inherit_velocity = 0.3,
              velocity = {0, 6.5, 0}, spread = 180, life = {1.1, 1.7} }
   :gravity {} :drag { linear = 0.9 } :solve {}
 
 local sparks = rapid.create { fps = 24, seed = 4 }
-  :emit    { source = stars, rate = 160, birth = "even", inherit = { "Cd" }, inherit_velocity = 0.1,
+  :spawn   { from = stars, rate = 160, birth = "even", inherit = { "Cd" }, inherit_velocity = 0.1,
              life = {0.2, 0.7} }
   :points  ("cool", function(p) p.Cd = p.Cd * (1 - 1.2 * p.dt) end)
   :gravity {} :drag { linear = 3 } :solve {}

@@ -35,7 +35,7 @@ local drops = rapid.create { fps = 24, seed = 4 }
   :solve   { substeps = 3 }
 
 local splash = rapid.create { fps = 24, seed = 4 }
-  :emit    { source = drops, on = "hit", min_speed = 2, count = 5, split = true, inherit_velocity = 0,
+  :spawn   { from = drops, on = "hit", min_speed = 2, count = 5, split = true, inherit_velocity = 0,
              speed = {0.8, 1.8}, spread = 60, life = 0.5, attributes = { Cd = {0.8, 0.92, 1} } }
   :gravity {} :collide { shape = floor, response = "die" } :solve {}
 

@@ -34,7 +34,7 @@ local rain = rapid.create { fps = 24, seed = 5 }
   :solve   { substeps = 2 }
 
 local splash = rapid.create { fps = 24, seed = 5 }
-  :emit    { source = rain, on = "hit", min_speed = 3, count = 3, inherit_velocity = 0, speed = {0.5, 1.4}, spread = 65,
+  :spawn   { from = rain, on = "hit", min_speed = 3, count = 3, inherit_velocity = 0, speed = {0.5, 1.4}, spread = 65,
              life = {0.1, 0.3}, attributes = { pscale = 0.004, Alpha = 0.5, Cd = {0.5, 0.62, 0.75} } }
   :gravity {} :collide { shape = ground, response = "die" } :solve {}
 

@@ -20,7 +20,7 @@ local drops = rapid.create { fps = 24, seed = 3 }
   :solve   {}
 
 local crown = rapid.create { fps = 24, seed = 3 }
-  :emit    { source = drops, on = "hit", min_speed = 2, count = 24, split = true, inherit_velocity = 0,
+  :spawn   { from = drops, on = "hit", min_speed = 2, count = 24, split = true, inherit_velocity = 0,
              speed = 2.1, spread = 55, life = {0.3, 0.8}, attributes = { Cd = {0.8, 0.92, 1} } }
   :gravity {} :drag { linear = 0.4 }
   :collide { shape = stone, bounce = 0.1, friction = 0.3 } :collide { shape = pool, response = "die" }

@@ -18,7 +18,7 @@ local fragments = rapid.create { fps = 24, seed = 11 }
   :solve   {}
 
 local dust = rapid.create { fps = 24, seed = 11 }
-  :emit    { source = fragments, source_group = "fast", rate = dust_rate, inherit_velocity = 0.08,
+  :spawn   { from = fragments, source_group = "fast", rate = dust_rate, inherit_velocity = 0.08,
              velocity = {0, 0.25, 0}, spread = 180, life = {0.5, 1.4}, attributes = { Cd = {0.85, 0.76, 0.62} } }
   :wind    { velocity = {0.5, 0.15, 0}, drag = 2 } :turbulence { amplitude = 1.2, size = 0.8, seed = 2 }
   :collide { shape = ground, bounce = 0 }

@@ -879,34 +879,28 @@ function Node:distance(params) end
 function Node:drag(params) end
 
 ---@class rapid.params.emit
----@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Node  what points are born from [mesh, level set, shape, fog, curve, points or node, required]
+---@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points  what points are born from [mesh, level set, shape, fog, curve or points, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  where on the source; without it "points" of points, else "surface". A mesh's points are its vertices. With count or impulse points are taken in order, so that as many births as points take each once; with rate at random [string, one of surface, volume, points]
 ---@field density? string|fun(frame: rapid.Frame): string  an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it [string]
----@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second; of a node, by each of its points [number or rapid.attr, 1/s, at least 0]
----@field count? integer|rapid.Attribute|fun(frame: rapid.Frame): integer|rapid.Attribute  points born a frame; of a node, by each of its points, a frame or an event [integer or rapid.attr, at least 0]
----@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
----@field birth? "random"|"begin"|"end"|"even"  at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, frame) that edits each newborn point once, which is born at random [moment or function of a point, one of random, begin, end, even, default "random"]
----@field age? number|number[]|rapid.Attribute|fun(frame: rapid.Frame): number|number[]|rapid.Attribute  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
+---@field source_group? string  of a mesh: only its faces in this group bear [string]
 ---@field motion? "spline"|"linear"|"none"|fun(frame: rapid.Frame): "spline"|"linear"|"none"  the way of a moving source within a frame: a cubic through the frames around it, a straight line, or none, as if it were where it is at the frame's end, at rest [string, one of spline, linear, none, default "spline"]
 ---@field alpha? number|fun(frame: rapid.Frame): number  tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform [number, default 0.5]
 ---@field cut? integer[]|fun(frame: rapid.Frame): integer[]  frames to which the source jumps from the frame before: nothing is born on the way. Where it is not given, a step of 8 times those around it and half the source's size is a jump, and reported [list of frames, from -2147483647 to 2147483647]
----@field inherit? number|string[]|fun(frame: rapid.Frame): number|string[]  fraction of the source's velocity that is added; of a node, also names of attributes that the newborn have of their parents [number or names, default 1]
+---@field inherit_velocity? number|fun(frame: rapid.Frame): number  fraction of the source's velocity that is added [number, default 1]
+---@field rate? number|fun(frame: rapid.Frame): number  points born a second [number, 1/s, at least 0]
+---@field count? integer|fun(frame: rapid.Frame): integer  points born a frame [integer, at least 0]
+---@field impulse? table<integer, number>|fun(frame: rapid.Frame): table<integer, number>  points born in single frames, {[frame] = count}; at the first frame they have not moved yet [numbers by frame, from 0 to 2147483647]
+---@field age? number|number[]|rapid.Attribute|fun(frame: rapid.Frame): number|number[]|rapid.Attribute  age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own attribute, rapid.attr [number, {min, max} or rapid.attr, s, at least 0]
+---@field birth? "random"|"begin"|"end"|"even"  at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, frame) that edits each newborn point once, which is born at random [moment or function of a point, one of random, begin, end, even, default "random"]
 ---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
 ---@field speed? number|number[]|fun(frame: rapid.Frame): number|number[]  along the source's normal N, added to velocity; a number or {min, max} [number or {min, max}, m/s, default 0]
 ---@field spread? number|fun(frame: rapid.Frame): number  turns velocity and speed together, uniformly in a cone of this half angle [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  the newborn join this group [string]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they go before the source's own [attributes]
----@field source_group? string  of a node: only its points in this group bear; of a mesh: only its faces in this group [string]
----@field on? string|fun(p: rapid.Point, frame: rapid.Frame): any  of a node: births at an event, count of each (1), not all the time: "hit", "death", "birth", when a comparison of an attribute with a number ("age > 0.5", "P.y < 0") begins to hold, or a function of a point begins to be true [event or function of a point]
----@field min_speed? number|fun(frame: rapid.Frame): number  with on = "hit": the least speed of approach [number, m/s, at least 0]
----@field limit? number|fun(frame: rapid.Frame): number  of a node: the most births of one point [number, at least 0]
----@field inherit_velocity? number|fun(frame: rapid.Frame): number  of a node: fraction of the parent's velocity at the birth that is added (1) [number]
----@field split? boolean|fun(frame: rapid.Frame): boolean  of a node: those that are born together share the parent's mass and volume [boolean, default false]
----@field kill_parent? boolean|fun(frame: rapid.Frame): boolean  with on: a point that has borne is removed [boolean, default false]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they replace inherited values [attributes]
 ---@field name? string  what the node is called in messages [string]
 
----Bears points from a surface, in a volume, at points, or from those of a node.
+---Bears points from a surface, in a volume, along a curve or at points.
 ---@param params rapid.params.emit
 ---@return rapid.Node
 function Node:emit(params) end
@@ -1208,6 +1202,32 @@ function Node:rasterize(params) end
 ---@param params? rapid.params.solve
 ---@return rapid.Node
 function Node:solve(params) end
+
+---@class rapid.params.spawn
+---@field from rapid.Node  the node whose points are parents [node, required]
+---@field source_group? string  only parents in this group bear [string]
+---@field on? string|fun(p: rapid.Point, frame: rapid.Frame): any  births at an event, count of each (1), not all the time: "hit", "death", "birth", when a comparison of an attribute with a number ("age > 0.5", "P.y < 0") begins to hold, or a function of a point begins to be true [event or function of a point]
+---@field min_speed? number|fun(frame: rapid.Frame): number  with on = "hit": the least speed of approach [number, m/s, at least 0]
+---@field rate? number|rapid.Attribute|fun(frame: rapid.Frame): number|rapid.Attribute  points born a second by each parent [number or rapid.attr, 1/s, at least 0]
+---@field count? integer|rapid.Attribute|fun(frame: rapid.Frame): integer|rapid.Attribute  points born by each parent, a frame or an event [integer or rapid.attr, at least 0]
+---@field limit? number|fun(frame: rapid.Frame): number  the most births of one parent [number, at least 0]
+---@field birth? "random"|"begin"|"end"|"even"  at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, frame) that edits each newborn point once, which is born at random [moment or function of a point, one of random, begin, end, even, default "random"]
+---@field velocity? rapid.Place|fun(frame: rapid.Frame): rapid.Place  mean direction and size [vec3, m/s, default {0, 0, 0}]
+---@field speed? number|number[]|fun(frame: rapid.Frame): number|number[]  along N: the normal at a hit, else the parent's attribute, else its way, added to velocity; a number or {min, max} [number or {min, max}, m/s, default 0]
+---@field spread? number|fun(frame: rapid.Frame): number  turns velocity and speed together, uniformly in a cone of this half angle [number, deg, from 0 to 180, default 0]
+---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it they live for ever [number or {min, max}, s, at least 0]
+---@field group? string  the newborn join this group [string]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they replace inherited values [attributes]
+---@field inherit? string|string[]|fun(frame: rapid.Frame): string|string[]  names of attributes that the newborn have of their parents [names]
+---@field inherit_velocity? number|fun(frame: rapid.Frame): number  fraction of the parent's velocity at the birth that is added [number, default 1]
+---@field split? boolean|fun(frame: rapid.Frame): boolean  those that are born together share the parent's mass and volume [boolean, default false]
+---@field kill_parent? boolean|fun(frame: rapid.Frame): boolean  with on: a point that has borne is removed [boolean, default false]
+---@field name? string  what the node is called in messages [string]
+
+---Bears points from those of another node, all the time or at events.
+---@param params rapid.params.spawn
+---@return rapid.Node
+function Node:spawn(params) end
 
 ---@class rapid.params.spin
 ---@field axis? rapid.Place|fun(frame: rapid.Frame): rapid.Place  of the world, any length but zero [vec3, default {0, 1, 0}]

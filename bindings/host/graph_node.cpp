@@ -85,6 +85,62 @@ int count_nodes(lua_State* L, const std::string& stem, int more)
     return count;
 }
 
+// The variable of graph code that holds the value at `index`; empty if none does.
+std::string variable_of(lua_State* L, int index)
+{
+    lua_Debug info;
+    std::string found;
+    const auto take = [&](const char* name) {
+        if (name[0] != '(' && lua_rawequal(L, -1, index)) found = name;
+        lua_pop(L, 1);
+    };
+    for (int level = 0; found.empty() && lua_getstack(L, level, &info); ++level) {
+        lua_getinfo(L, "Sf", &info);
+        if (is_graph_code(info)) {
+            for (int i = 1; const char* name = lua_getlocal(L, &info, i); ++i) take(name);
+            for (int i = 1; const char* name = lua_getupvalue(L, -1, i); ++i) take(name);
+        }
+        lua_pop(L, 1);
+    }
+    return found;
+}
+
+// Refuses `:emit { source = chain }`, and says how :spawn takes the arguments, which are on the stack behind the type;
+// and `inherit`, which no rule of likeness leads to inherit_velocity.
+void refuse_former_words(State& state)
+{
+    lua_State* L = state.lua();
+    lua_getfield(L, 2, "source");
+    const bool is_chain = std::dynamic_pointer_cast<const NodeHandle>(to_object(state, -1)) != nullptr;
+    const std::string chain = is_chain ? variable_of(L, lua_gettop(L)) : "";
+    lua_pop(L, 1);
+    if (!is_chain) {
+        lua_getfield(L, 2, "inherit");
+        const bool is_given = !lua_isnil(L, -1);
+        lua_pop(L, 1);
+        if (is_given) throw Error("unknown parameter \"inherit\"; did you mean \"inherit_velocity\"?");
+        return;
+    }
+    std::map<std::string, std::string> texts;
+    for (lua_pushnil(L); lua_next(L, 2); lua_pop(L, 1)) {
+        if (lua_type(L, -2) != LUA_TSTRING) continue;
+        const std::string name = text_at(L, -2);
+        const bool is_share = name == "inherit" && !lua_istable(L, -1) && lua_type(L, -1) != LUA_TSTRING;
+        const bool is_function = lua_isfunction(L, -1);
+        const std::string variable = is_function || lua_isuserdata(L, -1) ? variable_of(L, lua_gettop(L)) : "";
+        texts[is_share ? "inherit_velocity" : name] = !variable.empty() ? variable
+                                                      : is_function     ? "function(...) ... end"
+                                                                        : describe(to_value(state, -1));
+    }
+    texts.erase("source");
+    std::string call = fmt::format(":spawn {{ from = {}", chain.empty() ? "chain" : chain);
+    for (const auto& [name, text] : texts) call += fmt::format(", {} = {}", name, text);
+    Error error(fmt::format("source is a node, whose points :spawn takes; write {} }}", call));
+    lua_getfield(L, 2, "name");
+    if (lua_type(L, -1) == LUA_TSTRING) error.in_node(text_at(L, -1));
+    throw error;
+}
+
 // Sets the arguments and, where they have one, the name.
 void take_options(Node& node, const Table& options)
 {
@@ -124,6 +180,9 @@ int make_node(State& state)
     if (state.is_loaded())
         throw Error(fmt::format(":{} is called while a frame runs; the graph's body makes the nodes", type.name));
 
+    const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
+    const std::string number_name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);
+    if (type.name == "emit") name_errors(number_name, where(state), [&] { refuse_former_words(state); });
     copy_table(state.lua(), 2);
     const std::map<std::string, ObjectPtr> kernels = take_kernels(state, type, 2);
     return construct(state, [&]() -> ObjectPtr {
@@ -131,8 +190,7 @@ int make_node(State& state)
         node->type = &type;
         node->location = where(state);
         node->serial = host.graph.nodes.size();
-        const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
-        node->name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);
+        node->name = number_name;
         name_errors(node->name, node->location, [&] {
             take_options(*node, *table_at(state, 2));
             for (const auto& [param, kernel] : kernels) node->arguments[param] = Value(kernel);

@@ -10,7 +10,7 @@
 
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
-#include "runtime/operators/emit/parent_paths.h"
+#include "runtime/operators/spawn/parent_paths.h"
 
 namespace rapid {
 namespace {

@@ -23,7 +23,7 @@ return rapid.study {
   scene  = function(k)
     return rapid.create { fps = k.fps }
       :emit { source = rapid.mesh.sphere { radius = size, divisions = 4, center = {1, 0, 0} }:transform(turning),
-              rate = rate, birth = "even", motion = k.motion, inherit = 0 }
+              rate = rate, birth = "even", motion = k.motion, inherit_velocity = 0 }
       :solve {}
   end,
   frames = {1, 25},

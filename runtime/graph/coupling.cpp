@@ -28,11 +28,6 @@ const CouplingRule* rule_of(const std::string& type)
     return found == rules().end() ? nullptr : &*found;
 }
 
-bool has_stage(const NodeType& type, Stage stage)
-{
-    return std::find(type.stages.begin(), type.stages.end(), stage) != type.stages.end();
-}
-
 // A parameter for a function of all points at once; null where there is none.
 const Param* whole_set_function_of(const NodeType& type)
 {
@@ -65,10 +60,12 @@ std::string what_couples(const Plan& plan, const PlannedNode& planned)
     if (const Param* param = whole_set_function_of(type))
         return reads_whole_set(planned, *param) ? "its function is given all points, and reads them" : "";
     if (asks_places(planned)) return of_place;
-    if (has_stage(type, Stage::Constraints)) return "its constraints are solved for all points together";
+    if (type.has(Stage::Constraints)) return "its constraints are solved for all points together";
     const CouplingRule* rule = rule_of(type.name);
-    if (has_stage(type, Stage::Emission) && !(rule && rule->take)) return "brings points, and leaves none out";
-    if (rule) return rule->couples(plan, planned);
+    std::string what = rule ? rule->couples(plan, planned) : "";
+    if (!what.empty()) return what;
+    if (type.has(Stage::Emission) && !(rule && rule->take)) return "brings points, and leaves none out";
+    if (rule) return "";
     const bool alone = planned.op->as_point_edit() || type.kind == NodeKind::Dynamic || type.kind == NodeKind::Source;
     return alone ? "" : "may look at all points, as nothing says that it does not (RAPID_COUPLING)";
 }

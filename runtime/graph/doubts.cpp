@@ -92,7 +92,7 @@ bool is_at_rest(const PointSet& points)
 // Returns false only if all points of the emitter are born at rest.
 bool may_emit_velocity(const Node& emit)
 {
-    for (const char* name : {"velocity", "speed", "inherit_velocity"})
+    for (const char* name : {"velocity", "speed"})
         if (emit.arguments.count(name)) return true;
     if (const auto birth = emit.arguments.find("birth"); birth != emit.arguments.end())
         if (const auto kernel = birth->second.object<PointFunction>()) {
@@ -102,7 +102,7 @@ bool may_emit_velocity(const Node& emit)
         }
     const auto source = emit.arguments.find("source");
     const ObjectPtr* object = source == emit.arguments.end() ? nullptr : source->second.get<ObjectPtr>();
-    if (!object || (*object)->varies() || source->second.object<NodeHandle>()) return true;
+    if (!object || (*object)->varies()) return true;
     const auto points = source->second.object<PointsObject>();
     return points && !is_at_rest(points->points);
 }

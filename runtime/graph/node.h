@@ -65,11 +65,13 @@ public:
 
     // A parameter in `field`, which needs no initialiser. fallback: the default, in the unit that users give; nil where
     // the field can be empty. Degrees ("deg") are stored as radians.
-    template <class F>
-    Declaration& param(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
+    // The field may be one of a base that nodes share.
+    template <class F, class Base>
+    Declaration& param(F Base::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
     {
+        F T::*const own = field;
         type_.params.push_back(
-            param_of(field, std::move(name), std::move(fallback), range, std::move(unit), std::move(doc)));
+            param_of(own, std::move(name), std::move(fallback), range, std::move(unit), std::move(doc)));
         return *this;
     }
 

@@ -1,4 +1,4 @@
-// A node as a value: as graph code holds it, and as an argument of a node that reads its points (emit's `source`).
+// A node as a value: as graph code holds it, and as an argument of a node that reads its points (spawn's `from`).
 #pragma once
 
 #include "runtime/graph/node_type.h"
@@ -8,6 +8,7 @@ namespace rapid {
 
 class NodeHandle : public Object {
 public:
+    static constexpr std::string_view param_type = "node";
     explicit NodeHandle(NodePtr held) : node(std::move(held)) {}
     std::string_view kind() const override { return "node"; }
 

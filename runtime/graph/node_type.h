@@ -1,6 +1,7 @@
 // Node types and nodes: parameters, uses of attributes, and the operator that does the work.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -87,6 +88,7 @@ struct NodeType {
     bool varies = false;        // the result may change from frame to frame with the same inputs and arguments
     std::function<std::unique_ptr<Operator>()> make;
 
+    bool has(Stage stage) const { return std::find(stages.begin(), stages.end(), stage) != stages.end(); }
     // Null where there is no parameter of that name. (`name` is a parameter only where it is declared, as of :group;
     // elsewhere it names the node.)
     const Param* find(std::string_view param) const;

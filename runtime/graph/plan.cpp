@@ -43,11 +43,13 @@ const PlannedAttribute* PlannedSimulation::find(std::string_view name) const
 
 namespace {
 
-// The node that is the argument `source`. As another argument a node has the wrong type.
+// The node that is the argument `from`. As another argument a node has the wrong type.
 std::vector<NodePtr> sources_of(const Node& node)
 {
-    const auto given = node.arguments.find("source");
-    const auto handle = given == node.arguments.end() ? nullptr : given->second.object<NodeHandle>();
+    const Param* from = node.type->find("from");
+    const auto given = node.arguments.find("from");
+    if (!from || from->type != NodeHandle::param_type || given == node.arguments.end()) return {};
+    const auto handle = given->second.object<NodeHandle>();
     return handle ? std::vector{handle->node} : std::vector<NodePtr>();
 }
 
@@ -175,7 +177,7 @@ void Plan::warn_of_idle_nodes()
     for (const PlannedNode& planned : nodes) {
         const Node& node = *planned.node;
         const bool is_dynamic = node.type->kind == NodeKind::Dynamic;
-        if (planned.in_loop || (!is_dynamic && node.type->name != "emit")) continue;
+        if (planned.in_loop || (!is_dynamic && !node.type->has(Stage::Emission))) continue;
         if (!told.insert(planned.simulation).second) continue;
         warnings.push_back(
             fmt::format("{}:{}: node \"{}\": {}: no :solve comes after it; end the chain with :solve {{}}",
@@ -232,13 +234,13 @@ void Plan::check_source(const PlannedNode& planned, std::size_t s)
     const std::string& name = source.node->name;
     if (!from.solve)
         throw Error(fmt::format(
-            "source = node \"{}\": its points are not moved by a solve; end its chain with :solve{{}}", name));
+            "from = node \"{}\": its points are not moved by a solve; end its chain with :solve{{}}", name));
     if (source.simulation != planned.simulation && source.in_loop && source.node->type->kind != NodeKind::Solve)
-        throw Error(fmt::format("source = node \"{}\" comes before its solve; give \"{}\", or a node after it", name,
+        throw Error(fmt::format("from = node \"{}\" comes before its solve; give \"{}\", or a node after it", name,
                                 from.solve->name));
     if (from.fps != simulations[planned.simulation].fps)
         throw Error(
-            fmt::format("source = node \"{}\" runs at {} frames a second, and this chain at {}; give both the "
+            fmt::format("from = node \"{}\" runs at {} frames a second, and this chain at {}; give both the "
                         "same fps",
                         name, from.fps, simulations[planned.simulation].fps));
     from.recorded = true;

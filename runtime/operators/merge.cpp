@@ -79,12 +79,6 @@ bool removes_points(const PlannedNode& node)
     return node.node->type->kind == NodeKind::Solve || (edit && edit->removes_points());
 }
 
-bool bears_points(const PlannedNode& node)
-{
-    const auto& stages = node.node->type->stages;
-    return std::find(stages.begin(), stages.end(), Stage::Emission) != stages.end();
-}
-
 // Whether points of one simulation are in the order of their ids behind a merge. The points of the first input come
 // first, then those of the second that it does not have, and so on: newborn points, in the order in which their
 // emitters are evaluated, and those that an input before has removed.
@@ -95,12 +89,13 @@ bool keeps_order(const Plan& plan, const PlannedNode& merge)
     for (const std::size_t input : merge.inputs) {
         const std::set<std::size_t> here = upstream_of(plan, input);
         for (const std::size_t node : here)
-            if (bears_points(plan.nodes[node]) && !before.count(node) && node < last_emitter) return false;
+            if (plan.nodes[node].node->type->has(Stage::Emission) && !before.count(node) && node < last_emitter)
+                return false;
         for (const std::size_t node : before)
             if (!here.count(node) && removes_points(plan.nodes[node])) return false;
         before.insert(here.begin(), here.end());
         for (const std::size_t node : before)
-            if (bears_points(plan.nodes[node])) last_emitter = std::max(last_emitter, node);
+            if (plan.nodes[node].node->type->has(Stage::Emission)) last_emitter = std::max(last_emitter, node);
     }
     return true;
 }

@@ -119,14 +119,14 @@ void parents(benchmark::State& state, const char* birth, const char* event)
     const Registry registry;
     const Node chain{&registry.at("create"), "create1", {}, 0, {}, {}};
     std::map<std::string, Value> arguments{
-        {"source", ObjectPtr(std::make_shared<NodeHandle>(std::make_shared<const Node>(chain)))}, {"count", 10.0}};
+        {"from", ObjectPtr(std::make_shared<NodeHandle>(std::make_shared<const Node>(chain)))}, {"count", 10.0}};
     if (*event)
         arguments["on"] = std::string(event);
     else
         arguments["birth"] = std::string(birth);
     arguments["velocity"] = Vec3d(0, 1, 0);
     arguments["spread"] = 30.0;
-    const Node node{&registry.at("emit"), "emit1", {}, 1, {}, std::move(arguments)};
+    const Node node{&registry.at("spawn"), "emit1", {}, 1, {}, std::move(arguments)};
     const auto op = node.type->make();
     FrameFigures figures;
     std::vector<std::string> warnings;

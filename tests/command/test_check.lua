@@ -74,10 +74,13 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
 local rapid = require "rapid"
 local parents = rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
   :collide { shape = rapid.shape.plane { offset = -9 } } :solve {}
-return rapid.create {} :emit { source = %s }
+return rapid.create {} :%s }
   :points("k", function(p, frame) %s end)
   :solve {}
 ]]
+    local function births(source)
+      return (source:find "^parents" and "spawn { from = " or "emit { source = ") .. source
+    end
     for _, source in ipairs {
       "rapid.mesh.sphere {}, rate = 5", "rapid.mesh.sphere {}, impulse = { [30] = 5 }",
       "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
@@ -86,18 +89,18 @@ return rapid.create {} :emit { source = %s }
       'parents, on = "hit"', 'parents, on = "death", split = true', 'parents, on = "age > 0.5", kill_parent = true',
       "parents, on = function(p) return p.P.y < -5 end", "parents, rate = 0.02",
     } do
-      local result = check(chain:format(source, "p.v = p.P.x.y"))
+      local result = check(chain:format(births(source), "p.v = p.P.x.y"))
       assert.not_equal(0, result.status, source)
       assert.match('^scene.lua:5: node "k"', result.stderr)
-      assert.equal("", check(chain:format(source, "p.v = p.P * frame.time")).stderr)
+      assert.equal("", check(chain:format(births(source), "p.v = p.P * frame.time")).stderr)
     end
     -- The frames of a trial are those in which points are.
     assert.equal(0, check(chain:format(
-      "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
+      births "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
       "p.v = p.P * ({ [17] = 2 })[frame.number]")).status)
     for _, source in ipairs { "rapid.mesh.sphere {}, rate = 0", "parents, rate = 0",
                               'parents, on = "hit", count = 0' } do
-      assert.equal(0, check(chain:format(source, "p.v = p.P.x.y")).status, source)
+      assert.equal(0, check(chain:format(births(source), "p.v = p.P.x.y")).status, source)
     end
   end)
 

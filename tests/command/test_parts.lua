@@ -255,7 +255,7 @@ describe("points that are coupled", function()
     folder:write("born.lua", [[
 local rapid = require "rapid"
 local a = rapid.create {} :emit { source = rapid.shape.sphere {}, rate = 50 } :solve {}
-local b = rapid.create {} :emit { source = a, rate = 50 } :solve {}
+local b = rapid.create {} :spawn { from = a, rate = 50 } :solve {}
 return b:merge(a)
 ]])
     local because = json.decode(done("explain born.lua --json").stdout).parts.because

@@ -308,8 +308,8 @@ return rapid.create { points = rapid.points.from { P = {{x, up and 1 or 0, 0}} }
   local bursts = [[
 local drops = rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
   :gravity {} :collide { shape = rapid.shape.plane {}, record = true } :solve {}
-local pieces = rapid.create {} :emit { source = drops, on = "hittotal >= 1", count = 2, life = 0.2 } :solve {}
-return rapid.create {} :emit { source = pieces, on = "death", count = 3 } :solve {}
+local pieces = rapid.create {} :spawn { from = drops, on = "hittotal >= 1", count = 2, life = 0.2 } :solve {}
+return rapid.create {} :spawn { from = pieces, on = "death", count = 3 } :solve {}
 ]]
 
   it("reaches the chains whose points bear others, and their parents in turn", function()

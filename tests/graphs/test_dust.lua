@@ -4,7 +4,7 @@ describe("graphs/dust.lua", function()
   -- Dust that stays where it is born, and the pieces as an output of their own.
   local text = io.open("graphs/dust.lua"):read "*a":gsub("return dust.*", [[
 local born = rapid.create {}:points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = pieces, rate = rapid.attr "dust", inherit_velocity = 0 } :solve {}
+  :spawn { from = pieces, rate = rapid.attr "dust", inherit_velocity = 0 } :solve {}
 return { main = born, pieces = pieces }]])
   local result = rapid.run(scene.folder:write("dust.lua", text), { frames = {1, 30} })
   local pieces = result:output "pieces"

@@ -6,9 +6,9 @@ describe("graphs/fireworks.lua", function()
   -- The chains apart, with what they bear left where it is born.
   local body = text:gsub("return sparks:merge%b()", [[
 local still = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = shells, on = "death", inherit_velocity = 0 } :solve {}
+  :spawn { from = shells, on = "death", inherit_velocity = 0 } :solve {}
 local trail = rapid.create { fps = 24 } :points("read_trail", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = stars, rate = 160, birth = "even", inherit_velocity = 0 } :solve {}
+  :spawn { from = stars, rate = 160, birth = "even", inherit_velocity = 0 } :solve {}
 return { main = still, trail = trail, stars = stars }]])
   local path = folder:write("apart.lua", body)
 

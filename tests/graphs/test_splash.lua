@@ -6,7 +6,7 @@ describe("graphs/splash.lua", function()
   -- What is born stays where it is, and the drops are an output of their own.
   local body = text:gsub("return crown:merge%b()", [[
 local born = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = drops, on = "hit", min_speed = 2, count = 24, split = true, inherit_velocity = 0 } :solve {}
+  :spawn { from = drops, on = "hit", min_speed = 2, count = 24, split = true, inherit_velocity = 0 } :solve {}
 return born]])
   local points = rapid.run(folder:write("apart.lua", body), { frames = {1, 36} })[36]
 

@@ -5,7 +5,7 @@ describe("graphs/trails.lua", function()
   local text = io.open("graphs/trails.lua"):read "*a"
   local body = text:gsub("return dust:merge%b()", [[
 local still = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = fragments, rate = 400, birth = "even", inherit_velocity = 0, limit = 200 } :solve {}
+  :spawn { from = fragments, rate = 400, birth = "even", inherit_velocity = 0, limit = 200 } :solve {}
 return { main = still, fragments = fragments }]])
   local result = rapid.run(folder:write("apart.lua", body), { frames = {1, 30} })
 

@@ -42,7 +42,7 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
           return rapid.points.from { P = places }
         end
         return rapid.create { fps = 24, seed = 3 }
-          :emit { source = moving, rate = 100.7, inherit = 1, life = 0.6 }
+          :emit { source = moving, rate = 100.7, inherit_velocity = 1, life = 0.6 }
           :emit { source = rapid.mesh.sphere { radius = 0.2 }:transform(function(frame)
                     return rapid.translate(0.1 * frame.number ^ 2, 0, 0) end), rate = 60, life = 0.4 }
           :gravity {} :solve {})"},
@@ -52,15 +52,15 @@ inline const std::vector<std::pair<std::string, std::string>> scenes_with_state 
                   life = {0.3, 0.6} }
           :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve {}
         local smoke = rapid.create { fps = 24, seed = 5, subframes = 2 }
-          :emit { source = balls, rate = 33.3, life = 0.3 }
-          :emit { source = balls, on = "hit", count = 2, life = 0.5 }
-          :emit { source = balls, on = "death", count = 3, limit = 2, split = true, life = 0.5 }
-          :emit { source = balls, on = "age > 0.2", count = 1, life = 0.5 }
-          :emit { source = balls, on = function(p) return p.P.y < 0.1 end, count = 1, life = 0.5 }
+          :spawn { from = balls, rate = 33.3, life = 0.3 }
+          :spawn { from = balls, on = "hit", count = 2, life = 0.5 }
+          :spawn { from = balls, on = "death", count = 3, limit = 2, split = true, life = 0.5 }
+          :spawn { from = balls, on = "age > 0.2", count = 1, life = 0.5 }
+          :spawn { from = balls, on = function(p) return p.P.y < 0.1 end, count = 1, life = 0.5 }
           :solve {}
         local own = rapid.create { fps = 24, seed = 6, subframes = 2 }
           :emit { source = rapid.shape.sphere { radius = 0.1 }, rate = 30, life = 0.5, velocity = {1, 0, 0} }
-        own = own:emit { source = own, rate = 20, birth = "even", life = 0.1 } :solve {}
+        own = own:spawn { from = own, rate = 20, birth = "even", life = 0.1 } :solve {}
         return smoke:merge(balls, own))"},
     {"points that another chain adopts", R"(
         local a = rapid.create { seed = 1 }

@@ -63,7 +63,7 @@ describe("a message", function()
   end)
 
   it("says that a number that changes is a function of the frame", function()
-    expect("rate = {0} has the wrong type; it must be a number or rapid.attr, or a function of the frame: "
+    expect("rate = {0} has the wrong type; it must be a number, or a function of the frame: "
       .. "function(frame) return ... end",
       fault "return rapid.create {} :emit { source = POINTS, rate = {[1] = 0} } :solve {}")
     expect("a function of the frame", fault
@@ -226,7 +226,7 @@ describe("a warning", function()
   it("names the node that reads contacts which no collider records", function()
     local chain = "local chain = rapid.create { points = POINTS } :collide { shape = rapid.shape.plane {}%s }"
     local reads = chain .. ":points('k', function(p) if p.hitnum > 0 then p.v = p.v * 2 end end) :solve {} return chain"
-    local bears = chain .. ":solve {} return rapid.create {} :emit { source = chain, on = 'hittotal >= 2' } :solve {}"
+    local bears = chain .. ":solve {} return rapid.create {} :spawn { from = chain, on = 'hittotal >= 2' } :solve {}"
     expect('node "k": reads hitnum, which no collider writes; give a :collide record = true',
       warnings(reads:format ""))
     expect('node "emit1": reads hittotal, which no collider writes', warnings(bears:format ""))

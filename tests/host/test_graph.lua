@@ -211,9 +211,9 @@ return rapid.create {} :emit { source = two, count = function(frame) return fram
 
   it("is told from a constant by node, file, line and frame when it fails", function()
     for body, expected in pairs {
-      ["return nil"] = 'scene.lua:1: node "emit1": count is nil; it must be an integer or rapid.attr',
+      ["return nil"] = 'scene.lua:1: node "emit1": count is nil; it must be an integer',
       ["return 'many'"] =
-        'scene.lua:1: node "emit1": count = "many" has the wrong type; it must be an integer or rapid.attr',
+        'scene.lua:1: node "emit1": count = "many" has the wrong type; it must be an integer',
       ["return -1"] = 'scene.lua:1: node "emit1": count = -1 is out of range; it must be at least 0',
       ["return nil + 1"] = 'scene.lua:3: node "emit1": attempt to perform arithmetic on a nil value',
       ["error 'no more'"] = 'scene.lua:3: node "emit1": no more',

@@ -4,7 +4,7 @@ local scene = require "testing.scene"
 local speck = "rapid.mesh.from { points = {{0, 0, 0}, {1e-6, 0, 0}, {0, 0, 1e-6}}, faces = {{1, 2, 3}} }"
 
 local function births_of(source, options)
-  return scene.run(("return rapid.create {} :emit { source = %s, count = 4, birth = 'even', inherit = 0, %s }")
+  return scene.run(("return rapid.create {} :emit { source = %s, count = 4, birth = 'even', inherit_velocity = 0, %s }")
     :format(source, options or ""), { frames = {1, 14} })
 end
 

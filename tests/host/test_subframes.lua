@@ -35,7 +35,7 @@ return rapid.create { fps = 10, start = 5, subframes = 4, points = rapid.points.
 local function going(frame) return rapid.translate(2 * frame.time, 3 * frame.time ^ 2, 0) end
 return rapid.create { fps = 24, subframes = %d }
   :emit { source = rapid.mesh.sphere { radius = 1e-7, divisions = 4 }:transform(going), rate = 1000,
-          birth = "even", inherit = 0 } :solve {}]]
+          birth = "even", inherit_velocity = 0 } :solve {}]]
     for _, n in ipairs { 1, 4, 5 } do
       local points = scene.run(text:format(n), { frames = {13, 13} })[13]
       assert.equal(500, #points)

@@ -84,7 +84,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, count = 9000,
     local result = scene.run([[
 local parents = rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {9, 0, 0}}, name = {"leaf", "bark"} } }
   :solve { name = "parents" }
-return rapid.create {} :emit { source = parents, count = 2, inherit = {"name"} }
+return rapid.create {} :spawn { from = parents, count = 2, inherit = {"name"} }
   :group { name = "leaves", where = function(p) return p.name == "leaf" end } :solve {}]], { frames = {3, 3} })
     local leaves = result[3]:group "leaves"
     assert.is_true(#leaves > 0 and #leaves < #result[3])
@@ -135,7 +135,7 @@ return rapid.create { points = two } :attribute { kind = "a" } :drag { linear = 
     assert.truthy(told:find('"kind" is string', 1, true), told)
     told = scene.error [[
 local parents = rapid.create { points = two } :attribute { kind = "a" } :solve { name = "parents" }
-return rapid.create {} :emit { source = parents, on = "kind > 1" } :solve {}]]
+return rapid.create {} :spawn { from = parents, on = "kind > 1" } :solve {}]]
     assert.truthy(told:find('on: "kind" is a text; test it with a function', 1, true), told)
   end)
 end)

@@ -119,7 +119,7 @@ local links = {
   ":emit { source = rapid.mesh.box {}, count = 5, life = {2, 1} }",
   ":emit { source = rapid.mesh.box {}, impulse = { x = 3 } }",
   ":emit { source = rapid.mesh.box {}, impulse = { [2] = 1e12 } }",
-  ":emit { source = rapid.create {} :emit { source = rapid.mesh.box {}, rate = 9 } :solve {}, source_group = 'no' }",
+  ":spawn { from = rapid.create {} :emit { source = rapid.mesh.box {}, rate = 9 } :solve {}, source_group = 'no' }",
   ":points(3)", ":points('x')", ":points('', function() end)", ":points(long, function(p) p.x = nil end)",
   ":points('x', function(p) p.v = p.missing end)", ":points('x', function(p) p.P = p.P / 0 end)",
   ":points('x', function(p) p.v = 3 end)", ":points('x', function(p) p.v = nil end)",

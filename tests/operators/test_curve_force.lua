@@ -180,7 +180,7 @@ describe("rapid.points.along", function()
     local text = [[
 local function path(frame) return rapid.points.along({{0, frame.time, 0}, {1, frame.time, 0}}, { count = 50 }) end
 return rapid.create { fps = 24, seed = 2 } :points("r", function(p) local _ = p.birthtime end)
-  :emit { source = path, rate = 4000, speed = 0, inherit = 0 } :solve {}]]
+  :emit { source = path, rate = 4000, speed = 0, inherit_velocity = 0 } :solve {}]]
     local result = scene.run(text, { frames = {1, 12} })[12]
     assert.is_true(#result > 1500)
     for i = 1, #result do assert.near(result[i].birthtime, result[i].P.y, 2e-3) end

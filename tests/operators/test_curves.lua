@@ -4,7 +4,7 @@ local scene = require "testing.scene"
 local function birth_scene(source, more)
   return ([[
 return rapid.create { fps = 24, seed = 5 } :points("r", function(p) local _ = p.birthtime end)
-  :emit { source = %s, rate = 2400, %s } :solve {}]]):format(source, more or "inherit = 0")
+  :emit { source = %s, rate = 2400, %s } :solve {}]]):format(source, more or "inherit_velocity = 0")
 end
 
 local moving = [[rapid.curve.from { points = function(frame)

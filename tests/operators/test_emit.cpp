@@ -295,9 +295,10 @@ TEST_CASE("newborn points inherit the given fraction of the source's velocity, w
     PointSet moving = points_at({{0, 0, 0}, {1, 0, 0}});
     moving.v() = Column<Vec3f>(std::span<const Vec3f>(std::vector<Vec3f>{{4, 0, 0}, {0, 0, 8}}));
     const double inherit = GENERATE(1.0, 0.5, 0.0);
-    NodeTest emit(
-        "emit",
-        {{"source", ObjectPtr(source_of(moving))}, {"count", 2.0}, {"inherit", inherit}, {"velocity", Vec3d(0, 1, 0)}});
+    NodeTest emit("emit", {{"source", ObjectPtr(source_of(moving))},
+                           {"count", 2.0},
+                           {"inherit_velocity", inherit},
+                           {"velocity", Vec3d(0, 1, 0)}});
     const std::vector<Vec3f> v = values_of<Vec3f>(emit(2), "v");
     const auto f = static_cast<float>(inherit);
     CHECK_THAT(v[0], close_to(Vec3f(4 * f, 1, 0), 1e-6));
@@ -583,7 +584,7 @@ TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
     CHECK(refusal({{"rate", 1.0}, {"from", "surface"}}, one_point()) ==
           "from = \"surface\" needs a mesh or a shape; of points take \"points\"");
     CHECK(refusal({{"rate", 1.0}}, 5.0) ==
-          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve, points or node");
+          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve or points");
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"id", 1.0}})}}, mesh).find("\"id\"") != std::string::npos);
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"life", 1.0}})}}, mesh) ==
           "attributes: \"life\" has its own way; use life");

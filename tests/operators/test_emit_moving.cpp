@@ -113,7 +113,7 @@ TEST_CASE(
     NodeTest emit("emit", {{"source", moved(speck(), places([&](const Frame& f) { return way(f.time); }))},
                            {"rate", 500.0},
                            {"birth", "even"},
-                           {"inherit", 0.5}});
+                           {"inherit_velocity", 0.5}});
     double off = 0, slip = 0;
     for (std::int64_t k = 0, frame = 2; frame <= 10; ++frame) {
         const PointSet born = emit(frame);
@@ -229,9 +229,11 @@ TEST_CASE("speed goes along the normal that a turning source has at the time of 
         return Pose{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(turn * f.number, Vec3d::UnitZ()))};
     });
     const MeshPtr facing_x = make_mesh({{1, 0, 0}, {1, 1e-3f, 0}, {1, 0, 1e-3f}}, {{0, 1, 2}});
-    NodeTest emit(
-        "emit",
-        {{"source", moved(facing_x, motion)}, {"count", 4.0}, {"birth", "even"}, {"speed", 3.0}, {"inherit", 0.0}});
+    NodeTest emit("emit", {{"source", moved(facing_x, motion)},
+                           {"count", 4.0},
+                           {"birth", "even"},
+                           {"speed", 3.0},
+                           {"inherit_velocity", 0.0}});
     const PointSet born = emit(9);
     for (int i = 0; i < 4; ++i) {
         const double at = turn * (8 + (i + 1) / 4.0);

@@ -163,7 +163,7 @@ return rapid.create { fps = 24 }
     write_points(1, 8)
     local points = scene.run([[
 return rapid.create { fps = 24 }
-  :emit { source = rapid.points.read "set.####.csv", rate = 4800, birth = "even", inherit = 0 }
+  :emit { source = rapid.points.read "set.####.csv", rate = 4800, birth = "even", inherit_velocity = 0 }
   :solve {}]], { frames = {5, 5} })[5]
     -- Half of them of each point, at any place between the files 1 and 5.
     assert.equal(800, #points)

@@ -95,8 +95,12 @@ values["list of vec3, points, or curve"] = values["list of vec3"]
 values["mesh, shape, points or rapid.attr"] = function()
   return pick { "rapid.mesh.box {}", "solid", "rapid.points.grid { spacing = 0.5 }" }
 end
+function values.node()
+  return "rapid.create { seed = 9 } :emit { source = rapid.mesh.sphere { radius = 0.5 }, rate = 240, " ..
+    "life = {0.05, 0.3} } :solve {}"
+end
 function values.mesh() return pick { "sheet", ("sheet:transform(%s)"):format(values.motion()) } end
-values["mesh, level set, shape, fog, curve, points or node"] = function()
+values["mesh, level set, shape, fog, curve or points"] = function()
   return pick { "solid", "rapid.mesh.sphere { radius = 0.5 }", "rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} }",
     ("rapid.mesh.box { size = {1, 0.1, 1} }:transform(%s)"):format(values.motion()) }
 end
@@ -104,7 +108,6 @@ values["number or {min, max}"] = function()
   local least = magnitude(-4, 1)
   return pick { "0", literal(least), ("{%s, %s}"):format(literal(least), literal(least * 3)) }
 end
-values["number or names"] = function() return literal(random()) end
 values["number, {min, max} or rapid.attr"] = values["number or {min, max}"]
 values.attributes = function() return ("{ own = %s }"):format(literal(random())) end
 values["list of frames"] = function() return pick { "{}", "{3}" } end
@@ -163,15 +166,14 @@ local rule = { -- of parameters that exclude each other
   field = function(given) if given.mode ~= '"velocity"' then given.drag = nil end end,
   attract = function(given) if given.shape then given.center = nil end end,
   emit = function(given)
-    for _, of_a_node in ipairs { "source_group", "on", "min_speed", "limit", "inherit_velocity", "split",
-      "kill_parent" } do
-      given[of_a_node] = nil
-    end
-    given.impulse, given.from, given.cut = nil, nil, chance(0.1) and "{3}" or nil
+    given.impulse, given.from, given.source_group, given.cut = nil, nil, nil, chance(0.1) and "{3}" or nil
     given.rate, given.count = nil, literal(math.floor(random() * 30))
     if chance(0.5) then given.rate, given.count = literal(pick { 0, magnitude(-2, 3) }), nil end
     if given.source:find "points" then given.speed = nil end
     given.group = chance(0.2) and '"some"' or nil
+  end,
+  spawn = function(given)
+    given.on, given.min_speed, given.kill_parent, given.rate, given.count = nil, nil, nil, nil, "2"
   end,
   -- A band of a level set as wide as the radius costs its voxels: small ones, and some that are refused.
   collide = function(given)

@@ -14,7 +14,7 @@ local emit = ":emit { source = rapid.mesh.sphere { radius = 0.5 }, rate = 240, l
   "group = \"some\" } "
 local create = "rapid.create { seed = 3 } "
 local grid = "rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.5 } } "
-local parents = ":emit { source = own, rate = 60, life = 0.1 } "
+local parents = ":spawn { from = own, rate = 60, life = 0.1 } "
 -- Another chain, which a merge is given too; its points lack attributes that those of the first one have.
 local other = "local other = rapid.create { seed = 5 } :attribute { pscale = 0.02 } " .. emit
 
@@ -44,7 +44,7 @@ local places = {
   { "on children", create .. given .. parents .. "NODE :solve {}", create .. emit .. ":solve {}" },
   { "on children of the same chain", "own" .. parents .. ":solve {}",
     create .. given .. emit .. "NODE" },
-  { "in sub-frames", (create:gsub("seed", "subframes = 3, seed")) .. given .. emit .. "NODE :solve { substeps = 2 }" },
+  { "in sub-frames", create .. given .. emit .. "NODE :solve { substeps = 2 }" },
   { "between two outputs", "{ main = own, after = own NODE }", create .. given .. emit .. ":solve {}" },
 }
 
@@ -61,7 +61,9 @@ function placements.at(number)
   legal_nodes.start(1, number, 1)
   local nodes = { NODE = legal_nodes.plain(name), NODE2 = legal_nodes.plain(name) }
   local text = other .. "\n" .. (place[3] and "local own = " .. place[3] .. "\n" or "") .. "return " .. place[2]
-  return legal_nodes.with_head((text:gsub("NODE2?", nodes))), name, place[1]
+  text = text:gsub("NODE2?", nodes)
+  if place[1] == "in sub-frames" then text = text:gsub("rapid%.create {", "%0 subframes = 3,") end
+  return legal_nodes.with_head(text), name, place[1]
 end
 
 function placements.of(name)

@@ -10,19 +10,19 @@ local random_chains = {}
 local draw, literal = legal_nodes.draw, legal_nodes.literal
 local pick, chance, magnitude = draw.pick, draw.chance, draw.magnitude
 
-local apart = { create = true, emit = true, merge = true, solve = true }
+local apart = { create = true, emit = true, merge = true, solve = true, spawn = true }
 local any = {}
 for name in pairs(legal_nodes.types) do
   if not apart[name] then any[#any + 1] = name end
 end
 table.sort(any)
 
--- An emitter whose parents are the points of another chain.
+-- A node whose parents are the points of another chain.
 local function children_of(parents)
   local when = pick { ("rate = %s"):format(literal(magnitude(0, 2))), "count = 2", 'on = "death", count = 3',
     'on = "birth"', 'on = "hit"', 'on = "age > 0.1", kill_parent = true', 'on = "P.y < 0.2", limit = 1',
     "on = near, count = 2" }
-  return ("  :emit { source = %s, %s, life = %s%s }\n"):format(parents, when, pick { "0.1", "{0, 0.4}", "math.huge" },
+  return ("  :spawn { from = %s, %s, life = %s%s }\n"):format(parents, when, pick { "0.1", "{0, 0.4}", "math.huge" },
     pick { "", ', inherit = {"own"}', ', group = "some"', ", attributes = { pscale = 0.1, own = {0, 1} }" })
 end
 

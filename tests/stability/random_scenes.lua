@@ -20,7 +20,7 @@ function random_scenes.start(seed, number) legal_nodes.start(seed, number) end
 -- What is drawn here apart: which of several parameters is given, and how much a scene may cost.
 local apart = {
   action = true, attribute = true, create = true, detail = true, merge = true, points = true, solve = true,
-  rasterize = true, write = true,
+  rasterize = true, spawn = true, write = true,
 }
 
 -- Kernels that are right at any step, and some that are not: their points may end infinite, which is an error.

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "runtime/graph/value.h"
-#include "runtime/operators/emit/point_path.h"
+#include "runtime/points/id_index.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/motion/curves.h"
@@ -86,6 +86,92 @@ Vec3f direction(const Vec3f& normal)
     return length > 0 ? Vec3f((normal.cast<double>() / length).cast<float>()) : Vec3f(Vec3f::Zero());
 }
 
+class PointCurves final : public BodyPath {
+public:
+    explicit PointCurves(std::vector<Cubic<Vec3d>> curves) : curves_(std::move(curves)) {}
+
+    void carry(std::span<const double> t, bool, std::span<Birthplace> births, std::span<Vec3d> velocity) const override
+    {
+        for (std::size_t i = 0; i < births.size(); ++i) {
+            const Cubic<Vec3d>& curve = curves_[static_cast<std::size_t>(births[i].element)];
+            births[i].P = curve.at(t[i]).cast<float>();
+            velocity[i] = curve.derivative(t[i]);
+        }
+    }
+
+private:
+    std::vector<Cubic<Vec3d>> curves_;  // by point
+};
+
+// v counts as the rate of change where the ways that it predicts are off by less than this part of the ways gone.
+constexpr double most_off = 0.5;
+
+bool is_rate_of_change(const PointSet& now, const PointSet& before, std::span<const std::uint32_t> place, double dt)
+{
+    double off = 0, way = 0;
+    for (std::size_t i = 0; i < place.size(); ++i) {
+        if (place[i] == IdIndex::none) continue;
+        const Vec3d d = now.P()[i].cast<double>() - before.P()[place[i]].cast<double>();
+        const Vec3d mean = 0.5 * (now.v()[i].cast<double>() + before.v()[place[i]].cast<double>());
+        off += (d - dt * mean).squaredNorm();
+        way += d.squaredNorm();
+    }
+    return way > 0 && off <= most_off * most_off * way;
+}
+
+// The curves along which the points of a source travel in one step, where the source is another set at each step: a
+// function of the frame, such as one that reads a sequence of files. Points are the same where their id is.
+//
+// Where the attribute v is the rate at which positions change, the curve is the cubic Hermite spline of both, which is
+// the path to third order. Else its tangents are differences: of second order from the third step on, straight before.
+// A point that was not there goes back along its v, or is at rest.
+struct PointPath {
+    BodyPathPtr path;           // births are given on the points of `now`, by element
+    std::size_t unmatched = 0;  // points of `now` that were not there before
+    bool follows_v = false;     // v is the rate at which positions change: path gives it, not the attribute
+};
+
+// now, before: the source at the end and the beginning of a step of `dt` seconds; earlier: a step before that, or null.
+PointPath point_path(const PointSet& now, const PointSet& before, const PointSet* earlier, bool straight, double dt)
+{
+    PointPath result;
+    const IdIndex index(before.id());
+    const std::optional<IdIndex> index_earlier =
+        earlier ? std::optional<IdIndex>(std::in_place, earlier->id()) : std::nullopt;
+    std::vector<std::uint32_t> place(now.size());
+    for (std::size_t i = 0; i < place.size(); ++i) {
+        place[i] = index[now.id()[i]];
+        result.unmatched += place[i] == IdIndex::none;
+    }
+    result.follows_v = is_rate_of_change(now, before, place, dt);
+
+    std::vector<Cubic<Vec3d>> curves(now.size());
+    const Vec3d none = Vec3d::Zero();
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+        const Vec3d P = now.P()[i].cast<double>(), m = dt * now.v()[i].cast<double>();
+        if (place[i] == IdIndex::none) {
+            const bool goes = result.follows_v || result.unmatched == now.size();
+            curves[i] = goes ? Cubic<Vec3d>{P - m, m, none, none} : Cubic<Vec3d>{P, none, none, none};
+            continue;
+        }
+        const Vec3d P0 = before.P()[place[i]].cast<double>(), d = P - P0;
+        Vec3d m0 = d, m1 = d;
+        const std::uint32_t third = index_earlier ? (*index_earlier)[now.id()[i]] : IdIndex::none;
+        if (straight) {
+        } else if (result.follows_v) {
+            m0 = dt * before.v()[place[i]].cast<double>();
+            m1 = m;
+        } else if (third != IdIndex::none) {
+            const Vec3d d0 = P0 - earlier->P()[third].cast<double>();
+            m0 = 0.5 * (d0 + d);
+            m1 = 0.5 * (3 * d - d0);
+        }
+        curves[i] = {P0, m0, 3 * d - 2 * m0 - m1, m0 + m1 - 2 * d};
+    }
+    result.path = std::make_shared<PointCurves>(std::move(curves));
+    return result;
+}
+
 }  // namespace
 
 BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density, std::string group)
@@ -97,9 +183,7 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
         std::dynamic_pointer_cast<const Mesh>(object_) || std::dynamic_pointer_cast<const AnimatedMesh>(object_);
     if (!group_.empty() && !(is_mesh && (from_.empty() || from_ == "surface")))
         throw Error(
-            fmt::format("source_group = \"{}\" is of the points of a node, or of the faces of a mesh, from its "
-                        "surface; leave it out",
-                        group_));
+            fmt::format("source_group = \"{}\" is of the faces of a mesh, from its surface; leave it out", group_));
     if (points || moving_points_) {
         if (!from_.empty() && from_ != "points")
             throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));

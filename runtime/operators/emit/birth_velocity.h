@@ -8,10 +8,9 @@
 
 #include <span>
 
+#include "runtime/operators/births/draws.h"
+#include "runtime/operators/births/newborn.h"
 #include "runtime/operators/emit/birth_source.h"
-#include "runtime/operators/emit/cone.h"
-#include "runtime/operators/emit/draws.h"
-#include "runtime/operators/emit/interval.h"
 
 namespace rapid {
 

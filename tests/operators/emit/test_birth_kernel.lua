@@ -60,7 +60,7 @@ describe("a function of the newborn", function()
 local stars = rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {5, 0, 0}}, v = {{0, 1, 0}, {0, 3, 0}} } }
   :solve {}
 return rapid.create { fps = 24 }
-  :emit { source = stars, count = 6, attributes = { heat = 0 }, birth = function(p) p.heat = p.v.y + p.parent end }
+  :spawn { from = stars, count = 6, attributes = { heat = 0 }, birth = function(p) p.heat = p.v.y + p.parent end }
   :solve {}]], { frames = {2, 2} })[2]
     assert.equal(12, #result)
     for i = 1, #result do

@@ -93,7 +93,7 @@ describe("what is born on a mesh of an OBJ file", function()
       message 'source = rapid.mesh.read "squares.obj", source_group = "rigth"', 1, true)
     assert.matches('source_group: the mesh "sphere" has no group of faces "left"; it has none',
       message 'source = rapid.mesh.sphere {}, source_group = "left"', 1, true)
-    assert.matches('source_group = "left" is of the points of a node, or of the faces of a mesh',
+    assert.matches('source_group = "left" is of the faces of a mesh, from its surface',
       message 'source = two, source_group = "left"', 1, true)
   end)
 end)

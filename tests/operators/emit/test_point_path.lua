@@ -11,7 +11,7 @@ end
 describe("points that are a function of the frame", function()
   it("bear on the parabola of their places and velocities, without beads", function()
     local points = run([[rapid.points.from { P = {{3 * frame.time, 5 * frame.time ^ 2, 0}},
-      v = {{3, 10 * frame.time, 0}} }]], 'rate = 480, birth = "even", inherit = 0')[13]
+      v = {{3, 10 * frame.time, 0}} }]], 'rate = 480, birth = "even", inherit_velocity = 0')[13]
     assert.equal(240, #points)
     for i = 1, #points do
       local t = i / 480
@@ -22,7 +22,7 @@ describe("points that are a function of the frame", function()
 
   it("bear on it without velocities too, from the third frame on", function()
     local points = run("rapid.points.from { P = {{3 * frame.time, 5 * frame.time ^ 2, 0}} }",
-      'rate = 480, birth = "even", inherit = 0')[13]
+      'rate = 480, birth = "even", inherit_velocity = 0')[13]
     for i = 1, #points do
       local t = i / 480
       -- The first way is a chord, with a sagitta of a h²/8.
@@ -48,7 +48,7 @@ describe("points that are a function of the frame", function()
     scene.folder:write("a.0001.csv", "id,Px,Py,Pz\n7,0,0,0\n9,1,0,0\n")
     scene.folder:write("a.0002.csv", "id,Px,Py,Pz\n9,1,1,0\n7,0,1,0\n12,5,5,5\n")
     scene.folder:write("a.0003.csv", "id,Px,Py,Pz\n12,5,6,5\n9,1,2,0\n7,0,2,0\n")
-    local result = run('rapid.points.read(("a.%04d.csv"):format(frame.number))', 'count = 300, inherit = 0', 3)
+    local result = run('rapid.points.read(("a.%04d.csv"):format(frame.number))', 'count = 300, inherit_velocity = 0', 3)
     for i = 1, #result[3] do
       local p = result[3][i]
       local x, y = math.floor(p.P.x + 0.5), p.birthtime * 24
@@ -74,7 +74,7 @@ describe("points with a transform", function()
 local turning = rapid.points.from { P = {{1, 0, 0}} }
   :transform(function(frame) return rapid.rotate({0, 0, 1}, 360 * frame.time) end)
 return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime end)
-  :emit { source = turning, rate = 480, birth = "even", inherit = 0 } :solve {}]], { frames = {1, 13} })[13]
+  :emit { source = turning, rate = 480, birth = "even", inherit_velocity = 0 } :solve {}]], { frames = {1, 13} })[13]
     assert.equal(240, #points)
     for i = 40, #points do -- the first interval has a one-sided beginning
       local angle = 2 * math.pi * i / 480

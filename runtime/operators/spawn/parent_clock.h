@@ -5,19 +5,81 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "runtime/graph/evaluation.h"
-#include "runtime/operators/emit/amount.h"
-#include "runtime/operators/emit/birth_event.h"
-#include "runtime/operators/emit/parent_paths.h"
+#include "runtime/graph/param.h"
+#include "runtime/graph/point_function.h"
+#include "runtime/operators/spawn/parent_paths.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/points/state_checks.h"
 #include "runtime/random.h"
 
 namespace rapid {
+
+// Births a second (double), or whole births (int): a number, or an attribute of the parents.
+template <class T>
+struct Amount {
+    static constexpr std::string_view param_type =
+        std::is_same_v<T, int> ? "integer or rapid.attr" : "number or rapid.attr";
+    T value{};
+    std::string attribute;  // where not empty, each parent has its own
+};
+
+template <class T>
+void read_value(const Param& param, const Value& value, Amount<T>& field)
+{
+    field = {};
+    if (const auto* reference = value.get<AttributeRef>())
+        field.attribute = reference->name;
+    else
+        read_value(param, value, field.value);
+}
+
+// "age > 0.5", "P.y < 0": true from a moment on.
+struct AttributeComparison {
+    enum Relation { Below, AtMost, Above, AtLeast };
+    std::string attribute;
+    int axis = -1;  // of a vec3; -1 of a number
+    Relation relation = Above;
+    double limit = 0;
+
+    bool holds(double value) const
+    {
+        switch (relation) {
+            case Below:
+                return value < limit;
+            case AtMost:
+                return value <= limit;
+            case Above:
+                return value > limit;
+            case AtLeast:
+                break;
+        }
+        return value >= limit;
+    }
+};
+
+// The moment at which a parent bears others: the parameter `on`.
+struct BirthEvent {
+    // Functions are made kernels by the host of the scripting language, as the end of this says.
+    static constexpr std::string_view param_type = "event or function of a point";
+
+    enum Kind { Hit, Death, Birth, Compares, Tests };
+    Kind kind = Hit;
+    AttributeComparison comparison;
+    std::shared_ptr<const PointFunction> test;
+
+    // What it reads of its points.
+    void uses(Uses& uses) const;
+};
+
+void read_value(const Param& param, const Value& value, BirthEvent& field);
 
 // Births of one parent: at one moment, or over its time in the step.
 struct Brood {
@@ -38,7 +100,7 @@ struct BirthPlan {
     double min_speed = 0;         // m/s, of hits
     std::optional<double> limit;  // births of a parent
     std::string birth;            // "random", "begin", "end", "even": over the time of a parent in the step
-    int part = 0, parts = 1;      // of a frame: the step\'s number in it, from 0, and how many there are
+    int part = 0, parts = 1;      // of a frame: the step's number in it, from 0, and how many there are
 };
 
 class ParentClock {

@@ -1,4 +1,4 @@
-#include "runtime/operators/emit/births.h"
+#include "runtime/operators/emit/birth_times.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "runtime/operators/emit/offspring.h"
+#include "runtime/operators/spawn/offspring.h"
 
 #include <algorithm>
 #include <array>
@@ -6,10 +6,8 @@
 #include <functional>
 #include <numeric>
 
-#include "runtime/operators/emit/cone.h"
-#include "runtime/operators/emit/draws.h"
+#include "runtime/operators/births/draws.h"
 #include "runtime/parallel.h"
-#include "runtime/points/attribute_like.h"
 
 namespace rapid {
 namespace {
@@ -21,16 +19,6 @@ std::uint64_t number_of(std::int64_t parent, std::uint64_t number)
 }
 
 }  // namespace
-
-std::vector<std::string> Traits::of_parents() const
-{
-    std::vector<std::string> names = inherit;
-    if (splits)
-        for (const char* shared : {"mass", "pscale"})
-            if (std::find(names.begin(), names.end(), shared) == names.end()) names.emplace_back(shared);
-    std::erase_if(names, [&](const std::string& name) { return attributes.has(name); });
-    return names;
-}
 
 // The newborn points' part of the columns, shape [n]; empty where nothing reads them.
 struct Offspring::Columns {
@@ -44,15 +32,15 @@ struct Offspring::Columns {
 
 Offspring::Offspring(const ParentPaths& parents, const std::vector<Brood>& broods, const Traits& traits,
                      const Evaluation& now)
-    : parents_(parents), broods_(broods), traits_(traits), now_(now)
+    : parents_(parents), broods_(broods), traits_(traits), newborn_(traits.newborn), now_(now)
 {
 }
 
 void Offspring::make_columns(PointSet& points) const
 {
-    for (const auto& [name, value] : traits_.attributes.of)
-        if (now_.keeps(name)) points.add(attribute_like(name, value.first()));
-    if (!traits_.group.empty() && now_.keeps_group(traits_.group)) points.group(traits_.group);
+    for (const AttributeSpec& spec : newborn_.given())
+        if (now_.keeps(spec.name)) points.add(spec);
+    if (newborn_.joins_group(now_)) points.group(newborn_.joins);
     if (!now_.at_start) points.add({"dt", static_cast<float>(now_.frame.dt)});
 }
 
@@ -62,10 +50,9 @@ std::size_t Offspring::append_to(PointSet& points, std::int64_t& next_id, std::s
     const std::size_t n = std::min(all, most);
     if (n == 0) return 0;
     std::vector<AttributeSpec> common = {{"age", 0.0f}};
-    for (const auto& [name, value] : traits_.attributes.of) common.push_back({name, value.first()});
-    if (traits_.life && traits_.life->is_single()) common.push_back({"life", static_cast<float>(traits_.life->min)});
-    const bool joins = !traits_.group.empty() && now_.keeps_group(traits_.group);
-    points.append(n, common, joins ? std::vector{traits_.group} : std::vector<std::string>());
+    for (const auto& [name, value] : newborn_.attributes.of) common.push_back({name, value.first()});
+    if (newborn_.life && newborn_.life->is_single()) common.push_back({"life", static_cast<float>(newborn_.life->min)});
+    points.append(n, common, newborn_.joins_group(now_) ? std::vector{newborn_.joins} : std::vector<std::string>());
 
     const Columns columns = columns_of(points, n);
     for_each_chunk(n, [&](std::size_t begin, std::size_t end) { fill(columns, begin, end); });
@@ -87,23 +74,16 @@ Offspring::Columns Offspring::columns_of(PointSet& points, std::size_t n) const
     columns.parent = last("parent", std::int64_t{});
     columns.dt = last("dt", 0.0f);
     columns.birthtime = last("birthtime", 0.0f);
-    if (traits_.life && !traits_.life->is_single()) columns.life = last("life", 0.0f);
-    add_drawn(points, n, columns);
+    if (newborn_.life && !newborn_.life->is_single()) columns.life = last("life", 0.0f);
+    columns.drawn = newborn_.draws_of(points, n, now_);
     add_inherited(points, n, columns);
     return columns;
-}
-
-void Offspring::add_drawn(PointSet& points, std::size_t n, Columns& columns) const
-{
-    for (const auto& [name, value] : traits_.attributes.of)
-        if (!value.is_common() && now_.keeps(name))
-            columns.drawn.push_back(draw_values(value, *points.find(name), n, now_.random, name));
 }
 
 // mass and pscale of a brood that shares its parent: m / n, r / n^(1/3).
 void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns) const
 {
-    for (const std::string& name : traits_.of_parents()) {
+    for (const std::string& name : traits_.inherit) {
         if (!now_.keeps(name)) continue;
         AnyColumn* own = points.find(name);
         if (!own) continue;
@@ -130,9 +110,9 @@ void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns)
 // The births [begin, end) of the step, brood by brood.
 void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end) const
 {
-    const Cone cone(traits_.spread);
+    const Cone cone(newborn_.spread);
     const StepRecord& record = parents_.record();
-    const bool turns = traits_.spread > 0 && (!is_zero(traits_.speed) || traits_.velocity != Vec3d::Zero());
+    const bool turns = newborn_.spread > 0 && (!is_zero(newborn_.speed) || newborn_.velocity != Vec3d::Zero());
     auto brood = std::upper_bound(broods_.begin(), broods_.end(), begin,
                                   [](std::size_t i, const Brood& b) { return i < b.first; }) -
                  1;
@@ -159,13 +139,13 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
             if (!piece.holds(t)) piece = parents_.piece(of, t);
             const ParentPaths::Moment moment = brood->hit == Brood::no_hit ? piece.at(t) : moment_of_hit(brood->hit);
             of_parent[j] = moment.v;
-            own[j] = traits_.velocity;
-            if (!is_zero(traits_.speed)) own[j] += speed_of(number + j) * normal_of(*brood, moment.v);
+            own[j] = newborn_.velocity;
+            if (!is_zero(newborn_.speed)) own[j] += speed_of(number + j) * normal_of(*brood, moment.v);
             columns.P[i + j] = moment.P.cast<float>();
             const double L = record.h - t + traits_.wait;
             if (!columns.dt.empty()) columns.dt[i + j] = static_cast<float>(L);
             if (!columns.birthtime.empty()) columns.birthtime[i + j] = static_cast<float>(now_.frame.time - L);
-            if (!columns.life.empty()) columns.life[i + j] = static_cast<float>(traits_.life->at(draws[j][life_draw]));
+            if (!columns.life.empty()) columns.life[i + j] = static_cast<float>(newborn_.life->at(draws[j][life_draw]));
             if (!columns.parent.empty()) columns.parent[i + j] = parent;
         }
         if (turns) cone.turn(std::span(own).first(count), draws);
@@ -177,8 +157,8 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
 
 double Offspring::speed_of(std::uint64_t number) const
 {
-    return traits_.speed.is_single() ? traits_.speed.min
-                                     : traits_.speed.at(uniform4(now_.random, number, speed_use)[0]);
+    return newborn_.speed.is_single() ? newborn_.speed.min
+                                      : newborn_.speed.at(uniform4(now_.random, number, speed_use)[0]);
 }
 
 ParentPaths::Moment Offspring::moment_of_hit(std::uint32_t place) const

@@ -1,4 +1,4 @@
-#include "runtime/operators/emit/cone.h"
+#include "runtime/operators/births/draws.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,32 +1,23 @@
 // The points that are born from the points of a node in one step: column by column, in parallel.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "runtime/graph/evaluation.h"
-#include "runtime/operators/emit/birth_values.h"
-#include "runtime/operators/emit/interval.h"
-#include "runtime/operators/emit/parent_clock.h"
-#include "runtime/operators/emit/parent_paths.h"
+#include "runtime/operators/births/newborn.h"
+#include "runtime/operators/spawn/parent_clock.h"
+#include "runtime/operators/spawn/parent_paths.h"
 
 namespace rapid {
 
 // What newborn points get, and what of it is their parents'.
 struct Traits {
-    Vec3d velocity;
-    Interval speed;                // m/s
-    double spread = 0, share = 1;  // rad, part of the parent's velocity
-    std::optional<Interval> life;
-    BirthValues attributes;
-    std::vector<std::string> inherit;
-    std::string group;
-    bool splits = false;
-    double wait = 0;  // s from the end of the parents' step to the end of the frame
-
-    // The attributes that newborn points get from their parents.
-    std::vector<std::string> of_parents() const;
+    const Newborn& newborn;
+    std::vector<std::string> inherit;  // the attributes that they get from their parents
+    double share;                      // part of the parent's velocity
+    bool splits;
+    double wait;  // s from the end of the parents' step to the end of the frame
 };
 
 class Offspring {
@@ -45,7 +36,6 @@ private:
     struct Columns;
 
     Columns columns_of(PointSet& points, std::size_t n) const;
-    void add_drawn(PointSet& points, std::size_t n, Columns& columns) const;
     void add_inherited(PointSet& points, std::size_t n, Columns& columns) const;
     void fill(const Columns& columns, std::size_t begin, std::size_t end) const;
     double speed_of(std::uint64_t number) const;
@@ -55,6 +45,7 @@ private:
     const ParentPaths& parents_;
     const std::vector<Brood>& broods_;
     const Traits& traits_;
+    const Newborn& newborn_;
     const Evaluation& now_;
 };
 

@@ -1,12 +1,14 @@
-#include "runtime/operators/emit/parent_clock.h"
+#include "runtime/operators/spawn/parent_clock.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <regex>
 
-#include "runtime/operators/emit/births.h"
-#include "runtime/operators/emit/draws.h"
+#include "runtime/operators/births/draws.h"
+#include "runtime/operators/births/newborn.h"
 #include "runtime/points/id_index.h"
 
 namespace rapid {
@@ -15,6 +17,25 @@ namespace {
 constexpr double most_of_parent = 4294967295;  // births: their numbers are half of a counter
 
 double whole_births(double due) { return std::floor(due + whole_tolerance); }
+
+std::optional<AttributeComparison> comparison_of(const std::string& text)
+{
+    static const std::regex form(R"(\s*([A-Za-z_]\w*)(?:\.([xyz]))?\s*(<=|>=|<|>)\s*([-+.\w]+)\s*)");
+    std::smatch part;
+    if (!std::regex_match(text, part, form)) return std::nullopt;
+    AttributeComparison comparison;
+    comparison.attribute = part[1];
+    if (part[2].matched) comparison.axis = *part[2].first - 'x';
+    comparison.relation = part[3] == "<"    ? AttributeComparison::Below
+                          : part[3] == "<=" ? AttributeComparison::AtMost
+                          : part[3] == ">"  ? AttributeComparison::Above
+                                            : AttributeComparison::AtLeast;
+    const std::string number = part[4];
+    char* end = nullptr;
+    comparison.limit = std::strtod(number.c_str(), &end);
+    if (*end != '\0' || !std::isfinite(comparison.limit)) return std::nullopt;
+    return comparison;
+}
 
 // The value that is compared, of a parent at a moment of its time in the step: of P and v along its path, of others
 // between the values before and after.
@@ -58,7 +79,7 @@ private:
     double value(const PointSet& set, std::size_t i) const
     {
         const AnyColumn* column = set.find(comparison_.attribute);
-        if (!column) throw Error(fmt::format("on: the source has no attribute \"{}\"", comparison_.attribute));
+        if (!column) throw Error(fmt::format("on: the parents have no attribute \"{}\"", comparison_.attribute));
         return std::visit(
             [&]<class T>(const Column<T>& c) -> double {
                 if constexpr (std::is_same_v<T, Vec3f>)
@@ -95,6 +116,26 @@ std::vector<std::uint8_t> tested(const PointFunction& function, const PointSet& 
     return result;
 }
 
+// The values of a float or integer attribute. Error: there is none of that name, or it holds vectors.
+std::vector<double> numbers_of(const PointSet& points, const std::string& attribute)
+{
+    const AnyColumn* column = points.find(attribute);
+    if (!column)
+        throw Error(fmt::format("rapid.attr \"{}\": the parents have no attribute of that name{}", attribute,
+                                did_you_mean(attribute, points.column_names())));
+    return std::visit(
+        [&]<class T>(const Column<T>& c) {
+            std::vector<double> values(points.size());
+            if constexpr (std::is_arithmetic_v<T>)
+                for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(c[i]);
+            else
+                throw Error(fmt::format("rapid.attr \"{}\" is {}; it must be a number", attribute,
+                                        type_name(type_of(*column))));
+            return values;
+        },
+        *column);
+}
+
 // An amount of each parent, asked of its set once.
 class Amounts {
 public:
@@ -105,7 +146,7 @@ public:
         if (attribute_.empty()) return;
         const StepRecord& record = paths.record();
         for (const PointSet* set : {&paths.living(), &record.killed, &record.old})
-            if (!set->empty()) of_set_.emplace_back(set, amount.of(*set));
+            if (!set->empty()) of_set_.emplace_back(set, numbers_of(*set, attribute_));
     }
 
     double of(const ParentPaths::Parent& parent, std::int64_t id) const
@@ -115,8 +156,8 @@ public:
             if (set != parent.set) continue;
             const double value = values[parent.place];
             if (value >= 0 && value <= most_of_parent) return value;
-            throw Error(fmt::format("{} = rapid.attr \"{}\": the source's point {} has {:g}; it must be at least 0",
-                                    what_, attribute_, id, value));
+            throw Error(fmt::format("{} = rapid.attr \"{}\": parent {} has {:g}; it must be at least 0", what_,
+                                    attribute_, id, value));
         }
         return 0;
     }
@@ -130,23 +171,41 @@ private:
 
 }  // namespace
 
-std::vector<double> numbers_of(const PointSet& points, const std::string& attribute)
+void BirthEvent::uses(Uses& uses) const
 {
-    const AnyColumn* column = points.find(attribute);
-    if (!column)
-        throw Error(fmt::format("rapid.attr \"{}\": the source has no attribute of that name{}", attribute,
-                                did_you_mean(attribute, points.column_names())));
-    return std::visit(
-        [&]<class T>(const Column<T>& c) {
-            std::vector<double> values(points.size());
-            if constexpr (std::is_arithmetic_v<T>)
-                for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(c[i]);
-            else
-                throw Error(fmt::format("rapid.attr \"{}\" is {}; it must be a number", attribute,
-                                        type_name(type_of(*column))));
-            return values;
-        },
-        *column);
+    if (kind == Compares) uses.reads_of_source.push_back(comparison.attribute);
+    if (kind != Tests) return;
+    Uses own;
+    test->uses(own);
+    const auto append = [](std::vector<std::string>& to, const std::vector<std::string>& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
+    append(uses.reads_of_source, own.reads);
+    append(uses.takes_of_source, own.may);
+    append(uses.reads_groups_of_source, own.reads_groups);
+}
+
+void read_value(const Param& param, const Value& value, BirthEvent& field)
+{
+    field = {};
+    if (const auto test = value.object<PointFunction>()) {
+        field.kind = BirthEvent::Tests;
+        field.test = test;
+        return;
+    }
+    const std::string* text = value.get<std::string>();
+    if (text && (*text == "hit" || *text == "death" || *text == "birth")) {
+        field.kind = *text == "hit" ? BirthEvent::Hit : *text == "death" ? BirthEvent::Death : BirthEvent::Birth;
+        return;
+    }
+    const std::optional<AttributeComparison> comparison = text ? comparison_of(*text) : std::nullopt;
+    if (!comparison)
+        throw Error(
+            fmt::format("{} = {} is no event; it must be \"hit\", \"death\", \"birth\", a comparison of an "
+                        "attribute with a number (\"age > 0.5\", \"P.y < 0\"), or a function of a point",
+                        param.name, describe(value)));
+    field.kind = BirthEvent::Compares;
+    field.comparison = *comparison;
 }
 
 // Collects the broods of a step.

@@ -1,4 +1,4 @@
-#include "runtime/operators/emit/birth_values.h"
+#include "runtime/operators/births/birth_values.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "runtime/operators/emit/parent_paths.h"
+#include "runtime/operators/spawn/parent_paths.h"
 
 #include <algorithm>
 #include <cmath>

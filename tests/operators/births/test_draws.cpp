@@ -1,5 +1,5 @@
 // Vectors turned within a cone.
-#include "runtime/operators/emit/cone.h"
+#include "runtime/operators/births/draws.h"
 
 #include <numbers>
 #include <random>

@@ -55,7 +55,7 @@ public:
         }
     };
 
-    // living: the source's points after the step; those of the record that died in it follow. Both outlive this.
+    // living: the points after the step; those of the record that died in it follow. Both outlive this.
     ParentPaths(const PointSet& living, const StepRecord& record, const std::string& group);
 
     std::size_t size() const { return parents_.size(); }

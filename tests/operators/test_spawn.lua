@@ -1,4 +1,4 @@
--- emit with a node as source: births from the points of another chain, at places and moments that have closed forms.
+-- spawn: births from the points of another chain, at places and moments that have closed forms.
 local scene = require "testing.scene"
 
 local g = 9.81
@@ -12,7 +12,7 @@ local parents = rapid.create { fps = fps, subframes = %d, points = rapid.points.
   %s :solve { substeps = %d }
 local children = rapid.create { fps = fps, subframes = %d, name = "nursery" }
   :attribute { heat = 0 } :points("read", function(p) local _ = p.parent + p.age + p.birthtime end)
-  :emit { source = parents, %s } %s :solve {}
+  :spawn { from = parents, %s } %s :solve {}
 return { main = children, parents = parents }]]):format(options.subframes or 1, parents,
     options.before or ":gravity {}", options.substeps or 1, options.subframes or 1, emit, options.after or ""),
     { frames = {1, options.frames or 13}, threads = options.threads })
@@ -120,7 +120,7 @@ local parents = rapid.create { fps = 24 }
   :emit { source = rapid.points.from { P = {{0, 0, 0}} }, rate = 10, birth = "even", life = 0.26, velocity = {2, 0, 0} }
   :solve {}
 return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = parents, rate = 300, birth = "even", inherit_velocity = 0 } :solve {}]], { frames = {1, 25} })[25]
+  :spawn { from = parents, rate = 300, birth = "even", inherit_velocity = 0 } :solve {}]], { frames = {1, 25} })[25]
     local first, last, count = {}, {}, {}
     for i = 1, #points do
       local p = points[i]
@@ -146,9 +146,9 @@ local parents = rapid.create { fps = 24 }
     velocity = {0, -1, 0}, spread = 40 }
   :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.6 } :solve { substeps = 2 }
 local trail = rapid.create { fps = 24 } :points("read_trail", function(p) local _ = p.parent end)
-  :emit { source = parents, %s } :gravity {} :solve {}
+  :spawn { from = parents, %s } :gravity {} :solve {}
 local drops = rapid.create { fps = 24 } :points("read_drops", function(p) local _ = p.parent end)
-  :emit { source = parents, on = "hit", count = 5, velocity = {0, 2, 0}, spread = 50 } :gravity {} :solve {}
+  :spawn { from = parents, on = "hit", count = 5, velocity = {0, 2, 0}, spread = 50 } :gravity {} :solve {}
 return { main = trail, drops = drops }]]):format(emit), { frames = {1, 13}, threads = threads })
     end
     local first = run(1)
@@ -245,7 +245,7 @@ describe("births at an event", function()
 local parents = rapid.create { fps = 24 }
   :emit { source = rapid.points.from { P = {{0, 0, 0}} }, rate = 50, birth = "even", velocity = {2, 0, 0} } :solve {}
 return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = parents, on = "birth" } :solve {}]], { frames = {1, 13} })[13]
+  :spawn { from = parents, on = "birth" } :solve {}]], { frames = {1, 13} })[13]
     assert.equal(25, #points)
     for i = 1, 25 do
       assert.near(i / 50, points[i].birthtime, 1e-6)
@@ -315,9 +315,9 @@ describe("generations", function()
     local result = scene.run([[
 local shells = rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{1, 0, 0}}, life = {0.01} } }
   :solve {}
-local stars = rapid.create { fps = 24 } :emit { source = shells, on = "death", count = 2, life = 0.02 } :solve {}
+local stars = rapid.create { fps = 24 } :spawn { from = shells, on = "death", count = 2, life = 0.02 } :solve {}
 local sparks = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime end)
-  :emit { source = stars, on = "death", count = 3, inherit_velocity = 0 } :solve {}
+  :spawn { from = stars, on = "death", count = 3, inherit_velocity = 0 } :solve {}
 return sparks]], { frames = {1, 2} })
     assert.equal(6, #result[2])
     for i = 1, 6 do
@@ -330,7 +330,7 @@ return sparks]], { frames = {1, 2} })
     local result = scene.run([[
 local born = rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{0, 5, 0}}, n = {2} } }
 return born:gravity {} :points("read", function(p) local _ = p.birthtime + p.parent end)
-  :emit { source = born, count = rapid.attr "n", birth = "even", attributes = { n = 0 } } :solve {}]],
+  :spawn { from = born, count = rapid.attr "n", birth = "even", attributes = { n = 0 } } :solve {}]],
       { frames = {1, 8} })
     assert.equal(1, #result[2])
     for frame = 3, 8 do
@@ -344,39 +344,104 @@ return born:gravity {} :points("read", function(p) local _ = p.birthtime + p.par
   end)
 end)
 
-describe("a node as source that can't be one", function()
+describe("a node that can't bear", function()
   local function fails(text, message)
     local found = scene.error(text, { frames = {1, 3} })
     assert.truthy(found:find(message, 1, true), found)
   end
   local function with(parents, emit)
     return ("local parents = rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } %s\n"):format(parents)
-      .. ("return rapid.create {} :emit { %s } :solve {}"):format(emit)
+      .. ("return rapid.create {} :spawn { %s } :solve {}"):format(emit)
   end
 
   it("is refused with what would be right", function()
-    fails(with("", "source = parents, count = 1"), "its points are not moved by a solve; end its chain with :solve{}")
+    fails(with("", "from = parents, count = 1"), "its points are not moved by a solve; end its chain with :solve{}")
     fails("local inner = rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity { name = 'pull' }\n"
       .. "local outer = inner:solve { name = 'end' }\n"
-      .. "return { a = outer, b = rapid.create {} :emit { source = inner, count = 1 } :solve {} }",
-      'source = node "pull" comes before its solve; give "end", or a node after it')
+      .. "return { a = outer, b = rapid.create {} :spawn { from = inner, count = 1 } :solve {} }",
+      'from = node "pull" comes before its solve; give "end", or a node after it')
     fails("local slow = rapid.create { fps = 12 } :solve {}\n"
-      .. "return rapid.create {} :emit { source = slow, count = 1 } :solve {}", "give both the same fps")
-    fails(with(":solve {}", "source = parents"), "nothing says how many points are born")
-    fails(with(":solve {}", 'source = parents, on = "hits"'), 'on = "hits" is no event')
-    fails(with(":solve {}", 'source = parents, on = "hit", rate = 3'), "rate and on are given together")
-    fails(with(":solve {}", 'source = parents, count = 1, kill_parent = true'),
+      .. "return rapid.create {} :spawn { from = slow, count = 1 } :solve {}", "give both the same fps")
+    fails(with(":solve {}", "from = parents"), "nothing says how many points are born")
+    fails(with(":solve {}", 'from = parents, on = "hits"'), 'on = "hits" is no event')
+    fails(with(":solve {}", 'from = parents, on = "hit", rate = 3'), "rate and on are given together")
+    fails(with(":solve {}", 'from = parents, count = 1, kill_parent = true'),
       "kill_parent is for births at an event in a parent's life")
-    fails(with(":solve {}", 'source = parents, count = 1, inherit = {"heta"}'),
-      'node "emit1": inherit: the source has no attribute "heta"')
-    fails(with(":solve {}", 'source = parents, count = rapid.attr "n"'), 'no attribute "n"')
-    fails(with(":solve {}", 'source = parents, count = 1, source_group = "old"'), 'no node makes a group "old"')
-    fails(with(":solve {}", 'source = parents, count = 1, from = "points"'), "from is not for a source that is a node")
-    fails("local other = rapid.create { points = two } :solve {}\n"
-      .. "return rapid.create {} :emit { source = function() return other end, count = 1 } :solve {}",
-      "a function of the frame can't give a node")
-    fails(with(":solve { tolerance = 1e-3 }", 'source = parents, on = "hit"'), "has a tolerance")
-    fails(with(":solve {}", 'source = rapid.mesh.sphere {}, count = 1, on = "hit"'),
-      "on is for a source that is a node")
+    fails(with(":solve {}", 'from = parents, count = 1, inherit = {"heta"}'),
+      'node "emit1": inherit: the parents have no attribute "heta"')
+    fails(with(":solve {}", 'from = parents, count = rapid.attr "n"'), 'no attribute "n"')
+    fails(with(":solve {}", 'from = parents, count = 1, source_group = "old"'), 'no node makes a group "old"')
+    fails(with(":solve {}", "from = parents, count = 1, impulse = {[2] = 3}"), 'unknown parameter "impulse"')
+    fails(with(":solve {}", "from = function() return parents end, count = 1"), "from can't be a function of the frame")
+    fails(with(":solve {}", "from = rapid.mesh.sphere {}, count = 1"), "from = a mesh has the wrong type")
+    fails(with(":solve { tolerance = 1e-3 }", 'from = parents, on = "hit"'), "has a tolerance")
+  end)
+end)
+
+describe("emit with a node as its source", function()
+  local function refused(emit)
+    return (scene.error(([[
+local stars = rapid.create { points = two } :solve {}
+local size, many = vec3(1, 2, 3), function() return 2 end
+local old = function(p) return p.age > 1 end
+local chain = rapid.create {} :attribute { heat = 1 }
+  :emit { %s } :solve {}
+return chain]]):format(emit)))
+  end
+  local function expect(call, emit)
+    assert.equal('scene.lua:5: node "emit1": source is a node, whose points :spawn takes; write ' .. call,
+      refused(emit))
+  end
+
+  it("says how the scene's arguments are written for spawn, by the names of its variables", function()
+    expect(':spawn { from = stars, life = {0.5, 1}, on = "death" }', 'source = stars, on = "death", life = {0.5, 1}')
+    expect(":spawn { from = stars, count = many, on = old, velocity = {1, 2, 3} }",
+      "source = stars, count = many, on = old, velocity = size")
+    expect(':spawn { from = stars, attributes = {Cd = {1, 0, 0}}, inherit = {"heat"}, rate = rapid.attr "n" }',
+      'source = stars, rate = rapid.attr "n", inherit = {"heat"}, attributes = { Cd = {1, 0, 0} }')
+    expect(":spawn { from = chain, birth = function(...) ... end, rate = 5 }",
+      "source = rapid.create {} :solve {}, rate = 5, birth = function(p) p.heat = 2 end")
+    assert.matches('node "burst": .*name = "burst"', refused 'source = stars, count = 1, name = "burst"')
+  end)
+
+  it("says so of the part of the velocity that was inherited under another name", function()
+    expect(":spawn { from = stars, inherit_velocity = 0.5, rate = 5 }", "source = stars, rate = 5, inherit = 0.5")
+    assert.matches('unknown parameter "inherit"; did you mean "inherit_velocity"?',
+      scene.error "return rapid.create {} :emit { source = two, rate = 5, inherit = 0.5 }", 1, true)
+  end)
+
+  it("gives the words with which the scene runs to the same bits as under the emitter's name", function()
+    local text = "local stars = rapid.create { points = two } :gravity {} :solve {}\n"
+      .. "return rapid.create {} :emit { %s } :solve {}"
+    local call = scene.error(text:format "source = stars, rate = 500, spread = 40, velocity = {0, 1, 0}")
+      :match "write (:spawn .*)$"
+    local found = scene.run((text:gsub(":emit { %%s }", (call:gsub("%%", "%%%%")))))[3]
+    local named = scene.run((text:format("from = stars, rate = 500, spread = 40, velocity = {0, 1, 0}, name = 'emit1'"
+      ):gsub(":emit", ":spawn")))[3]
+    assert.is_true(#found > 20)
+    assert.same_points(named, found)
+  end)
+
+  it("finds a node that a function of the frame returns, too", function()
+    local message = scene.error [[
+local stars = rapid.create { points = two } :solve {}
+return rapid.create {} :emit { source = function() return stars end, count = 1 } :solve {}]]
+    assert.matches("source is a node, whose points are parents; give it to spawn", message, 1, true)
+  end)
+end)
+
+describe("the names of nodes that bear", function()
+  it("are numbered together, whichever they are", function()
+    local function names(first, second)
+      local text = ("local a = rapid.create { points = two } :solve {}\nreturn rapid.create {} %s %s :solve {}")
+        :format(first, second)
+      return scene.command("explain", text, "--json").stdout
+    end
+    local emit, spawn = ":emit { source = two, count = 1 }", ":spawn { from = a, count = 1 }"
+    for _, pair in ipairs { { emit, spawn }, { spawn, emit }, { spawn, spawn }, { emit, emit } } do
+      local found = names(unpack(pair))
+      assert.matches('"emit1"', found, 1, true)
+      assert.matches('"emit2"', found, 1, true)
+    end
   end)
 end)

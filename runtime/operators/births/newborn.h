@@ -1,0 +1,112 @@
+// The parameters that emit and spawn share: when points are born, how fast, for how long, and what they have.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/graph/node.h"
+#include "runtime/graph/point_editor.h"
+#include "runtime/graph/point_function.h"
+#include "runtime/operators/births/birth_values.h"
+
+namespace rapid {
+
+// A number of births due that is this near to a whole one counts as that. 0.29 births a second for 100 s are
+// 28.999999999999996 in doubles, and 29 to the user. Rounding stays below 1e-11 after 100,000 changes of the rate, and
+// a birth is shifted by at most this fraction of the interval between two.
+inline constexpr double whole_tolerance = 1e-9;
+
+// Memory of a newborn point with the attributes that most have, in the state and in what is made of it within a frame.
+inline constexpr double bytes_a_birth = 2 * 64;
+
+inline constexpr std::size_t trial_births = 64;  // of a frame, in a trial (Evaluator::examine)
+
+// One number for all points, or uniform between two: 2 or {1, 3}.
+struct Interval {
+    static constexpr std::string_view param_type = "number or {min, max}";
+    double min = 0, max = 0;
+
+    bool is_single() const { return min == max; }
+    // u: uniform in [0, 1).
+    double at(double u) const { return is_single() ? min : min + (max - min) * u; }
+};
+
+void read_value(const Param& param, const Value& value, Interval& field);
+
+inline bool is_zero(const Interval& interval) { return interval.min == 0 && interval.max == 0; }
+// 2, or {1, 3}.
+std::string describe(const Interval& interval);
+
+// When in the frame's interval points are born, or a function that edits each newborn point, which is then born at a
+// random time.
+struct BirthMoment {
+    // Functions are made kernels by the host of the scripting language, as the end of this says.
+    static constexpr std::string_view param_type = "moment or function of a point";
+
+    std::string when = "random";
+    // Null without a function; the same object.
+    std::shared_ptr<const PointFunction> function;
+    std::shared_ptr<const PointEditor> edit;
+};
+
+void read_value(const Param& param, const Value& value, BirthMoment& field);
+
+// Base of the structs of emit and spawn.
+struct Newborn {
+    BirthMoment birth;
+    Vec3d velocity;
+    Interval speed;
+    double spread;
+    std::optional<Interval> life;
+    std::string joins;
+    BirthValues attributes;
+
+    // Adds these parameters, and what every newborn point has. speed_along: the direction of `speed`.
+    template <class T>
+    static void declare_newborn(Declaration<T>& type, const std::string& speed_along);
+
+    void use_newborn(Uses& uses) const;
+    void check_attributes() const;
+
+    // The attributes that `attributes` makes.
+    std::vector<AttributeSpec> given() const;
+    // The value of a float attribute if `attributes` gives all newborn the same one.
+    std::optional<std::vector<float>> common_value(const std::string& attribute) const;
+    bool may_end() const { return std::isfinite(life->min); }
+    bool joins_group(const Evaluation& now) const { return !joins.empty() && now.keeps_group(joins); }
+    // The functions that draw the values which differ from birth to birth, of the last n points.
+    std::vector<DrawValues> draws_of(PointSet& points, std::size_t n, const Evaluation& now) const;
+};
+
+template <class T>
+void Newborn::declare_newborn(Declaration<T>& type, const std::string& speed_along)
+{
+    type.varies()
+        .stage(Stage::Emission)
+        .writes("P")
+        .writes("v")
+        .writes("id")
+        .param(&T::birth, "birth", "random", any_number(), "",
+               "at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, "
+               "frame) that edits each newborn point once, which is born at random")
+        .choices({"random", "begin", "end", "even"})
+        .constant()
+        .param(&T::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
+        .param(&T::speed, "speed", 0.0, any_number(), "m/s",
+               "along " + speed_along + ", added to velocity; a number or {min, max}")
+        .param(&T::spread, "spread", 0.0, between(0, 180), "deg",
+               "turns velocity and speed together, uniformly in a cone of this half angle")
+        .param(&T::life, "life", Value(), or_infinity(at_least(0)), "s",
+               "age at which points die: a number or {min, max}; without it they live for ever")
+        .param(&T::joins, "group", Value(), any_number(), "", "the newborn join this group")
+        .constant()
+        .param(&T::attributes, "attributes", Value(), any_number(), "",
+               "values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on "
+               "a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they replace inherited values");
+}
+
+}  // namespace rapid

@@ -1,0 +1,273 @@
+// spawn: bears points from the points of another node, its parents, at moments and places of their paths.
+//
+// Each parent bears along its path through the frame (spawn/parent_paths.h), by rate and count of each, or at an event
+// (spawn/parent_clock.h). Parents of another simulation, which comes before, have their path in this frame; those of
+// the same simulation move later in the frame, and bear along their path of the frame before.
+//
+// A birth's random numbers depend on the seed, on the name of this node and on the birth's number among those of its
+// parent. Nodes without a name of their own are numbered together with those of emit, of which spawn was a part: so
+// scenes that were written for it keep their random numbers.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "runtime/graph/coupling.h"
+#include "runtime/graph/node_handle.h"
+#include "runtime/graph/stateful.h"
+#include "runtime/memory_budget.h"
+#include "runtime/operators/spawn/offspring.h"
+#include "runtime/points/id_index.h"
+
+namespace rapid {
+namespace {
+
+// Error: no memory for all newborn, with a copy of the points that are there.
+void require_room(const PointSet& points, const std::vector<Brood>& broods)
+{
+    if (broods.empty()) return;
+    const std::size_t n = broods.back().first + broods.back().count;
+    const double bytes = static_cast<double>(n) * bytes_a_birth + static_cast<double>(points.bytes());
+    if (fits_in_memory(bytes)) return;
+    throw beyond_memory(
+        fmt::format("{} births in a frame, of {} parents, behind {} points,", n, broods.size(), points.size()), bytes,
+        "give a smaller rate or count, or a limit");
+}
+
+bool emits(const BirthPlan& plan)
+{
+    const auto is_positive = [](const auto& amount) { return !amount.attribute.empty() || amount.value > 0; };
+    if (plan.rate) return is_positive(*plan.rate);
+    return plan.count ? is_positive(*plan.count) : plan.on.has_value();
+}
+
+// In a trial, in which no point moves and nothing happens to it: one birth of a living parent.
+std::vector<Brood> sample_of(const ParentPaths& parents)
+{
+    for (std::uint32_t i = 0; i < parents.size(); ++i) {
+        if (!parents[i].takes_part || !parents[i].is_alive) continue;
+        Brood brood{};
+        brood.parent = i;
+        brood.hit = Brood::no_hit;
+        brood.count = 1;
+        brood.begin = brood.end = parents[i].end;
+        return {brood};
+    }
+    return {};
+}
+
+// Points of this chain are removed at once, those of another by the evaluator, from all that nobody has taken yet.
+void remove_parents(Flow& flow, const Flow& from, const ParentPaths& parents, const std::vector<Brood>& broods,
+                    const Evaluation& now)
+{
+    if (from.simulation != flow.simulation) {
+        for (const Brood& brood : broods)
+            if (parents[brood.parent].is_alive) from.simulation->condemned.push_back(parents.id(parents[brood.parent]));
+        return;
+    }
+    std::vector<std::uint8_t> keep(flow.points.size(), 1);
+    const IdIndex index(std::as_const(flow.points).id());
+    for (const Brood& brood : broods)
+        if (const std::uint32_t i = index[parents.id(parents[brood.parent])]; i != IdIndex::none) keep[i] = 0;
+    now.figures.died += static_cast<std::uint64_t>(std::count(keep.begin(), keep.end(), 0));
+    flow.points.keep(keep);
+}
+
+struct Spawn : Newborn {
+    std::shared_ptr<const NodeHandle> from;
+    std::string source_group;
+    std::optional<Amount<double>> rate;
+    std::optional<Amount<int>> count;
+    std::optional<BirthEvent> on;
+    std::optional<double> min_speed, limit;
+    std::vector<std::string> inherit;
+    double inherit_velocity;
+    bool split, kill_parent;
+
+    static NodeType declare()
+    {
+        auto type = node<Spawn>("spawn", "Bears points from those of another node, all the time or at events.");
+        type.counted_as("emit");
+        declare_births(type);
+        declare_newborn(type, "N: the normal at a hit, else the parent's attribute, else its way");
+        type.param(&Spawn::inherit, "inherit", Value(), any_number(), "",
+                   "names of attributes that the newborn have of their parents")
+            .param(&Spawn::inherit_velocity, "inherit_velocity", 1.0, any_number(), "",
+                   "fraction of the parent's velocity at the birth that is added")
+            .param(&Spawn::split, "split", false, any_number(), "",
+                   "those that are born together share the parent's mass and volume")
+            .param(&Spawn::kill_parent, "kill_parent", false, any_number(), "",
+                   "with on: a point that has borne is removed");
+        return type;
+    }
+
+    static void declare_births(Declaration<Spawn>& type)
+    {
+        type.param(&Spawn::from, "from", Value(), any_number(), "", "the node whose points are parents")
+            .required()
+            .constant()
+            .param(&Spawn::source_group, "source_group", Value(), any_number(), "", "only parents in this group bear")
+            .constant()
+            .param(&Spawn::on, "on", Value(), any_number(), "",
+                   "births at an event, count of each (1), not all the time: \"hit\", \"death\", \"birth\", when a "
+                   "comparison of an attribute with a number (\"age > 0.5\", \"P.y < 0\") begins to hold, or a "
+                   "function of a point begins to be true")
+            .constant()
+            .param(&Spawn::min_speed, "min_speed", Value(), at_least(0), "m/s",
+                   "with on = \"hit\": the least speed of approach")
+            .param(&Spawn::rate, "rate", Value(), at_least(0), "1/s", "points born a second by each parent")
+            .param(&Spawn::count, "count", Value(), at_least(0), "", "points born by each parent, a frame or an event")
+            .param(&Spawn::limit, "limit", Value(), at_least(0), "", "the most births of one parent");
+    }
+
+    void uses(Uses& uses) const
+    {
+        for (const AttributeSpec& spec : made(uses)) uses.makes.push_back(spec);
+        const std::vector<std::string> names = of_parents();
+        uses.reads_of_source.insert(uses.reads_of_source.end(), names.begin(), names.end());
+        if (!is_zero(speed)) uses.takes_of_source.emplace_back("N");
+        if (!source_group.empty()) uses.reads_groups_of_source.push_back(source_group);
+        if (on) on->uses(uses);
+        uses.gives.emplace_back("parent");
+        uses.writes.emplace_back("dt");
+        use_newborn(uses);
+    }
+
+    std::string couples(const Plan&, const PlannedNode&) const
+    {
+        return "its births are numbered over all points of its source";
+    }
+
+    std::optional<std::vector<float>> values(const std::string& attribute, float) const
+    {
+        return common_value(attribute);
+    }
+
+    void check() const
+    {
+        if (!rate && !count && !on) throw Error("nothing says how many points are born; give rate, count or on");
+        if (rate && count) throw Error("rate and count are given together; keep one of them");
+        check_attributes();
+        if (on && rate) throw Error("rate and on are given together; with an event give count, the births of each");
+        if (on && birth.when != "random")
+            throw Error(
+                fmt::format("birth = \"{}\" and on are given together; an event has its own moment", birth.when));
+        if (min_speed && !(on && on->kind == BirthEvent::Hit))
+            throw Error("min_speed is for on = \"hit\"; leave it out, or give on");
+        if (kill_parent && (!on || on->kind == BirthEvent::Death))
+            throw Error("kill_parent is for births at an event in a parent's life; give on, and not \"death\"");
+    }
+
+    Flow start(std::span<Flow> inputs, const Evaluation& now)
+    {
+        bear(inputs[0], inputs[1], now);
+        return std::move(inputs[0]);
+    }
+
+    Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
+    {
+        const std::uint64_t born = now.figures.born;
+        Flow flow = start(inputs, now);
+        if (now.at_start) return flow;
+        has_borne_ |= now.figures.born > born;
+        if (flow.simulation->trial && !has_borne_) ++now.figures.idle;
+        return flow;
+    }
+
+    static std::unique_ptr<Operator> make() { return stateful<Spawn>(); }
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(clock_);
+    }
+
+private:
+    // The attributes that newborn points get from their parents.
+    std::vector<std::string> of_parents() const
+    {
+        std::vector<std::string> names = inherit;
+        if (split)
+            for (const char* shared : {"mass", "pscale"})
+                if (std::find(names.begin(), names.end(), shared) == names.end()) names.emplace_back(shared);
+        std::erase_if(names, [&](const std::string& name) { return attributes.has(name); });
+        return names;
+    }
+
+    std::vector<AttributeSpec> made(const Uses& uses) const;
+    BirthPlan plan_of_step(const Flow& flow, const Flow& from, const Evaluation& now) const;
+    void bear(Flow& flow, const Flow& from, const Evaluation& now);
+
+    ParentClock clock_;
+    bool has_borne_ = false;  // read in trials
+};
+RAPID_NODE(Spawn);
+RAPID_COUPLING("spawn", Spawn);
+
+// The type of an inherited attribute is that which the source's makers, or Rapid, give it. Error: nobody makes it.
+std::vector<AttributeSpec> Spawn::made(const Uses& uses) const
+{
+    std::vector<AttributeSpec> specs = given();
+    for (const std::string& name : of_parents()) {
+        const auto of_source = std::find_if(uses.source_makes.begin(), uses.source_makes.end(),
+                                            [&](const AttributeSpec& spec) { return spec.name == name; });
+        if (of_source != uses.source_makes.end()) {
+            specs.push_back(*of_source);
+        } else if (const AttributeSpec* known = known_attribute(name)) {
+            specs.push_back(*known);
+        } else {
+            std::vector<std::string> names;
+            for (const AttributeSpec& spec : uses.source_makes) names.push_back(spec.name);
+            const std::string near = did_you_mean(name, names);
+            throw Error(fmt::format("inherit: the parents have no attribute \"{}\"{}", name,
+                                    near.empty() ? "; make it there, with :attribute or emit's attributes" : near));
+        }
+    }
+    return specs;
+}
+
+// What is born a frame is spread over its sub-frames.
+BirthPlan Spawn::plan_of_step(const Flow& flow, const Flow& from, const Evaluation& now) const
+{
+    BirthPlan plan{rate, count, on, min_speed.value_or(0), limit, birth.when};
+    const FrameClock clock = flow.simulation->clock();
+    const std::int64_t late = from.simulation == flow.simulation ? 1 : 0;
+    const std::int64_t before = clock.step_at(now.frame) - clock.start - 1 - late;
+    plan.parts = clock.subframes;
+    plan.part = static_cast<int>(std::max<std::int64_t>(before, 0) % clock.subframes);
+    return plan;
+}
+
+void Spawn::bear(Flow& flow, const Flow& from, const Evaluation& now)
+{
+    const StepRecord& record = *from.simulation->record;
+    if (on && on->kind == BirthEvent::Hit && !record.has_contacts)
+        throw Error("on = \"hit\": the parents' solve has a tolerance, and then keeps no contacts; give it substeps");
+    // Points of the same chain move after this node: their last path is that of the frame before.
+    const bool waits = from.simulation == flow.simulation && !now.at_start;
+    const ParentPaths parents(from.points, record, source_group);
+    const BirthPlan plan = plan_of_step(flow, from, now);
+    std::vector<Brood> broods;
+    // A chain that begins when its parents have lived already bears from its next frame on.
+    if (!now.at_start || record.h == 0) broods = clock_.births(parents, plan, now);
+    const bool is_trial = flow.simulation->trial;
+    const bool is_sample = is_trial && !now.at_start && broods.empty() && emits(plan);
+    if (is_sample) broods = sample_of(parents);
+
+    const Traits traits{*this, of_parents(), inherit_velocity, split, waits ? now.frame.dt : 0};
+    const Offspring offspring(parents, broods, traits, now);
+    offspring.make_columns(flow.points);
+    require_room(flow.points, broods);
+    if (kill_parent && !is_sample) remove_parents(flow, from, parents, broods, now);
+    const std::size_t born =
+        offspring.append_to(flow.points, flow.simulation->next_id, is_trial ? trial_births : SIZE_MAX);
+    now.figures.born += born;
+    if (parents.without_path() > 0 && !now.at_start)
+        now.warnings.push_back(fmt::format(
+            "{}:{}: node \"{}\": the source has points that its solve has not moved, as of another chain or "
+            "made after it; what they bear is born where they are at the end of the frame",
+            now.location.file, now.location.line, now.node));
+    if (birth.edit) birth.edit->edit(flow.points, flow.points.size() - born, now);
+}
+
+}  // namespace
+}  // namespace rapid

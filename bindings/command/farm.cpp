@@ -1,14 +1,20 @@
-// rapid farm: what became of a job that --farm submitted.
+#include "bindings/command/farm.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
+#include <charconv>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <set>
+#include <sstream>
+#include <utility>
 
-#include "bindings/command/farm_job.h"
-#include "bindings/command/slurm.h"
-#include "bindings/command_line/command.h"
+#include "bindings/command/processes.h"
+#include "bindings/command_line/programs.h"
+#include "runtime/files/program_path.h"
+#include "runtime/files/whole_file.h"
 
 namespace rapid {
 namespace {
@@ -16,36 +22,176 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+// Slurm, by its commands: sbatch, squeue, scancel.
+
+// Returns its standard output. Throws Error with what it says if it fails.
+std::string said_by(const std::vector<std::string>& words)
+{
+    const ProgramOutput output = output_of(words);
+    if (output.status == 0) return output.out;
+    throw Error(fmt::format("{} failed with status {}: {}", words.front(), output.status, output.errors));
+}
+
+std::int64_t submit(const FarmJob& job, const fs::path& script, std::vector<std::string> words)
+{
+    words.insert(words.begin(), {"sbatch", "--parsable"});
+    words.insert(words.end(), job.options.begin(), job.options.end());
+    words.push_back(script.string());
+    const std::string said = said_by(words);  // "17", or "17;CLUSTER"
+    std::int64_t id = 0;
+    const auto parsed = std::from_chars(said.data(), said.data() + said.size(), id);
+    if (parsed.ec != std::errc() || id <= 0) throw Error(fmt::format("sbatch told no id of a job but \"{}\"", said));
+    return id;
+}
+
+// The jobs that were submitted, each once.
+std::set<std::int64_t> jobs_of(const SubmittedJob& submitted)
+{
+    std::set<std::int64_t> jobs(submitted.arrays.begin(), submitted.arrays.end());
+    jobs.insert(submitted.last);
+    jobs.erase(jobs.begin(), jobs.upper_bound(0));
+    return jobs;
+}
+
+// Throws Error with what is missing of it.
+void require_slurm()
+{
+    std::vector<std::string> missing;
+    for (const char* program : {"sbatch", "squeue", "scancel"})
+        if (program_path(program).empty()) missing.emplace_back(program);
+    if (!missing.empty())
+        throw Error(
+            fmt::format("--farm slurm: {} {} not on PATH; install slurm-client, or give --dry-run to see the "
+                        "scripts",
+                        fmt::join(missing, " and "), missing.size() == 1 ? "is" : "are"));
+}
+
+// "1-3,7" of numbers in order.
+std::string ranges_of(const std::vector<std::size_t>& numbers)
+{
+    std::vector<std::string> ranges;
+    for (std::size_t begin = 0, end = 1; begin < numbers.size(); begin = end++) {
+        while (end < numbers.size() && numbers[end] == numbers[end - 1] + 1) ++end;
+        ranges.push_back(end == begin + 1 ? fmt::format("{}", numbers[begin])
+                                          : fmt::format("{}-{}", numbers[begin], numbers[end - 1]));
+    }
+    return fmt::format("{}", fmt::join(ranges, ","));
+}
+
+// Submits the tasks of these numbers, from 1, as an array, and returns its id.
+std::int64_t submit_tasks(const FarmJob& job, const std::vector<std::size_t>& tasks)
+{
+    return submit(job, job.scripts() / "tasks.sh", {"--array=" + ranges_of(tasks)});
+}
+
+// Submits the last one, which waits for jobs: "17", or "17_3" of an array.
+std::int64_t submit_last(const FarmJob& job, const std::vector<std::string>& waits_for)
+{
+    std::vector<std::string> words;
+    if (!waits_for.empty())
+        words.push_back(
+            fmt::format("--dependency={}:{}", job.last_needs_all ? "afterok" : "afterany", fmt::join(waits_for, ":")));
+    return submit(job, job.scripts() / "last.sh", std::move(words));
+}
+
+// What is queued or runs, of these jobs: its state and the reason ("PENDING", "Resources"), by job and number in an
+// array; of a job that is none the number is 0.
+struct QueuedTask {
+    std::string state, reason;
+};
+using Queue = std::map<std::pair<std::int64_t, std::size_t>, QueuedTask>;
+Queue queued(const std::set<std::int64_t>& jobs)
+{
+    Queue queue;
+    if (jobs.empty()) return queue;
+    // Of a job that Slurm has forgotten squeue complains; it is not queued.
+    const ProgramOutput output = output_of(
+        {"squeue", "--noheader", "--array", "--format=%F|%K|%T|%r", "--jobs", fmt::format("{}", fmt::join(jobs, ","))});
+    if (output.status != 0 && output.errors.find("Invalid job id") == std::string::npos)
+        throw Error(fmt::format("squeue failed with status {}: {}", output.status, output.errors));
+    std::istringstream lines(output.out);
+    for (std::string line; std::getline(lines, line);) {
+        std::istringstream fields(line);
+        std::string job, task, state, reason;
+        std::getline(fields, job, '|');
+        std::getline(fields, task, '|');
+        std::getline(fields, state, '|');
+        std::getline(fields, reason, '|');
+        std::int64_t id = 0;
+        std::size_t number = 0;
+        std::from_chars(job.data(), job.data() + job.size(), id);
+        std::from_chars(task.data(), task.data() + task.size(), number);  // "N/A" of one that is in no array
+        queue[{id, number}] = {state, reason};
+    }
+    return queue;
+}
+
+void cancel(const std::set<std::int64_t>& jobs)
+{
+    std::vector<std::string> words = {"scancel"};
+    for (const std::int64_t job : jobs) words.push_back(fmt::format("{}", job));
+    if (words.size() > 1) said_by(words);
+}
+
+// The words of a text, as a shell splits them at spaces; a part in quotes is one word.
+std::vector<std::string> split_words(const std::string& text)
+{
+    std::vector<std::string> words;
+    std::string word;
+    bool in_word = false;
+    char quote = 0;
+    for (const char c : text) {
+        if (quote ? c == quote : c == '"' || c == '\'') {
+            quote = quote ? '\0' : c;
+            in_word = true;
+        } else if (!quote && (c == ' ' || c == '\t' || c == '\n')) {
+            if (in_word) words.push_back(std::exchange(word, {}));
+            in_word = false;
+        } else {
+            word.push_back(c);
+            in_word = true;
+        }
+    }
+    if (quote) throw Error(fmt::format("--farm-options = \"{}\"; a {} is not closed", text, quote));
+    if (in_word) words.push_back(word);
+    return words;
+}
+
+// Error: tasks of a job of this folder are still to come, or run.
+void require_free(const FarmJob& job)
+{
+    std::error_code none;
+    if (!fs::exists(job.file(), none)) return;
+    const SubmittedJob before = SubmittedJob::read(job.file());
+    if (const Queue queue = queued(jobs_of(before)); !queue.empty())
+        throw Error(
+            fmt::format("{} tasks of the job of {} are queued or run; wait for them, or give `rapid farm cancel "
+                        "{}`",
+                        queue.size(), job.file().string(), job.file().string()));
+}
+
+// rapid farm: what became of a job that --farm submitted.
+
 // Lost: neither queued nor ended, as when it was cancelled before it ran.
-enum class State { Done, Failed, Running, Waiting, Lost };
+enum class Stage { Done, Failed, Running, Waiting, Lost };
 constexpr std::string_view state_names[] = {"done", "failed", "running", "waiting", "lost"};
 
 struct TaskState {
-    State state;
+    Stage state;
     std::string why;  // of Failed and Waiting
 };
-
-std::optional<int> ended_with(const fs::path& status)
-{
-    std::error_code none;
-    if (!fs::is_regular_file(status, none)) return {};  // reading a pipe would wait
-    std::ifstream file(status);
-    int code = 0;
-    if (!(file >> code)) return {};
-    return code;
-}
 
 TaskState state_of(const Queue& queue, std::int64_t job, std::size_t number, const fs::path& status)
 {
     if (const auto found = queue.find({job, number}); found != queue.end()) {
         const auto& [state, reason] = found->second;
-        if (state == "RUNNING" || state == "COMPLETING") return {State::Running, ""};
-        return {State::Waiting, reason};
+        if (state == "RUNNING" || state == "COMPLETING") return {Stage::Running, ""};
+        return {Stage::Waiting, reason};
     }
-    const std::optional<int> code = ended_with(status);
-    if (!code) return {State::Lost, ""};
-    if (*code == 0) return {State::Done, ""};
-    return {State::Failed, *code > 128 ? fmt::format("signal {}", *code - 128) : fmt::format("status {}", *code)};
+    const std::optional<int> code = read_status(status);
+    if (!code) return {Stage::Lost, ""};
+    if (*code == 0) return {Stage::Done, ""};
+    return {Stage::Failed, *code > 128 ? fmt::format("signal {}", *code - 128) : fmt::format("status {}", *code)};
 }
 
 class Farm : public Command {
@@ -79,9 +225,7 @@ private:
     // Of the tasks, then of the last one.
     static std::vector<TaskState> states_of(const SubmittedJob& submitted)
     {
-        std::vector<std::int64_t> jobs = submitted.arrays;
-        jobs.push_back(submitted.last);
-        const Queue queue = queued(jobs);
+        const Queue queue = queued(jobs_of(submitted));
         std::vector<TaskState> states;
         for (std::size_t k = 0; k < submitted.arrays.size(); ++k)
             states.push_back(state_of(queue, submitted.arrays[k], k + 1, submitted.job.status_file(k + 1)));
@@ -89,14 +233,14 @@ private:
         return states;
     }
 
-    static bool is_open(const TaskState& task) { return task.state == State::Running || task.state == State::Waiting; }
+    static bool is_open(const TaskState& task) { return task.state == Stage::Running || task.state == Stage::Waiting; }
 
     // Status 1 where something has failed or is lost.
     int tell(const SubmittedJob& submitted, const std::vector<TaskState>& states) const
     {
         const FarmJob& job = submitted.job;
         const std::size_t count = job.tasks.size() + !job.last.empty();
-        std::map<State, std::size_t> counts;
+        std::map<Stage, std::size_t> counts;
         ordered_json tasks = ordered_json::array();
         std::string lines;
         for (std::size_t k = 0; k < count; ++k) {
@@ -109,7 +253,7 @@ private:
             ++counts[task.state];
             const std::string_view state = state_names[static_cast<std::size_t>(task.state)];
             tasks.push_back({{"name", name}, {"job", id}, {"state", state}, {"why", task.why}, {"log", log}});
-            if (task.state == State::Failed || task.state == State::Lost)
+            if (task.state == Stage::Failed || task.state == Stage::Lost)
                 lines += fmt::format("{}: {}{}{}, {}\n", name, state, task.why.empty() ? "" : ", ", task.why, log);
         }
         std::vector<std::string> summary;
@@ -121,14 +265,12 @@ private:
                   '\n');
         else
             print(fmt::format("{}: {} tasks: {}\n{}", job.name, count, fmt::join(summary, ", "), lines));
-        return counts[State::Failed] + counts[State::Lost] > 0 ? status_failed : status_done;
+        return counts[Stage::Failed] + counts[Stage::Lost] > 0 ? status_failed : status_done;
     }
 
     static int cancel_all(const SubmittedJob& submitted, const std::vector<TaskState>& states)
     {
-        std::vector<std::int64_t> jobs = submitted.arrays;
-        jobs.push_back(submitted.last);
-        cancel(jobs);
+        cancel(jobs_of(submitted));
         print(fmt::format("{} tasks cancelled\n", std::count_if(states.begin(), states.end(), is_open)));
         return status_done;
     }
@@ -137,10 +279,10 @@ private:
     {
         std::vector<std::size_t> again;
         for (std::size_t k = 0; k < submitted.arrays.size(); ++k)
-            if (states[k].state == State::Failed || states[k].state == State::Lost) again.push_back(k + 1);
+            if (states[k].state == Stage::Failed || states[k].state == Stage::Lost) again.push_back(k + 1);
         const bool has_last = !submitted.job.last.empty();
         const TaskState& last = states.back();
-        if (again.empty() && (!has_last || is_open(last) || last.state == State::Done)) {
+        if (again.empty() && (!has_last || is_open(last) || last.state == Stage::Done)) {
             print("nothing has failed\n");
             return status_done;
         }
@@ -170,4 +312,80 @@ private:
 RAPID_COMMAND(Farm);
 
 }  // namespace
+
+void FarmOptions::declare(Options& options)
+{
+    options
+        .add_option(
+            "--farm",
+            [this](const std::string& text) {
+                if (text != "slurm") throw Error(fmt::format("--farm = \"{}\"; it must be slurm", text));
+                farm_ = text;
+            },
+            "submits to a farm in place of running here: slurm")
+        .type_name("slurm");
+    options
+        .add_repeated(
+            "--farm-options",
+            [this](const std::vector<std::string>& texts) {
+                for (const std::string& text : texts)
+                    for (std::string& word : split_words(text)) options_.push_back(std::move(word));
+            },
+            "options of sbatch, untouched: \"-p fx -t 2:00:00\"")
+        .type_name("OPTIONS")
+        .one_value();
+    options.add_flag("--dry-run", dry_run_, "with --farm: prints the scripts, and submits nothing");
+}
+
+void FarmOptions::check() const
+{
+    if (asked()) return;
+    if (!options_.empty()) throw Error("--farm-options are for --farm; give --farm slurm, too");
+    if (dry_run_) throw Error("--dry-run is for --farm; give --farm slurm, too");
+}
+
+std::vector<std::string> FarmOptions::words(const Options& options, const std::vector<std::string>& others) const
+{
+    std::vector<std::string> skipped = {"--farm", "--farm-options", "--dry-run", "--threads", "--quiet"};
+    skipped.insert(skipped.end(), others.begin(), others.end());
+    return options.words(skipped);
+}
+
+int FarmOptions::submit(FarmJob job) const
+{
+    job.options = options_;
+    job.folder = fs::current_path();
+    job.outputs = fs::absolute(job.outputs).lexically_normal();
+    const std::string program = command_file().string(), tasks = script_of_tasks(job, program);
+    const std::string last = job.last.empty() ? std::string() : script_of_last(job, program);
+    if (dry_run_) {
+        print(fmt::format("# sbatch --array=1-{} {} {}\n{}", job.tasks.size(), fmt::join(job.options, " "),
+                          (job.scripts() / "tasks.sh").string(), tasks));
+        if (!last.empty())
+            print(fmt::format("\n# sbatch --dependency={}:JOB {} {}\n{}", job.last_needs_all ? "afterok" : "afterany",
+                              fmt::join(job.options, " "), (job.scripts() / "last.sh").string(), last));
+        return status_done;
+    }
+    require_slurm();
+    require_free(job);
+    fs::remove_all(job.scripts());
+    write_whole(job.scripts() / "tasks.sh", tasks);
+    if (!last.empty()) write_whole(job.scripts() / "last.sh", last);
+
+    SubmittedJob submitted{std::move(job), {}, 0};
+    std::vector<std::size_t> all(submitted.job.tasks.size());
+    std::iota(all.begin(), all.end(), std::size_t{1});
+    const std::int64_t array = submit_tasks(submitted.job, all);
+    submitted.arrays.assign(all.size(), array);
+    submitted.write();  // what is submitted is known, whatever happens next
+    print(fmt::format("job {}: {} tasks\n", array, all.size()));
+    if (!last.empty()) {
+        submitted.last = submit_last(submitted.job, {fmt::format("{}", array)});
+        submitted.write();
+        print(fmt::format("job {}: {}, when they are done\n", submitted.last, submitted.job.name_of_last()));
+    }
+    print(fmt::format("rapid farm status {}\n", submitted.job.file().string()));
+    return status_done;
+}
+
 }  // namespace rapid

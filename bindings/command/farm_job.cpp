@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "runtime/checked_json.h"
 #include "runtime/error.h"
@@ -15,6 +16,22 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int job_version = 1;
+
+// As one word of the shell, quoted where it must be.
+std::string shell_word(const std::string& text)
+{
+    constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
+    if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;
+    std::string quoted(1, '\'');
+    for (const char c : text) {
+        if (c == '\'')
+            quoted.append("'\\''");
+        else
+            quoted.push_back(c);
+    }
+    quoted.push_back('\'');
+    return quoted;
+}
 
 std::string shell_words(const std::vector<std::string>& words)
 {
@@ -74,24 +91,19 @@ std::string body(const std::string& status, const std::string& program, const st
 
 }  // namespace
 
-std::string shell_word(const std::string& text)
-{
-    constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
-    if (!text.empty() && text.find_first_not_of(plain) == std::string::npos) return text;
-    std::string quoted(1, '\'');
-    for (const char c : text) {
-        if (c == '\'')
-            quoted.append("'\\''");
-        else
-            quoted.push_back(c);
-    }
-    quoted.push_back('\'');
-    return quoted;
-}
-
 fs::path FarmJob::status_file(std::size_t task) const
 {
     return scripts() / (task == 0 ? std::string("last.status") : fmt::format("{}.status", task));
+}
+
+std::optional<int> read_status(const fs::path& status_file)
+{
+    std::error_code none;
+    if (!fs::is_regular_file(status_file, none)) return {};  // reading a pipe would wait
+    std::ifstream file(status_file);
+    int status = 0;
+    if (!(file >> status)) return {};
+    return status;
 }
 
 std::string script_of_tasks(const FarmJob& job, const std::string& program)

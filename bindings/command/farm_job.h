@@ -47,7 +47,7 @@ struct SubmittedJob {
     void write() const;
 };
 
-// As one word of the shell, quoted where it must be.
-std::string shell_word(const std::string& text);
+// The exit status that a task has written. Nothing if it has not ended.
+std::optional<int> read_status(const std::filesystem::path& status_file);
 
 }  // namespace rapid

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "bindings/command/cache_options.h"
-#include "bindings/command/farm_options.h"
+#include "bindings/command/farm.h"
 #include "bindings/command/file_options.h"
 #include "bindings/command/graceful_end.h"
 #include "bindings/command/part_options.h"

@@ -1,9 +1,9 @@
-// The work of a study in child processes (child.h), each of which opens a scene, starts threads and runs scripts.
+// The work of a study in child processes (processes.h), each of which opens a scene, starts threads and runs scripts.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "bindings/command/child.h"
+#include "bindings/command/processes.h"
 #include "include/rapid/study.h"
 
 namespace rapid {

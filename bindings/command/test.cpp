@@ -10,7 +10,7 @@
 #include <optional>
 #include <thread>
 
-#include "bindings/command/child.h"
+#include "bindings/command/processes.h"
 #include "bindings/command/test_file.h"
 #include "bindings/command/test_report.h"
 #include "bindings/command_line/command.h"

@@ -3,27 +3,311 @@
 #include <tbb/info.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "bindings/command/cache_options.h"
-#include "bindings/command/farm_options.h"
+#include "bindings/command/farm.h"
 #include "bindings/command/file_options.h"
-#include "bindings/command/process_pool.h"
-#include "bindings/command/wedge_report.h"
-#include "bindings/command/wedge_rows.h"
+#include "bindings/command/processes.h"
+#include "bindings/command/swept_setting.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/picture_sheet.h"
+#include "runtime/checked_json.h"
 #include "runtime/files/content_hash.h"
+#include "runtime/files/frame_pattern.h"
 #include "runtime/files/temporary_folder.h"
+#include "runtime/files/whole_file.h"
+#include "runtime/printable.h"
+#include "runtime/report/number_text.h"
 
 namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+// The rows: settings, and the names of the files that each writes.
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+// What a run gave, as far as it got.
+struct WedgeResult {
+    // The error since birth of the frame where its 95 % quantile is largest.
+    struct PositionError {
+        double p50, p95, max;  // m
+        std::int64_t frame;
+    };
+
+    std::string failure;                     // empty: none
+    std::uint64_t points = 0;                // of the last frame
+    std::optional<std::int64_t> last_frame;  // nothing: none was computed
+    std::uint64_t contacts = 0;              // of all frames
+    double seconds = 0;                      // wall time of the run
+    std::uint64_t peak_bytes = 0;
+    std::optional<PositionError> error;
+};
+
+struct WedgeRow {
+    Settings settings;                 // name and value, in the order of --vary
+    std::vector<std::string> outputs;  // -o, with values in place of {NAME}
+
+    WedgeResult result = {};
+
+    // "rate=1000 solve.substeps=4"
+    std::string label() const
+    {
+        std::string text;
+        for (const auto& [name, value] : settings) text += fmt::format("{}{}={}", text.empty() ? "" : " ", name, value);
+        return text;
+    }
+};
+
+void check_settings(const std::vector<SweptSetting>& settings, bool zip)
+{
+    std::set<std::string> names;
+    for (const SweptSetting& setting : settings) {
+        if (!names.insert(setting.name).second) throw Error(fmt::format("--vary: {} is varied twice", setting.name));
+        const std::size_t count = setting.values.size(), first = settings.front().values.size();
+        if (zip && count != first)
+            throw Error(fmt::format("--zip: {} has {} values and {} has {}; they must have as many",
+                                    settings.front().name, first, setting.name, count));
+    }
+}
+
+std::vector<Settings> combinations(const std::vector<SweptSetting>& settings, bool zip)
+{
+    constexpr std::size_t most = 100000;
+    std::size_t count = 1;
+    for (const SweptSetting& setting : settings) {
+        count = zip ? setting.values.size() : count * setting.values.size();
+        if (count > most) throw Error(fmt::format("--vary: there are more than {} rows; vary less at a time", most));
+    }
+    std::vector<Settings> rows(count);
+    for (std::size_t row = 0; row < count; ++row) {
+        std::size_t rest = row;
+        for (auto setting = settings.rbegin(); setting != settings.rend(); ++setting) {
+            const std::size_t of = setting->values.size();
+            rows[row].emplace_back(setting->name, setting->values[zip ? row : rest % of]);
+            rest /= of;
+        }
+        std::reverse(rows[row].begin(), rows[row].end());
+    }
+    return rows;
+}
+
+// By the name in braces: the place of its setting. A PARAM that several nodes have is left out.
+std::map<std::string, std::size_t> names_in_braces(const std::vector<SweptSetting>& settings)
+{
+    std::map<std::string, std::size_t> names;
+    std::map<std::string, int> of_nodes;
+    for (const SweptSetting& setting : settings)
+        if (const std::size_t dot = setting.name.rfind('.'); dot != std::string::npos)
+            ++of_nodes[setting.name.substr(dot + 1)];
+    for (std::size_t k = 0; k < settings.size(); ++k) {
+        const std::string& name = settings[k].name;
+        const std::string param = name.substr(name.rfind('.') + 1);
+        if (param != name && of_nodes[param] == 1) names.emplace(param, k);
+    }
+    for (std::size_t k = 0; k < settings.size(); ++k) names[settings[k].name] = k;
+    return names;
+}
+
+std::string with_values(const std::string& pattern, const Settings& row,
+                        const std::map<std::string, std::size_t>& names)
+{
+    std::string result;
+    for (std::size_t at = 0; at < pattern.size();) {
+        const std::size_t open = pattern.find('{', at), close = pattern.find('}', open);
+        if (close == std::string::npos) return result + pattern.substr(at);
+        result += pattern.substr(at, open - at);
+        const std::string name = pattern.substr(open + 1, close - open - 1);
+        at = close + 1;
+        if (name == "output") {
+            result += "{output}";
+            continue;
+        }
+        const auto found = names.find(name);
+        if (found == names.end()) {
+            std::vector<std::string> known;
+            for (const auto& [other, place] : names) known.push_back(other);
+            throw Error(fmt::format("-o {}: {{{}}} is not varied{}", pattern, name, did_you_mean(name, known)));
+        }
+        std::string value = row[found->second].second;
+        std::erase_if(value, [](char c) { return c == '{' || c == '}' || c == ' '; });  // of a vec3
+        if (value.empty() || value.find_first_of("/#$%:") != std::string::npos || value.front() == '.')
+            throw Error(
+                fmt::format("-o {}: the value {} of {} can't be a part of a file's name; leave it out of the "
+                            "pattern, or vary a parameter with plain values",
+                            pattern, value, name));
+        result += value;
+    }
+    return result;
+}
+
+// "{rate} and {substeps}": what is varied and not in the pattern.
+std::string missing_names(const std::string& pattern, const std::vector<SweptSetting>& settings)
+{
+    std::map<std::size_t, std::string> shortest;
+    for (const auto& [name, place] : names_in_braces(settings)) {
+        std::string& text = shortest[place];
+        if (text.empty() || name.size() < text.size()) text = name;
+    }
+    std::vector<std::string> missing;
+    for (const auto& [place, name] : shortest) {
+        const bool there = pattern.find('{' + name + '}') != pattern.npos ||
+                           pattern.find('{' + settings[place].name + '}') != pattern.npos;
+        if (!there && settings[place].values.size() > 1) missing.push_back('{' + name + '}');
+    }
+    return fmt::format("{}", fmt::join(missing, " and "));
+}
+
+[[noreturn]] void refuse_same_files(const std::string& pattern, const std::vector<SweptSetting>& settings,
+                                    const std::string& row, const std::string& other)
+{
+    if (row == other) throw Error(fmt::format("--vary: {} is there twice; leave one out", row));
+    const std::string missing = missing_names(pattern, settings);
+    throw Error(fmt::format("-o {}: {} and {} write the same files; {}", pattern, row, other,
+                            missing.empty() ? "leave one out" : fmt::format("put {} into the pattern", missing)));
+}
+
+// All combinations, of which the last setting changes fastest; zip: the n-th values together. In a pattern {NAME}, or
+// for NODE.PARAM also {PARAM}, stands for the value; {output} stays. Error: a setting twice; lists of different
+// lengths with zip; a name in braces that is not varied; a value that can't be a part of a file's name; rows that
+// write the same files.
+std::vector<WedgeRow> wedge_rows(const std::vector<SweptSetting>& settings, bool zip,
+                                 const std::vector<std::string>& patterns)
+{
+    check_settings(settings, zip);
+    const std::map<std::string, std::size_t> names = names_in_braces(settings);
+    std::vector<WedgeRow> rows;
+    std::map<std::string, std::string> written;  // by the file's name: the row
+    for (Settings& row : combinations(settings, zip)) {
+        rows.push_back({std::move(row), {}});
+        for (const std::string& pattern : patterns) {
+            const std::string name = with_values(pattern, rows.back().settings, names);
+            const auto [other, is_new] = written.emplace(name, rows.back().label());
+            if (!is_new) refuse_same_files(pattern, settings, other->second, rows.back().label());
+            rows.back().outputs.push_back(name);
+        }
+    }
+    return rows;
+}
+
+// The report: a line for each row as it ends, a table, wedge.json, and wedge.png, a contact sheet.
+
+// Reads the file of --stats of a run. Nothing has changed if there is none.
+void read_statistics(const fs::path& file, WedgeResult& result)
+{
+    std::error_code none;
+    if (!fs::is_regular_file(file, none)) return;  // reading a pipe would wait
+    std::ifstream text(file);
+    const CheckedJson all = CheckedJson::parse(text, nullptr, false);
+    if (all.is_discarded()) return;
+    try {
+        result.seconds = all.at("seconds");
+        result.peak_bytes = all.at("peak_bytes");
+        for (const CheckedJson& frame : all.at("frames")) {
+            result.last_frame = frame.at("frame").get<std::int64_t>();
+            result.points = frame.at("points");
+            result.contacts += frame.at("collisions").get<std::uint64_t>();
+            if (!frame.contains("error")) continue;
+            const CheckedJson& error = frame.at("error");
+            const double p95 = error.at("position_p95");
+            if (!result.error || p95 > result.error->p95)
+                result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
+        }
+    } catch (const nlohmann::json::exception&) {
+        result.failure = fmt::format("{}: it does not hold the statistics of a run", file.string());
+    }
+}
+
+// The picture of the last frame up to `last` that has one; empty: there is none, or the files are no pictures.
+fs::path last_picture(const std::string& output, std::optional<std::int64_t> last)
+{
+    const FramePattern pattern(parse_output_target(output).pattern);
+    if (!last || fs::path(pattern.text()).extension() != ".png") return {};
+    if (!pattern.has_frame()) return fs::exists(pattern.text()) ? fs::path(pattern.text()) : fs::path();
+    fs::path file;
+    for (const auto& [frame, path] : pattern.existing())
+        if (frame <= *last) file = path;
+    return file;
+}
+
+std::string table_of(const std::vector<SweptSetting>& varied, const std::vector<WedgeRow>& rows)
+{
+    TextTable table = {{}};
+    for (const SweptSetting& setting : varied) table[0].push_back(setting.name);
+    table[0].insert(table[0].end(), {"points", "seconds", "error (m)", "contacts"});
+    for (const WedgeRow& row : rows) {
+        const WedgeResult& result = row.result;
+        std::vector<std::string>& cells = table.emplace_back();
+        for (const auto& [name, value] : row.settings) cells.push_back(printable(value));
+        if (!result.failure.empty())
+            cells.insert(cells.end(), {"failed", "", "", ""});
+        else
+            cells.insert(cells.end(), {with_separators(result.points), fmt::format("{:.3f}", result.seconds),
+                                       result.error ? fmt::format("{:.2g}", result.error->p95) : "not estimated",
+                                       with_separators(result.contacts)});
+    }
+    return table_text(table) + "error: since birth, estimated; 95 % of the points are within it in every frame\n";
+}
+
+ordered_json json_of(const WedgeRow& row)
+{
+    const WedgeResult& result = row.result;
+    ordered_json json = {{"settings", ordered_json::object()},
+                         {"files", row.outputs},
+                         {"status", result.failure.empty() ? "done" : "failed"}};
+    for (const auto& [name, value] : row.settings) json["settings"][name] = value;
+    if (!result.failure.empty()) json["failure"] = result.failure;
+    json["last_frame"] = result.last_frame ? ordered_json(*result.last_frame) : ordered_json();
+    json.update({{"points", result.points},
+                 {"contacts", result.contacts},
+                 {"seconds", result.seconds},
+                 {"peak_bytes", result.peak_bytes},
+                 {"error", nullptr}});
+    if (result.error)
+        json["error"] = {{"position_p50", result.error->p50},
+                         {"position_p95", result.error->p95},
+                         {"position_max", result.error->max},
+                         {"frame", result.error->frame}};
+    return json;
+}
+
+// Writes the contact sheet, of the last pictures of the first -o that is one. Returns false if there are none.
+bool write_sheet(const fs::path& file, const std::vector<SweptSetting>& varied, const std::vector<WedgeRow>& rows)
+{
+    std::vector<SheetPicture> pictures;
+    bool drawn = false;
+    for (const WedgeRow& row : rows) {
+        const WedgeResult& result = row.result;
+        SheetPicture& picture = pictures.emplace_back();
+        for (const std::string& output : row.outputs)
+            if (picture.file.empty()) picture.file = last_picture(output, result.last_frame);
+        drawn |= !picture.file.empty();
+        picture.label = {row.label(), result.failure.empty()
+                                          ? fmt::format("{} points, {}", with_separators(result.points),
+                                                        duration_text(result.seconds))
+                                          : "failed"};
+    }
+    // Of combinations those that differ by the last setting alone belong together.
+    const std::size_t of_last = varied.back().values.size(), series = of_last < rows.size() ? of_last : 1;
+    if (drawn) write_whole(file, or_throw(picture_sheet(pictures, series)));
+    return drawn;
+}
 
 class WedgeCommand : public Command, public Confined {
 public:
@@ -69,47 +353,44 @@ public:
 
     int run(const CommonOptions& common) override
     {
-        const std::vector<WedgeRow> rows = wedge_rows(settings_, zip_, files_.names());
+        rows_ = wedge_rows(settings_, zip_, files_.names());
         const std::vector<std::string> folders = or_throw(output_folders(files_.files()));
-        const fs::path folder = folders.empty() ? "." : folders.front();
+        if (!folders.empty()) folder_ = folders.front();
         cache_.check();
         farm_.check();
-        WedgeReport report(graph_.file(), settings_, rows, folder, quiet_);
-        if (!collect_.empty()) return collect(rows, report);
-        check(rows.front(), common);
-        if (farm_.asked()) return submit(rows, folder, common);
+        if (!collect_.empty()) return collect();
+        check(common);
+        if (farm_.asked()) return submit(common);
         const TemporaryFolder statistics("wedge");
-        const auto statistics_of = [&](std::size_t row) { return statistics.path() / fmt::format("{}.json", row); };
         const int signal = run_processes(
-            rows.size(), static_cast<int>(std::min(jobs_, static_cast<std::int64_t>(rows.size()))),
+            rows_.size(), static_cast<int>(std::min(jobs_, static_cast<std::int64_t>(rows_.size()))),
             [&](std::size_t row) {
-                std::vector<std::string> words = words_of(rows[row], statistics_of(row), folder, common);
+                std::vector<std::string> words = words_of(row, statistics.path(), common);
                 words.push_back("--claims=" + statistics.path().string());
                 return words;
             },
-            [&](std::size_t row, const EndedProcess& ended) { report.ended(row, ended, statistics_of(row)); });
-        if (signal != 0) return signal;
-        return report.finish() ? status_done : status_failed;
+            [&](std::size_t row, const EndedProcess& process) { end_row(row, process.failure, statistics.path()); });
+        return signal != 0 ? signal : report();
     }
 
 private:
     static constexpr const char* collect_option = "--collect";
 
     // A task for each row, then the report of all.
-    int submit(const std::vector<WedgeRow>& rows, const fs::path& outputs, const CommonOptions& common) const
+    int submit(const CommonOptions& common) const
     {
         FarmJob job;
         job.name = "rapid-wedge-" + fs::path(graph_.file()).stem().string();
-        job.outputs = outputs;
+        job.outputs = folder_;
         const fs::path folder = fs::absolute(job.scripts()).lexically_normal();
-        for (std::size_t row = 0; row < rows.size(); ++row) {
-            std::vector<std::string> words = words_of(rows[row], statistics_of(folder, row), outputs, common);
+        for (std::size_t row = 0; row < rows_.size(); ++row) {
+            std::vector<std::string> words = words_of(row, folder, common);
             words.erase(words.begin());  // the name of the program
             // A task that begins again goes on behind its last snapshot.
             std::erase_if(words, [](const std::string& word) {
                 return word.starts_with("--threads=") || word == "--cache-every=0";
             });
-            job.tasks.push_back({rows[row].label(), {words.begin() + 2, words.end()}});
+            job.tasks.push_back({rows_[row].label(), {words.begin() + 2, words.end()}});
             job.words.assign(words.begin(), words.begin() + 2);  // run GRAPH
         }
         job.last.push_back(farm_.words(*given_, {"--jobs"}));
@@ -124,36 +405,67 @@ private:
     }
 
     // The rows have run on a farm.
-    int collect(const std::vector<WedgeRow>& rows, WedgeReport& report) const
+    int collect()
     {
-        for (std::size_t row = 0; row < rows.size(); ++row) {
-            EndedProcess ended{"it did not run to its end", status_failed};
-            const fs::path path = fs::path(collect_) / fmt::format("{}.status", row + 1);
-            std::error_code none;
-            std::ifstream file;
-            if (fs::is_regular_file(path, none)) file.open(path);  // reading a pipe would wait
-            if (int status = 0; file.is_open() && file >> status) {
-                ended = {"", status};
-                if (status != status_done)
-                    ended.failure = fmt::format("ended with status {}; see {}", status,
-                                                (fs::path(collect_) / fmt::format("{}.log", row + 1)).string());
-            }
-            report.ended(row, ended, statistics_of(collect_, row));
+        for (std::size_t row = 0; row < rows_.size(); ++row) {
+            const std::optional<int> status = read_status(fs::path(collect_) / fmt::format("{}.status", row + 1));
+            std::string failure;
+            if (!status)
+                failure = "it did not run to its end";
+            else if (*status != status_done)
+                failure = fmt::format("ended with status {}; see {}", *status,
+                                      (fs::path(collect_) / fmt::format("{}.log", row + 1)).string());
+            end_row(row, std::move(failure), collect_);
         }
-        return report.finish() ? status_done : status_failed;
+        return report();
+    }
+
+    // statistics: the folder of the statistics of all rows, where one may be missing that failed.
+    void end_row(std::size_t row, std::string failure, const fs::path& statistics)
+    {
+        WedgeResult& result = rows_[row].result;
+        result.failure = std::move(failure);
+        read_statistics(statistics_of(statistics, row), result);
+        const std::string head = fmt::format("{}/{}  {}: ", ++done_, rows_.size(), printable(rows_[row].label()));
+        if (!result.failure.empty())
+            std::fputs(fmt::format("{}failed: {}\n", head, result.failure).c_str(), stderr);
+        else if (!quiet_)
+            print(
+                fmt::format("{}{} points, {}\n", head, with_separators(result.points), duration_text(result.seconds)));
+        std::fflush(stdout);
+    }
+
+    // Returns the exit status. Error: a file can't be written.
+    int report() const
+    {
+        const bool drawn = write_sheet(folder_ / "wedge.png", settings_, rows_);
+        ordered_json wedge = {
+            {"graph", graph_.file()}, {"varied", ordered_json::object()}, {"rows", ordered_json::array()}};
+        for (const SweptSetting& setting : settings_) wedge["varied"][setting.name] = setting.values;
+        for (const WedgeRow& row : rows_) wedge["rows"].push_back(json_of(row));
+        write_whole(folder_ / "wedge.json", wedge.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+        if (!quiet_) {
+            print('\n' + table_of(settings_, rows_));
+            print(fmt::format(
+                "wrote {}{}\n", (folder_ / "wedge.json").string(),
+                drawn ? " and " + (folder_ / "wedge.png").string() : "; no contact sheet, as no -o is a .png"));
+        }
+        const bool all_done =
+            std::all_of(rows_.begin(), rows_.end(), [](const WedgeRow& row) { return row.result.failure.empty(); });
+        return all_done ? status_done : status_failed;
     }
 
     // What a misspelt setting is wrong with is found before any row runs. Error: that of `rapid check`.
-    void check(const WedgeRow& row, const CommonOptions& common) const
+    void check(const CommonOptions& common) const
     {
         std::string failure;
         const int signal = run_processes(
             1, 1,
             [&](std::size_t) {
                 std::vector<std::string> words = {"rapid", "check", graph_.file()};
-                add_shared(words, row, common);
+                add_shared(words, rows_.front(), common);
                 // check takes it that there are several frames.
-                if (!frames_ || !frames_->single()) add_outputs(words, row);
+                if (!frames_ || !frames_->single()) add_outputs(words, rows_.front());
                 return words;
             },
             [&](std::size_t, const EndedProcess& ended) { failure = ended.failure; });
@@ -162,19 +474,19 @@ private:
     }
 
     // `rapid run` of the row.
-    std::vector<std::string> words_of(const WedgeRow& row, const fs::path& statistics, const fs::path& folder,
-                                      const CommonOptions& common) const
+    std::vector<std::string> words_of(std::size_t number, const fs::path& statistics, const CommonOptions& common) const
     {
+        const WedgeRow& row = rows_[number];
         const int threads = common.threads > 0 ? common.threads : tbb::info::default_concurrency();
         std::vector<std::string> words = {"rapid",
                                           "run",
                                           graph_.file(),
                                           "--quiet",
-                                          "--stats=" + statistics.string(),
+                                          "--stats=" + statistics_of(statistics, number).string(),
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
         for (const std::string& frames : given_->values_of("--frames")) words.push_back("--frames=" + frames);
         // What a row has done is known by its journal: one of the same fingerprint is not run again.
-        const fs::path of_rows = cache_.asked() ? fs::path(cache_.folder()) : folder / "wedge.cache";
+        const fs::path of_rows = cache_.asked() ? fs::path(cache_.folder()) : folder_ / "wedge.cache";
         words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
         words.push_back("--cache-replace");
         if (const std::int64_t every = cache_.asked() ? cache_.every().value_or(-1) : 0; every >= 0)
@@ -213,6 +525,9 @@ private:
     bool zip_ = false, quiet_ = false;
     FarmOptions farm_;
     std::string collect_;  // the folder of their statistics
+    std::vector<WedgeRow> rows_;
+    fs::path folder_ = ".";  // where wedge.json and wedge.png go
+    std::size_t done_ = 0;   // rows that have ended
 };
 RAPID_COMMAND(WedgeCommand);
 

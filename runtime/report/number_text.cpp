@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace rapid {
 
 std::string with_separators(std::uint64_t count)
@@ -30,6 +32,22 @@ std::string duration_text(double seconds)
     const auto whole = static_cast<std::uint64_t>(seconds + 0.5);
     if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
     return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string table_text(const TextTable& rows, std::size_t left)
+{
+    std::vector<std::size_t> widths(rows.front().size());
+    for (const auto& cells : rows)
+        for (std::size_t c = 0; c < cells.size(); ++c) widths[c] = std::max(widths[c], cells[c].size());
+    std::string text;
+    for (const auto& cells : rows) {
+        for (std::size_t c = 0; c < cells.size(); ++c)
+            text +=
+                c < left ? fmt::format("{:<{}}  ", cells[c], widths[c]) : fmt::format("{:>{}}  ", cells[c], widths[c]);
+        text.erase(text.find_last_not_of(' ') + 1);
+        text += '\n';
+    }
+    return text;
 }
 
 }  // namespace rapid

@@ -57,8 +57,6 @@ std::string order_text(const StudyLine& line)
     return line.at_rounding ? "exact: every error is at rounding" : "no order: fewer than two rows to fit";
 }
 
-using TextTable = std::vector<std::vector<std::string>>;
-
 // A row for each setting, below a row of titles; the knobs come first.
 TextTable table_of(const StudyResult& result)
 {
@@ -95,22 +93,9 @@ TextTable table_of(const StudyResult& result)
 std::string to_text(const StudyResult& result)
 {
     const Study& study = result.study;
-    const TextTable table = table_of(result);
-    std::vector<std::size_t> widths(table[0].size());
-    for (const auto& cells : table)
-        for (std::size_t c = 0; c < cells.size(); ++c) widths[c] = std::max(widths[c], cells[c].size());
     std::string text = fmt::format("{}: {}, {}{}; median of {} runs\n\n", study.name, error_title(study),
                                    frames_text(study), reference_text(study), study.repeat_runs);
-    for (std::size_t i = 0; i < table.size(); ++i) {
-        std::string line;
-        for (std::size_t c = 0; c < table[i].size(); ++c) {
-            const bool words = c <= study.lines.size();
-            line += words ? fmt::format("{:<{}}  ", table[i][c], widths[c])
-                          : fmt::format("{:>{}}  ", table[i][c], widths[c]);
-        }
-        text += line.substr(0, line.find_last_not_of(' ') + 1) + '\n';
-    }
-    text += '\n';
+    text += table_text(table_of(result), study.lines.size() + 1) + '\n';
     for (const StudyLine& line : result.lines()) text += fmt::format("{}: {}\n", line.name, order_text(line));
     for (const StudyRow& row : result.rows)
         if (!row.failed.empty()) text += fmt::format("failed: {}: {}\n", study.label(row.knobs), row.failed);

@@ -1,4 +1,4 @@
-// --farm: submits to a scheduler what would be run here.
+// --farm: submits to a scheduler what would be run here. `rapid farm` tells what became of it.
 #pragma once
 
 #include <functional>

@@ -1,0 +1,47 @@
+// Child processes of the commands: rows of a wedge, scenes of a study, the programs of a scheduler.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace rapid {
+
+struct EndedProcess {
+    std::string failure;  // empty: status 0; else what it said last on standard error, or the signal that ended it
+    int status = 0;       // of the exit; 128 + the number of a signal
+};
+
+// Runs `rapid` `count` times, at most `jobs` at a time, in order; `words` gives the arguments of each. `ended`
+// hears how each ended, in this thread. What they print goes nowhere. A signal that ends this process (Ctrl-C, SIGTERM,
+// ...) is passed on to those that run; then it returns 128 + its number, when all have ended; else 0.
+//
+// Must be called before this process starts a thread, which would take the signals.
+int run_processes(std::size_t count, int jobs, const std::function<std::vector<std::string>(std::size_t)>& words,
+                  const std::function<void(std::size_t, const EndedProcess&)>& ended);
+
+using TellParent = std::function<void(const nlohmann::json& event)>;
+
+// Forks. The child does `work`, tells events and ends; this process hears each as it comes. Returns an empty text, or
+// how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
+//
+// This process must have no other threads (a child would inherit locks that are never freed), so sessions and the
+// runtime, which start threads, belong in children. A child's standard output goes to standard error, so that output of
+// scripts does not mix with the parent's results.
+std::string run_in_child(const std::function<void(const TellParent& tell)>& work,
+                         const std::function<void(const nlohmann::json& event)>& hear);
+
+// Makes this process end when its parent does, however the parent ends.
+void end_with_parent(int parent);
+
+struct ProgramOutput {
+    int status;  // 127: it can't be started
+    std::string out, errors;
+};
+
+// Runs a program that is found on PATH.
+ProgramOutput output_of(const std::vector<std::string>& words);
+
+}  // namespace rapid

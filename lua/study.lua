@@ -78,8 +78,8 @@ local function make(native, vector)
     local over = definition.error_frames
     expect(over == nil or over == "all" or over == "last", "error_frames", '"all" or "last"')
     local runs = definition.repeat_runs
-    expect(runs == nil or type(runs) == "number" and runs >= 1 and runs % 1 == 0, "repeat_runs",
-      "a whole number, at least 1")
+    expect(runs == nil or type(runs) == "number" and runs >= 1 and runs <= 100000 and runs % 1 == 0,
+      "repeat_runs", "a whole number, at least 1 and at most 100000")
     local lines = definition.lines
     expect(lines == nil or type(lines) == "string" or type(lines) == "table", "lines",
       "the name of a knob, or a list of them")

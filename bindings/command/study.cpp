@@ -3,27 +3,36 @@
 // This process only coordinates: the file is read, and each scene run, in a child process, so that a setting that
 // crashes or never ends is only a failed row of the table.
 #include <fmt/format.h>
+#include <luajit.h>
 #include <sys/stat.h>
+#include <sys/utsname.h>
 #include <tbb/info.h>
+#include <tbb/version.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <filesystem>
+#include <fstream>
+#include <new>
 #include <nlohmann/json.hpp>
+#include <thread>
 
-#include "bindings/command/machine.h"
-#include "bindings/command/study_run.h"
+#include "bindings/command/processes.h"
 #include "bindings/command/swept_setting.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
+#include "bindings/command_line/memory_limit.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/host/graph_parameter.h"
+#include "bindings/run/study_scene.h"
 #include "runtime/files/whole_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
+#include "runtime/threads.h"
 
 namespace rapid {
 namespace {
@@ -71,30 +80,142 @@ private:
     bool drawn_ = false;
 };
 
-// The result that a child told, or how it ended without one.
+std::string processor()
+{
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("model name"))
+            if (const std::size_t at = line.find(": "); at != std::string::npos) return line.substr(at + 2);
+    return "unknown";
+}
+
+// The machine and the versions on which run times depend.
+std::vector<std::pair<std::string, std::string>> describe_machine(int threads)
+{
+    utsname system{};
+    uname(&system);
+    return {{"processor", processor()},
+            {"processors", fmt::format("{}", std::thread::hardware_concurrency())},
+            {"threads", fmt::format("{}", threads)},
+            {"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)},
+            {"rapid", RAPID_VERSION},
+            {"compiler", __VERSION__},
+            {"luajit", LUAJIT_VERSION},
+            {"tbb", TBB_runtime_version()}};
+}
+
+// JSON of studies and rows, as it goes through the pipe between the processes.
+
+json json_of(const Value& value)
+{
+    if (const bool* boolean = value.get<bool>()) return *boolean;
+    if (const std::string* text = value.get<std::string>()) return *text;
+    if (const Vec3d* vector = value.get<Vec3d>()) return {vector->x(), vector->y(), vector->z()};
+    return *value.get<double>();
+}
+
+Value value_of(const json& value)
+{
+    if (value.is_boolean()) return Value(value.get<bool>());
+    if (value.is_string()) return Value(value.get<std::string>());
+    if (value.is_array()) return Value(Vec3d(value[0], value[1], value[2]));
+    return Value(value.get<double>());
+}
+
+json json_of(const Study& study)
+{
+    json sweep = json::object(), reference;
+    for (const auto& [knob, values] : study.sweep)
+        for (const Value& value : values) sweep[knob].push_back(json_of(value));
+    if (study.reference)
+        for (const auto& [knob, value] : *study.reference) reference[knob] = json_of(value);
+    return {{"file", study.file},
+            {"name", study.name},
+            {"sweep", sweep},
+            {"lines", study.lines},
+            {"frames", {study.first, study.last}},
+            {"error", study.error},
+            {"last_frame_only", study.last_frame_only},
+            {"reference", reference},
+            {"repeat_runs", study.repeat_runs}};
+}
+
+Study study_of(const json& told)
+{
+    Study study;
+    study.file = told.at("file");
+    study.name = told.at("name");
+    study.lines = told.at("lines").get<std::vector<std::string>>();
+    for (const auto& [knob, values] : told.at("sweep").items())
+        for (const json& value : values) study.sweep[knob].push_back(value_of(value));
+    study.first = told.at("frames")[0];
+    study.last = told.at("frames")[1];
+    study.error = told.at("error");
+    study.last_frame_only = told.at("last_frame_only");
+    if (!told.at("reference").is_null()) {
+        study.reference.emplace();
+        for (const auto& [knob, value] : told.at("reference").items()) (*study.reference)[knob] = value_of(value);
+    }
+    study.repeat_runs = told.at("repeat_runs");
+    return study;
+}
+
+json json_of(const StudyRow& row)
+{
+    return {{"error", row.error},
+            {"rounding", row.rounding},
+            {"seconds", row.seconds},
+            {"compared", row.compared},
+            {"missing", row.missing}};
+}
+
+StudyRow row_of(const json& told, const Knobs& knobs)
+{
+    return {knobs,
+            told.at("error"),
+            told.at("rounding"),
+            told.at("seconds").get<std::vector<double>>(),
+            told.at("compared"),
+            told.at("missing"),
+            ""};
+}
+
+// Holds the result of a child, or why there is none.
 struct Outcome {
-    json event;
+    json result;
     std::string failed;
-    bool refused = false;
+    bool refused = false;  // no frame was computed
 };
 
-Outcome outcome_of(const std::function<void(const TellParent& tell)>& work,
-                   const std::function<void(std::int64_t run)>& on_run = {})
+// Opens a scene and computes its frames. `progress` hears how many runs are done, 0 when the first frame is due.
+using ChildWork = std::function<json(const StudySource& source, const StudyScene::Progress& progress)>;
+
+// Does the work in the child. Tells the parent {"run": how many are done} after each run, and at the end
+// {"result": ...} or {"failed": why, "refused": whether no frame was computed}.
+void do_work(StudySource source, int threads, const ChildWork& work, const TellParent& tell)
 {
-    Outcome outcome;
-    const std::string ending = run_in_child(work, [&](const json& event) {
-        if (!event.contains("run"))
-            outcome.event = event;
-        else if (on_run)
-            on_run(event.at("run"));
-    });
-    if (outcome.event.contains("failed")) {
-        outcome.failed = outcome.event.at("failed");
-        outcome.refused = outcome.event.at("refused");
-    } else if (outcome.event.is_null()) {
-        outcome.failed = "its process ended with " + (ending.empty() ? "no result" : ending);
+    bool started = false;
+    const auto fail = [&](const std::string& why, bool refused) { tell({{"failed", why}, {"refused", refused}}); };
+    const auto end = [&](const std::string& message) {
+        fail(message, false);
+        _exit(status_done);
+    };
+    source.session.on_timeout = end;
+    const auto progress = [&](int runs) {
+        started = true;
+        if (runs > 0) tell({{"run", runs}});
+    };
+    Threads all(threads);
+    try {
+        all.run([&] {
+            const MemoryLimit limit(source.file, end);
+            tell({{"result", work(source, progress)}});
+        });
+    } catch (const std::bad_alloc&) {
+        fail("out of memory", !started);
+    } catch (const std::exception& error) {
+        fail(error.what(), !started);
     }
-    return outcome;
 }
 
 class StudyCommand : public Command, public Confined {
@@ -117,7 +238,7 @@ public:
         declare_frames(
             options, frames_,
             fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]", default_frames));
-        const SceneStudy defaults;
+        const Study defaults;
         options
             .add_option("--error", error_,
                         fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]",
@@ -152,41 +273,41 @@ public:
 
     int run(const CommonOptions& common) override
     {
-        const StudyChild child{{graph_.file(), !sweep_.empty(), graph_.scene_options(), {}}, common.threads};
-        const SceneStudy study = describe(child);
+        threads_ = common.threads;
+        const Study study = describe();
         open_folder();
 
-        std::vector<StudyRun> rows;
+        StudyResult result{study, {}, {}};
         {
-            const std::vector<StudyKnobs> all = or_throw(study.rows());
+            const std::vector<Knobs> all = study.rows();
             RowProgress progress(quiet_ ? ProgressStyle::None : progress_style(stderr), all.size());
-            for (const StudyKnobs& knobs : all) {
-                StudyRun row = measure(child, study, knobs, progress);
+            for (const Knobs& knobs : all) {
+                StudyRow row = measure(study, knobs, progress);
                 progress.row(study.label(knobs), row.failed.empty() ? fmt::format("error {:.3g}, {:.3f} ms", row.error,
                                                                                   1e3 * row.median_seconds())
                                                                     : "failed: " + row.failed);
-                rows.push_back(std::move(row));
+                result.rows.push_back(std::move(row));
             }
         }
-        const StudyReport report = or_throw(study.report(
-            rows, describe_machine(common.threads > 0 ? common.threads : tbb::info::default_concurrency())));
-        write_whole(fs::path(folder_) / "study.json", report.json + '\n');
-        write_whole(fs::path(folder_) / "study.svg", report.svg);
-        print(json_ ? report.json + '\n' : report.text);
+        result.machine = describe_machine(threads_ > 0 ? threads_ : tbb::info::default_concurrency());
+        const std::string text = to_json(result).dump(2, ' ', false, json::error_handler_t::replace) + '\n';
+        write_whole(fs::path(folder_) / "study.json", text);
+        write_whole(fs::path(folder_) / "study.svg", to_svg(result));
+        print(json_ ? text : to_text(result));
         return status_;
     }
 
 private:
     // The study of a graph that the options describe.
-    SceneStudy asked() const
+    Study asked() const
     {
-        SceneStudy study;
+        Study study;
         study.file = graph_.file();
         study.name = fs::path(graph_.file()).filename().string();
         for (const std::string& text : sweep_) {
             const auto [knob, values] = read_swept_setting("--sweep", text, "NODE.PARAM");
             if (study.sweep.count(knob)) throw Error(fmt::format("--sweep: {} is swept twice", knob));
-            for (const std::string& value : values) study.sweep[knob].push_back(knob_value(value));
+            for (const std::string& value : values) study.sweep[knob].push_back(read_argument(value));
         }
         if (error_) study.error = *error_;
         if (!study.compares() && !reference_.empty())
@@ -196,12 +317,12 @@ private:
         if (study.compares()) study.reference.emplace();
         for (const std::string& text : reference_) {
             if (study.sweep.size() == 1 && text.find('=') == std::string::npos) {
-                (*study.reference)[study.sweep.begin()->first] = knob_value(text);
+                (*study.reference)[study.sweep.begin()->first] = read_argument(text);
                 continue;
             }
             const auto [knob, values] = read_swept_setting("--reference", text, "NODE.PARAM");
             if (values.size() != 1) throw Error(fmt::format("--reference \"{}\"; it must be one value", text));
-            (*study.reference)[knob] = knob_value(values.front());
+            (*study.reference)[knob] = read_argument(values.front());
         }
         study.lines = lines_;
         study.last_frame_only = error_frames_ == "last";
@@ -213,25 +334,60 @@ private:
         } else {
             study.last = study.first + default_frames - 1;
         }
-        or_throw(study.complete());
+        study.complete();
         return study;
     }
 
-    // Error: the file, the graph or the options are wrong; found before any scene is run.
-    SceneStudy describe(const StudyChild& child) const
+    bool is_scene() const { return !sweep_.empty(); }
+
+    Outcome in_child(const ChildWork& work, const std::function<void(int run)>& on_run = {}) const
     {
-        if (!child.source.is_scene)
+        StudySource source{graph_.file(), is_scene(), {}, graph_.seed()};
+        source.session.set = graph_.settings();
+        source.session.script_timeout = graph_.options().script_seconds;
+        source.session.script_memory = graph_.options().script_memory;
+        Outcome outcome;
+        json last;
+        const std::string ending =
+            run_in_child([&](const TellParent& tell) { do_work(std::move(source), threads_, work, tell); },
+                         [&](const json& event) {
+                             if (!event.contains("run"))
+                                 last = event;
+                             else if (on_run)
+                                 on_run(event.at("run"));
+                         });
+        if (last.contains("failed"))
+            outcome = {{}, last.at("failed"), last.at("refused")};
+        else if (last.is_null())
+            outcome.failed = "its process ended with " + (ending.empty() ? "no result" : ending);
+        else
+            outcome.result = last.at("result");
+        return outcome;
+    }
+
+    // Error: the file, the graph or the options are wrong; found before any scene is run.
+    Study describe() const
+    {
+        if (!is_scene())
             for (const auto& [given, option] : {std::pair{!reference_.empty(), "--reference"},
                                                 {!lines_.empty(), "--lines"},
                                                 {frames_.has_value(), "-f"},
                                                 {error_.has_value(), "--error"},
                                                 {error_frames_.has_value(), "--error-frames"}})
                 if (given) throw Error(fmt::format("{} goes with --sweep; a study file says it itself", option));
-        const SceneStudy study = child.source.is_scene ? asked() : SceneStudy();
-        const Outcome outcome =
-            outcome_of([&](const TellParent& tell) { describe_study(child, study, !frames_.has_value(), tell); });
+        const Study study = is_scene() ? asked() : Study();
+        const Outcome outcome = in_child([&](const StudySource& source, const StudyScene::Progress&) -> json {
+            if (!source.is_scene) return json_of(read_study(source));
+            const std::int64_t first = StudyScene(study, source, study.rows().front()).first_frame();
+            Study from_first = study;
+            if (!frames_) {
+                from_first.last += first - study.first;
+                from_first.first = first;
+            }
+            return json_of(from_first);
+        });
         if (!outcome.failed.empty()) throw Error(outcome.failed);
-        SceneStudy described = read_study(outcome.event);
+        Study described = study_of(outcome.result);
         if (repeat_) described.repeat_runs = *repeat_;
         return described;
     }
@@ -246,47 +402,48 @@ private:
             throw Error(fmt::format("can't be written: {}", std::strerror(errno))).at({folder_, 0});
     }
 
-    StudyRun measure(const StudyChild& child, const SceneStudy& study, const StudyKnobs& knobs, RowProgress& progress)
+    StudyRow measure(const Study& study, const Knobs& knobs, RowProgress& progress)
     {
         const auto fail = [&](const Outcome& outcome, const char* whose) {
             status_ = std::max<int>(status_, outcome.refused ? status_refused : status_failed);
-            StudyRun row;
+            StudyRow row;
             row.knobs = knobs;
             row.failed = whose + outcome.failed;
             return row;
         };
-        const Reference& reference = reference_of(child, study, knobs, progress);
+        const Reference& reference = reference_of(study, knobs, progress);
         if (!reference.outcome.failed.empty()) return fail(reference.outcome, "the reference: ");
         const std::string label = study.label(knobs);
         progress.now(label);
-        const Outcome outcome = outcome_of(
-            [&](const TellParent& tell) {
-                run_row(child, study, knobs, reference.frames ? &*reference.frames : nullptr, tell);
+        const Outcome outcome = in_child(
+            [&](const StudySource& source, const StudyScene::Progress& runs) {
+                const RecordLog* frames = reference.frames ? &*reference.frames : nullptr;
+                return json_of(StudyScene(study, source, knobs).measure(frames, runs));
             },
-            [&](std::int64_t run) { progress.now(fmt::format("{}  run {}/{}", label, run, study.repeat_runs + 1)); });
-        if (!outcome.failed.empty()) return fail(outcome, "");
-        return read_row(outcome.event, knobs);
+            [&](int run) { progress.now(fmt::format("{}  run {}/{}", label, run, study.repeat_runs + 1)); });
+        return outcome.failed.empty() ? row_of(outcome.result, knobs) : fail(outcome, "");
     }
 
     struct Reference {
-        std::string label;                     // of its knobs
-        std::optional<StudyReference> frames;  // nothing for a closed form, which needs no run
+        std::string label;                // of its knobs
+        std::optional<RecordLog> frames;  // nothing for a closed form, which needs no run
         Outcome outcome;
     };
 
     // Rows of one line share a reference, which is kept until another one is needed.
-    const Reference& reference_of(const StudyChild& child, const SceneStudy& study, const StudyKnobs& knobs,
-                                  RowProgress& progress)
+    const Reference& reference_of(const Study& study, const Knobs& knobs, RowProgress& progress)
     {
-        const StudyKnobs wanted = study.reference ? study.reference_of(knobs) : StudyKnobs();
+        const Knobs wanted = study.reference ? study.reference_of(knobs) : Knobs();
         const std::string label = study.label(wanted);
         if (kept_ && kept_->label == label) return *kept_;
         kept_.emplace().label = label;
         if (!study.reference) return *kept_;
         progress.now("reference: " + label);
-        kept_->frames = or_throw(StudyReference::make());
-        kept_->outcome =
-            outcome_of([&](const TellParent& tell) { run_reference(child, study, wanted, *kept_->frames, tell); });
+        RecordLog& frames = kept_->frames.emplace(RecordLog::in_memory());
+        kept_->outcome = in_child([&](const StudySource& source, const StudyScene::Progress& runs) {
+            StudyScene(study, source, wanted).keep_frames(frames, runs);
+            return json();
+        });
         return *kept_;
     }
 
@@ -298,6 +455,7 @@ private:
     std::optional<int> repeat_;
     std::string folder_ = ".";
     bool json_ = false, quiet_ = false;
+    int threads_ = 0;
     std::optional<Reference> kept_;
     int status_ = status_done;
 };

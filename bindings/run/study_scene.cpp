@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "runtime/graph/evaluate.h"
+#include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/state_file.h"
@@ -137,10 +138,24 @@ double run_frames(const Plan& plan, const Study& study,
     return stopwatch.seconds();
 }
 
+// A study file without knobs has no graph.
+SessionOptions session_options(const StudySource& source, const Knobs& knobs)
+{
+    SessionOptions options = source.session;
+    if (!source.is_scene) options.knobs = knobs;
+    return options;
+}
+
 }  // namespace
 
-StudyScene::StudyScene(const Study& study, const Session& session, Graph graph, std::optional<std::uint64_t> seed)
-    : study_(study), session_(session), graph_(std::move(graph)), seed_(seed)
+Study read_study(const StudySource& source) { return Session(source.file, session_options(source, {})).study(); }
+
+StudyScene::StudyScene(const Study& study, const StudySource& source, const Knobs& knobs)
+    : study_(study),
+      knobs_(knobs),
+      session_(source.file, session_options(source, knobs)),
+      graph_(source.is_scene ? with_arguments(session_.graph(), knobs) : session_.graph()),
+      seed_(source.seed)
 {
 }
 
@@ -163,7 +178,7 @@ void StudyScene::keep_frames(RecordLog& log, const Progress& progress) const
     progress(1);
 }
 
-StudyRow StudyScene::measure(const Knobs& knobs, const RecordLog* reference, const Progress& progress) const
+StudyRow StudyScene::measure(const RecordLog* reference, const Progress& progress) const
 {
     Measure measure(study_, session_);
     std::vector<double> seconds;
@@ -182,14 +197,14 @@ StudyRow StudyScene::measure(const Knobs& knobs, const RecordLog* reference, con
                 const double time = result.time.at(output), fps = result.fps.at(output);
                 const Frame frame{static_cast<double>(result.frame), time, 1 / fps};
                 const PointSet compared = study_.reference ? frame_of(*reference, result.frame, place)
-                                                           : session_.study_reference(frame, knobs);
+                                                           : session_.study_reference(frame, knobs_);
                 measure.add(points, compared, result.frame - plan.first_frame(), time);
             });
         }
         progress(run + 1);
     }
     StudyRow row = measure.row();
-    row.knobs = knobs;
+    row.knobs = knobs_;
     row.seconds = std::move(seconds);
     return row;
 }

@@ -49,8 +49,6 @@ struct [[gnu::visibility("hidden")]] SceneShapes::Data
 };
 
 SceneValue value_of(const DetailValue& detail);
-// Of a parameter: a boolean, a number, a text or three numbers.
-SceneValue value_in_header(const Value& value);
 
 // As the renderer takes it, which refuses sizes. Refusal: a camera that looks at its own place,
 // or nowhere; an angle of view that none has.

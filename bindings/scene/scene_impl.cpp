@@ -7,6 +7,9 @@
 
 namespace rapid {
 
+namespace {
+
+// Returns a parameter's value: a boolean, a number, a text or three numbers.
 SceneValue value_in_header(const Value& value)
 {
     if (const auto* number = value.get<double>()) return *number;
@@ -14,8 +17,6 @@ SceneValue value_in_header(const Value& value)
     if (const auto* vector = value.get<Vec3d>()) return std::array<double, 3>{(*vector)[0], (*vector)[1], (*vector)[2]};
     return *value.get<std::string>();
 }
-
-namespace {
 
 std::vector<SceneParameter> parameters_of(const Session& session)
 {

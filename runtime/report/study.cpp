@@ -66,7 +66,11 @@ void Study::complete()
         if (!sweep.count(knob))
             throw Error(fmt::format("{}: the sweep has no knob \"{}\"{}", what, knob, did_you_mean(knob, names)));
     };
-    for (const std::string& line : lines) check_name("lines", line);
+    for (const std::string& line : lines) {
+        check_name("lines", line);
+        if (std::count(lines.begin(), lines.end(), line) > 1)
+            throw Error(fmt::format("lines: \"{}\" is there twice", line));
+    }
     if (reference)
         for (const auto& [knob, value] : *reference) check_name("reference", knob);
 

@@ -32,7 +32,7 @@ struct Study {
     // Whether points are compared with a reference: a residual needs none.
     bool compares() const { return error != "residual"; }
     // Completes `lines` where the sweep leaves no choice. Error: two knobs remain for the step; an unknown name; a
-    // value given twice.
+    // value or a line given twice.
     void complete();
     // The knob along a line: the one that is not in `lines`. Empty where there is none, or where it has no numbers.
     std::string step() const;

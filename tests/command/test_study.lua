@@ -235,6 +235,27 @@ return rapid.create { points = rapid.points.grid { size = {0.6, 0.9, 0.3}, spaci
     end
   end)
 
+  it("sweeps a vector, in the parameter's own components", function()
+    folder:write("fall.lua", header .. [[
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity { name = "down" } :solve {}]])
+    local found = result_of("fall.lua --sweep 'down.g={0,-8,0},{0,-6,0}' --reference '{0,-8,0}' -f 1-13 --error max")
+    assert.same({ 0, -6, 0 }, found.rows[2].knobs["down.g"])
+    assert.equal(0, found.rows[1].error)
+    assert.near(2 * 0.5 ^ 2 / 2, found.rows[2].error, 1e-6) -- the difference of g, times t²/2
+  end)
+
+  it("tells a setting that fails from one that the scene refuses", function()
+    folder:write("warm.lua", header .. [[
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
+  :points("warm", function(_, frame) if frame.number == 4 then error "hot" end end) :solve {}]])
+    for sweep, status in pairs { ["1,2 -f 1-3"] = 0, ["1,2 -f 1-5"] = 1, ["1,-1 -f 1-3"] = 2 } do
+      local result = rapid("warm.lua --repeat 1 -o out --reference 4 --sweep solve.substeps=" .. sweep)
+      assert.equal(status, result.status, result.stdout)
+    end
+    local early = rapid "warm.lua --repeat 1 -o out --reference 4 --sweep solve.substeps=1,2 -f -4-3"
+    assert.truthy(early.stdout:find("frames: -4 is before the scene's first frame, 1", 1, true), early.stdout)
+  end)
+
   it("says that there is no residual where there is no constraint", function()
     local result = rapid "orbit.lua --sweep solve.substeps=1,2 --error residual -f 1-3 -o out"
     assert.equal(1, result.status)
@@ -299,7 +320,9 @@ return rapid.study { %s }]]):format(fields))
       [rest .. 'name = "x", sweep = { n = {{}} }'] = "sweep: n holds a table; it must be finite numbers,",
       [rest .. 'name = "x", repeat_runs = 0'] = "repeat_runs = 0; it must be a whole number, at least 1",
       [rest .. 'name = "x", error_frames = "first"'] = 'error_frames = "first"; it must be "all" or "last"',
+      [rest .. 'name = "x", repeat_runs = 1e18'] = "it must be a whole number, at least 1 and at most 100000",
       [rest .. 'name = "x", lines = "m"'] = 'lines: the sweep has no knob "m"',
+      [rest .. 'name = "x", lines = { "n", "n" }'] = 'lines: "n" is there twice',
       [rest .. 'name = "x", reference = { m = 1 }'] = 'reference: the sweep has no knob "m"',
     } do
       local found = message(fields)

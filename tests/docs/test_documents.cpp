@@ -9,7 +9,7 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> documents = {"docs/architecture.md", "docs/numerics.md",    "docs/extending.md",
                                             "docs/host.md",         "docs/reliability.md", "docs/cli.md",
-                                            "SECURITY.md",          "CONTRIBUTING.md"};
+                                            "docs/guide.md",        "SECURITY.md",         "CONTRIBUTING.md"};
 
 // Files that a document's examples are, which a reader would write.
 std::set<std::string> example_files(const std::string& text)

@@ -27,7 +27,7 @@ void fill(Picture& sheet, int x, int y, int width, int height, const Colour& col
                       &sheet.rgb[3 * (static_cast<std::size_t>(row) * sheet.width + column)]);
 }
 
-// The beginning of the text that is at most so wide; cut texts end with dots.
+// Returns the longest beginning of the text that fits the width. A truncated text ends with dots.
 std::string cut(std::string text, int width)
 {
     for (char& c : text)
@@ -55,7 +55,7 @@ void write_line(Picture& sheet, int x, int y, int width, const std::string& line
     }
 }
 
-// Into the middle of the tile, as large as it fits.
+// Draws a picture centred in a tile, as large as it fits.
 void draw(Picture& sheet, int x, int y, int width, int height, const Picture& picture)
 {
     const double scale =
@@ -68,7 +68,7 @@ void draw(Picture& sheet, int x, int y, int width, int height, const Picture& pi
                             fitted_height, 3 * sheet.width, 3, STBIR_ALPHA_CHANNEL_NONE, 0);
 }
 
-// As near to a square as there are columns that take whole series, or a part of one in whole rows.
+// Returns the number of columns nearest to a square that holds whole series per row, or a series in whole rows.
 int columns_of(int count, int series)
 {
     const int square = std::max(1, static_cast<int>(std::ceil(std::sqrt(count))));
@@ -86,7 +86,7 @@ Picture contact_sheet(const std::vector<SheetTile>& tiles, std::size_t series)
     const int count = static_cast<int>(tiles.size());
     const int columns = columns_of(count, static_cast<int>(series)), rows = (count + columns - 1) / columns;
     const int width = std::clamp((widest_sheet - gap) / columns - gap, narrowest_tile, widest_tile);
-    double shape = 9.0 / 16;  // height by width
+    double shape = 9.0 / 16;  // height / width
     std::size_t lines = 0;
     for (const SheetTile& tile : tiles) lines = std::max(lines, tile.label.size());
     const auto first = std::find_if(tiles.begin(), tiles.end(), [](auto& tile) { return tile.picture.width > 0; });

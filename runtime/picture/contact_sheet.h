@@ -9,13 +9,13 @@
 namespace rapid {
 
 struct SheetTile {
-    Picture picture;                 // of width 0: none
-    std::vector<std::string> label;  // lines of ASCII; what does not fit is cut
+    Picture picture;                 // width 0 means no picture
+    std::vector<std::string> label;  // lines of ASCII; truncated to the tile's width
 };
 
-// Tiles from left to right and from the top, in about as many rows as columns; at most 8,192 pixels wide. All have the
-// shape of the first picture; others are fitted into it. So many tiles each are a series, which begins with a row, or
-// lies in one, where that is possible.
+// Arranges tiles from left to right and top to bottom, in about as many rows as columns, at most 8,192 pixels wide. All
+// tiles have the shape of the first picture, and others are fitted into it. Every `series` tiles form a series, which
+// starts a row or fits within one if possible.
 Picture contact_sheet(const std::vector<SheetTile>& tiles, std::size_t series = 1);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// The frame that is written or drawn, besides its points.
+// The frame that is written or drawn, apart from its points.
 #pragma once
 
 #include <memory>
@@ -15,12 +15,12 @@ struct FrameInfo {
     double time = 0;  // s since the start
     double fps = 24;
 
-    // For pictures (picture.h). Null: the usual ones; the points alone; fitted to this one frame. FrameWriter keeps a
-    // view and a painter over a sequence.
+    // Settings for pictures (picture.h). Null selects the defaults: default options, only the points, a view fitted to
+    // this frame. FrameWriter keeps a view and a painter for a sequence.
     std::shared_ptr<const PictureOptions> picture = nullptr;
     std::shared_ptr<const PictureScene> scene = nullptr;
     std::shared_ptr<const PictureView> view = nullptr;
-    std::shared_ptr<Painter> painter = nullptr;  // null: one for this frame alone
+    std::shared_ptr<Painter> painter = nullptr;  // null: a new one for this frame
 };
 
 }  // namespace rapid

@@ -6,7 +6,8 @@
 
 namespace rapid {
 
-// With the usual options, scene, view and painter where the frame has none. Error: a size that no picture can have.
+// Draws a frame with the default options, scene, view and painter if the frame has none. Throws Error if the size is
+// out of range.
 Picture picture_of(const PointSet& points, const FrameInfo& frame);
 
 }  // namespace rapid

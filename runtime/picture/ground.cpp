@@ -24,13 +24,13 @@ Ground::Ground(const PictureScene::Plane& plane, const PictureView& view, bool i
     v = u.cross(normal);
 }
 
-// The part of a pixel that a line covers; x: m from the origin, pixel: its width on the ground, m.
+// Returns the fraction of a pixel that a line covers. x: m from the origin; pixel: its width on the ground, m.
 float Ground::line(float x, float pixel) const
 {
     const float away = std::abs(x - spacing * std::round(x / spacing));
     const float width = std::max(0.004f * spacing, 0.5f * pixel);
     const float seen = std::clamp((width + 0.5f * pixel - away) / pixel, 0.0f, 1.0f);
-    // Lines closer than a few pixels would shimmer.
+    // Lines closer than a few pixels would shimmer, so they fade out.
     return seen * std::clamp(1.5f - 4 * pixel / spacing, 0.0f, 1.0f);
 }
 
@@ -40,7 +40,7 @@ ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ra
     const float slope = std::max(0.02f, std::abs(normal.dot(ray.normalized())));
     const float pixel = t / focal;
     const Vec3f along = P - normal * offset;
-    // A pixel is longer on the ground where it is seen at a flat angle; lines across it are then wider.
+    // At a flat angle a pixel is longer on the ground, so lines across the view direction are drawn wider.
     const Vec3f view_on_ground = (ray - normal * normal.dot(ray)).normalized();
     const auto width = [&](const Vec3f& axis) {
         const float across = std::abs(view_on_ground.dot(axis));

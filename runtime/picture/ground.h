@@ -1,4 +1,4 @@
-// The ground of a picture: the planes of the scene, or a grid of lines where there are none.
+// The ground of a picture: the planes of the scene, or a grid of lines if it has none.
 #pragma once
 
 #include <cmath>
@@ -8,25 +8,25 @@
 
 namespace rapid {
 
-// A place of a surface as it is seen.
+// The shading of a visible surface point.
 struct ShadedSample {
-    Vec3f colour;  // where no point shades it
-    Vec3f lamp;    // the part of that which points can take
+    Vec3f colour;  // without shadows of points
+    Vec3f lamp;    // the part of it that points can shade
 };
 
-// Lines on a ground plane that fade out far from the scene.
+// Lines on a ground plane that fade out with distance from the scene.
 struct Ground {
     Vec3f normal, u, v;
     float offset;
     float spacing;  // m
     Vec3f scene_center;
-    Vec3f center;  // of the part that is seen
-    float extent;  // m from there, where lines have faded to 1/e
+    Vec3f center;  // centre of the visible part
+    float extent;  // m from `center`, where lines have faded to 1/e
     bool solid;
 
     Ground(const PictureScene::Plane& plane, const PictureView& view, bool is_solid);
 
-    // Where the ray meets the plane; infinite where it does not.
+    // Returns the ray parameter at the plane, or infinity if the ray misses it.
     float depth(const Vec3f& origin, const Vec3f& ray) const
     {
         const float towards = normal.dot(ray);
@@ -34,13 +34,13 @@ struct Ground {
         return towards != 0 && t > 0 && std::isfinite(t) ? t : std::numeric_limits<float>::infinity();
     }
 
-    // Whether it is a wall between the eye and the scene, seen from behind: then it is transparent.
+    // Returns true if the plane is seen from behind and stands between the eye and the scene. It is then not drawn.
     bool stands_before(const Vec3f& eye) const
     {
         return normal.dot(eye) < offset && normal.dot(scene_center) >= offset;
     }
 
-    // At P, at depth t on the ray, over the colour `behind` it.
+    // Shades P, at depth t on the ray, over the background colour `behind`.
     ShadedSample shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
                        const Light& light) const;
 

@@ -1,23 +1,23 @@
-// The projection from the world to a raster.
+// The projection from world space to a raster.
 #pragma once
 
 #include "runtime/picture/scene.h"
 
 namespace rapid {
 
-// A unit vector perpendicular to a normal.
+// Returns a unit vector perpendicular to a normal.
 Vec3f any_tangent(const Vec3f& n);
 
-// By perspective or along parallel rays.
+// A perspective or parallel projection.
 struct Lens {
     Vec3f origin, right, up, forward;  // unit vectors
-    float focal;                       // samples at depth 1 m; of parallel rays: samples a metre
+    float focal;                       // samples at depth 1 m; if parallel, samples per metre
     float center_x, center_y;          // samples
     bool parallel = false;
 
     static Lens of_camera(const Camera& camera, int width, int height);
 
-    // x, y and depth.
+    // Returns x, y and depth.
     Vec3f project(const Vec3f& P) const
     {
         const Vec3f d = P - origin;

@@ -15,21 +15,21 @@ namespace {
 
 constexpr int shadow_size = 1024;  // texels across the shadow map of the meshes
 constexpr int cells = 160;         // across the shadow grid of the points
-constexpr int slices = 64;         // and along the light
+constexpr int slices = 64;         // of the grid, along the light
 constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
 constexpr std::size_t slice = std::size_t{cells} * cells;
 
-// Points of a larger radius are discs of cells, smaller ones are in one cell with all that they cover.
+// Larger points are discs that cover several cells. A smaller one puts its whole cross section into one cell.
 constexpr float small_radius = 1.5f;  // cells
-constexpr float most_covered = 4;     // times, by one large ball, which lets nothing through: exp(-0.7 4) is dark
+constexpr float most_covered = 4;     // per large ball, enough to be opaque: exp(-0.7 · 4) is dark
 
-// What a point covers, in cells.
+// The cells that a point covers, in units of cells.
 struct ShadowDisc {
     float x, y, radius, taken;
 
     int reach() const { return radius <= small_radius ? 0 : static_cast<int>(std::ceil(radius)); }
 
-    // How often it covers a cell.
+    // Returns how many times the point covers a cell.
     float covers(int cell_x, int cell_y) const
     {
         if (radius <= small_radius) {
@@ -41,7 +41,7 @@ struct ShadowDisc {
         return part * taken * std::min(radius / small_radius, most_covered);
     }
 
-    // How often it covers its own middle, as the blurred cells tell it there.
+    // Returns how many times the point covers its own centre, as read back from the blurred cells.
     float covers_itself() const
     {
         if (radius > 5) return taken * std::min(radius / small_radius, most_covered);
@@ -56,12 +56,12 @@ struct ShadowDisc {
     }
 
 private:
-    // Of the cells around that of `at` in a value that is interpolated there, between two blurred cells.
+    // Returns the weights of the cells around `at` in the value interpolated there between two blurred cells.
     static std::array<float, 7> weights(float at)
     {
         constexpr std::array<float, 9> blur = {0, 0, 0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f, 0, 0};
         const float middle = at - std::floor(at) - 0.5f;
-        const int low = middle < 0 ? -1 : 0;  // the nearer of the two, from the point's cell
+        const int low = middle < 0 ? -1 : 0;  // the nearer of the two, relative to the point's cell
         const float part = middle - static_cast<float>(low);
         std::array<float, 7> result{};
         for (int k = -3; k <= 3; ++k)
@@ -74,8 +74,8 @@ private:
 Vec3f light_direction(const Camera& camera)
 {
     const Lens lens = Lens::of_camera(camera, 2, 2);
-    // From above, a little from the left, and from behind the viewer: the visible sides of shapes are lit, and shadows
-    // fall to the right.
+    // The light comes from above, slightly from the left, and from behind the viewer: the visible sides of shapes are
+    // lit, and shadows fall to the right.
     const Vec3f across = lens.right * -0.45f + Vec3f::UnitY() * 0.85f - lens.forward * 0.35f;
     return across.normalized();
 }
@@ -130,7 +130,7 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
         covered_.assign(count, 0);
         spread_.assign(count, 0);
     }
-    // What the frame before has left.
+    // Clears the cells of the previous frame.
     const auto for_each_row = [&](const auto& f) {
         tbb::parallel_for(z_.begin, z_.end, [&](int k) {
             for (int y = y_.begin; y < y_.end; ++y)
@@ -177,7 +177,7 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
         y_.extend(std::max(y.begin - 2, 0), std::min(y.end + 1, cells - 1));
         z_.extend(z.begin, slices - 1);
     }
-    // A load and a store take a tenth of the time of an exchange, and nobody else is there.
+    // A load and a store take a tenth of the time of an exchange, and no other thread is active.
     for_each_row([&](std::size_t row) {
         for (std::size_t i = row + x_.begin; i < row + x_.end; ++i) {
             covered_[i] = static_cast<float>(sums_[i].load(std::memory_order_relaxed)) / unit;
@@ -193,8 +193,8 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
     });
 }
 
-// Over the neighbours, twice along each axis, so that cells do not show: weights 1, 4, 6, 4, 1. What is beyond the
-// range is 0.
+// Blurs over the neighbours along both axes, so that cells do not show: weights 1, 4, 6, 4, 1. Values outside the range
+// are 0.
 void Light::blur_covered()
 {
     tbb::parallel_for(z_.begin, z_.end, [&](int k) {
@@ -229,11 +229,12 @@ void Light::blur_covered()
 float Light::past_meshes(const Vec3f& P, const Vec3f& n) const
 {
     if (mesh_depth_.empty()) return 1;
-    // A little in front of the surface, or the raster of the shadow map would show on it.
+    // Tests slightly in front of the surface, because the raster of the shadow map would otherwise show on it.
     const float texel = 1 / lens_.focal;
     const Vec3f s = lens_.project(P + n * (2 * texel));
     if (!(s.x() >= 2 && s.y() >= 2 && s.x() < shadow_size - 2 && s.y() < shadow_size - 2)) return 1;
-    // Nine texels, weighted by how much of each a square of two texels around s covers: the shadow's edge is a ramp.
+    // Averages nine texels, weighted by how much of each a square of two texels around s covers, for a smooth shadow
+    // edge.
     const int x = static_cast<int>(s.x()), y = static_cast<int>(s.y());
     const float fx = s.x() - static_cast<float>(x), fy = s.y() - static_cast<float>(y);
     const float wx[3] = {1 - fx, 1, fx}, wy[3] = {1 - fy, 1, fy};
@@ -273,7 +274,7 @@ float Light::past_other_points(const Vec3f& P, float radius, float taken) const
                        static_cast<int>(lens_.project(P).z() / depth_range_ * slices));
 }
 
-// own: how often the point whose place it is covers it, with its slice.
+// own: coverage of the position by the point that is there, to be excluded; own_slice: its slice.
 float Light::past_points(const Vec3f& cell, float own, int own_slice) const
 {
     if (z_.begin == z_.end) return 1;

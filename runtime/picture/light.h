@@ -1,4 +1,4 @@
-// The light of a picture, and the shadows that it casts.
+// The light of a picture and its shadows.
 #pragma once
 
 #include <atomic>
@@ -11,30 +11,30 @@
 
 namespace rapid {
 
-// Of the light that reaches an open place; the rest is the lamp's.
+// Fraction of the light at an unshaded position that comes from the sky. The rest comes from the lamp.
 constexpr float light_from_sky = 0.30f;
 
-// A lamp at infinity that casts shadows: of meshes on everything, and of points on each other and on what is below.
-// Made for a view and its shapes; the points' shadows are gathered anew for each frame.
+// A lamp at infinity that casts shadows: of meshes on everything, of points on each other and on surfaces. Create one
+// for a view and its shapes. The points' shadows are gathered again for each frame.
 class Light {
 public:
     Light(const PictureScene& scene, const PictureView& view);
 
     const Vec3f& direction() const { return direction_; }  // to the lamp
-    // The part of the light at P that passes the meshes; n: the normal where P is on a surface, else 0.
+    // Returns the fraction of light at P that passes the meshes. n: the normal if P is on a surface, else 0.
     float past_meshes(const Vec3f& P, const Vec3f& n) const;
 
-    // opacity: how much light a point takes, from 0 to 1; shape [points.size()], or empty where all are opaque.
-    // least_radius: m, that points are seen with at least.
+    // Gathers the points' shadows. opacity: light that each point blocks, 0 to 1; shape [points.size()], or empty if
+    // all are opaque. least_radius: minimum radius at which points are drawn, m.
     void gather(const PointSet& points, std::span<const float> opacity, float least_radius);
 
-    // The place of P among the cells of the points' shadows.
+    // Returns the position of P in the shadow grid of the points.
     Vec3f cell_of(const Vec3f& P) const;
-    // The part of the light that passes the points between the lamp and such a place.
+    // Returns the fraction of light that passes the points between the lamp and a position in the grid.
     float past_points(const Vec3f& cell) const;
-    // The same at a point that has been gathered, by all others: a ball casts no shadow on its own middle.
+    // Returns the same at a gathered point, excluding the point itself: a ball casts no shadow on its own centre.
     float past_other_points(const Vec3f& P, float radius, float taken) const;
-    // Whether any place in the box of cells may be in their shadow.
+    // Returns true if any position in this box of the grid may be shaded.
     bool may_shade(const Box3f& box) const;
 
 private:
@@ -42,7 +42,7 @@ private:
     void blur_covered();
     float past_points(const Vec3f& cell, float own, int own_slice) const;
 
-    // The cells that points cover, with those that the blur reaches: of none, begin = end.
+    // The cells that points cover, including those that the blur reaches. Empty if begin = end.
     struct Range {
         int begin = 0, end = 0;
         void extend(int low, int high);
@@ -50,11 +50,12 @@ private:
 
     Vec3f direction_;
     Lens lens_;
-    float depth_range_;              // m, of the lit region
-    float least_radius_ = 0;         // m, of the points that were gathered
-    std::vector<float> mesh_depth_;  // of the nearest mesh, shape [shadow_size][shadow_size]; empty: no meshes
-    // How often points cover a cell's cross section, summed from the lamp to the cell's far side; shape [slices][size]
-    // [size] over the same square. Integers while they are summed: a sum does not depend on the order of threads.
+    float depth_range_;              // depth of the lit region, m
+    float least_radius_ = 0;         // m, as passed to gather()
+    std::vector<float> mesh_depth_;  // nearest mesh depth, shape [shadow_size][shadow_size]; empty without meshes
+    // How many times points cover a cell's cross section, summed from the lamp to the cell's far side; shape
+    // [slices][size] [size] over the same square. The sums use integers, so that they do not depend on the order of
+    // threads.
     std::vector<float> covered_, spread_;
     std::unique_ptr<std::atomic<std::uint64_t>[]> sums_;
     Range x_, y_, z_;

@@ -1,5 +1,5 @@
-// Points are sorted into tiles; each tile sorts its own by depth and composites them front to back, until a pixel is
-// covered.
+// Points are sorted into tiles. Each tile sorts its points by depth and composites them front to back, until a pixel is
+// opaque.
 #include "runtime/picture/marks.h"
 
 #include <tbb/parallel_for.h>
@@ -20,8 +20,8 @@
 namespace rapid {
 namespace {
 
-// Dark blue over teal to light yellow: lightness grows evenly with speed, and stands out on the background all along.
-// sRGB, at even steps.
+// From dark blue over teal to light yellow: lightness grows evenly with speed and contrasts with the background
+// everywhere. sRGB, in equal steps.
 constexpr std::array<std::array<float, 3>, 6> speed_ramp = {{{0.17f, 0.25f, 0.62f},
                                                              {0.16f, 0.42f, 0.80f},
                                                              {0.18f, 0.62f, 0.82f},
@@ -31,7 +31,7 @@ constexpr std::array<std::array<float, 3>, 6> speed_ramp = {{{0.17f, 0.25f, 0.62
 
 float linear(float srgb) { return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f); }
 
-// The ramp in linear light, finer than 8 bits can show.
+// Returns the ramp in linear light, finer than 8 bits can show.
 const std::vector<Vec3f>& speed_colours()
 {
     static const std::vector<Vec3f> colours = [] {
@@ -48,7 +48,7 @@ const std::vector<Vec3f>& speed_colours()
     return colours;
 }
 
-// What the styles of a scene come to for each point.
+// The styles of a scene, resolved for each point.
 class PointStyles {
 public:
     PointStyles(const PointSet& points, const PictureScene& scene) : styles_(scene.styles)
@@ -69,7 +69,7 @@ public:
     {
         return !additive_.empty() && additive_[i] != 0 && *styles_[additive_[i] - 1].additive;
     }
-    // s
+    // Returns the exposure time in s.
     double shutter(std::size_t i) const
     {
         return shutter_.empty() || shutter_[i] == 0 ? 0 : *styles_[shutter_[i] - 1].shutter;
@@ -77,27 +77,27 @@ public:
 
 private:
     const std::vector<PointStyle>& styles_;
-    // The style that counts for each point, by its place in styles_ from 1; 0: none. Empty: none for all points.
+    // The style that applies to each point: its index in styles_ plus 1, or 0 for none. Empty if no point has one.
     std::vector<std::uint8_t> additive_, shutter_;
 };
 
-// How much brighter than white a colour is, up to 1.
+// Returns how much brighter than white a colour is, at most 1.
 float glow(const Vec3f& colour) { return std::clamp(colour.maxCoeff() - 1, 0.0f, 1.0f); }
 
 float opacity_of(const Column<float>* Alpha, std::size_t i)
 {
     if (!Alpha) return 1;
     const float alpha = (*Alpha)[i];
-    return alpha >= 0 ? std::min(alpha, 1.0f) : 0;  // NaN: 0
+    return alpha >= 0 ? std::min(alpha, 1.0f) : 0;  // NaN gives 0
 }
 
-// How points look in this picture.
+// The appearance of points in this picture.
 struct PointLook {
     const PictureView& view;
     const Light& light;
     const TileGrid& tiles;
     Lens lens;
-    float far;  // m, the depth at which colours have faded halfway to the background
+    float far;  // m, depth at which colours have faded halfway to the background
     PointStyles styles;
     const Strided<Vec3f> P, v;
     const Column<Vec3f>* Cd;
@@ -130,12 +130,12 @@ struct PointLook {
         }
         const float speed = v[i].norm() / static_cast<float>(view.full_speed);
         const std::vector<Vec3f>& table = speed_colours();
-        // A square root: most points are slow, and differences among them show.
+        // The square root shows differences among slow points, which are the most frequent.
         const float at = std::isfinite(speed) ? std::sqrt(std::clamp(speed, 0.0f, 1.0f)) : 1;
         return table[static_cast<std::size_t>(at * static_cast<float>(table.size() - 1))];
     }
 
-    // Piece k of the trail, from 1: from its place k - 1 to k. It fades to its end.
+    // Returns segment k of the trail, from 1, between its positions k - 1 and k. Segments fade towards the end.
     Mark piece(std::size_t i, int k, Mark m) const
     {
         m.radius = 0;
@@ -155,7 +155,7 @@ struct PointLook {
         return m;
     }
 
-    // The radius, if the mark may be in the picture.
+    // Sets the radius if the mark may be in the picture.
     void size(Mark& m) const
     {
         const auto least = static_cast<float>(view.least_radius);
@@ -167,7 +167,7 @@ struct PointLook {
             m.radius = radius;
     }
 
-    // The way back to where the point was when the shutter opened, or was born after.
+    // Sets the displacement back to the position when the shutter opened, or to the birth if that was later.
     void expose(std::size_t i, float shutter, Mark& m) const
     {
         const float open = std::min(shutter, age ? std::max(0.0f, (*age)[i]) : shutter);
@@ -201,7 +201,7 @@ struct PointLook {
         const float fog = std::exp(-0.35f * std::max(0.0f, s.z() / far - 1));
         const Vec3f own = colour(i);
         m.colour = own * fog;
-        // A colour brighter than white shines, and no shadow dims it.
+        // A colour brighter than white glows and receives no shadow.
         const float shining = m.additive ? 1 : glow(own);
         if (shining < 1) {
             const float lamp = light.past_meshes(P[i], Vec3f::Zero()) *
@@ -229,7 +229,7 @@ void for_each_tile_of(const Mark& m, const TileGrid& tiles, const F& f)
 // A pixel while points are composited front to back.
 struct Pixel {
     Vec3f colour = Vec3f::Zero();
-    float open = 1;  // transmittance: the part of what is behind that shows
+    float open = 1;  // transmittance: fraction of the background that shows
 };
 
 class TilePainter {
@@ -247,7 +247,7 @@ public:
 
     void composite(const Mark& m)
     {
-        // The tile as a whole tells of most marks that no surface hides them.
+        // For most marks the depth range of the tile shows that no surface hides them.
         const float first = m.depth + std::min(0.0f, m.ddepth) - m.metres;
         const float last = m.depth + std::max(0.0f, m.ddepth);
         if (surfaces_.farthest <= first) return;
@@ -266,7 +266,8 @@ public:
     }
 
 private:
-    // Calls f(pixel, its place in the tile, x and y from the mark's to its centre) for those of a box around the mark.
+    // Calls f(pixel, index in the tile, x and y from the mark to the pixel's centre) for the pixels in a box around the
+    // mark.
     template <class F>
     void for_each_pixel(const Mark& m, const F& f)
     {
@@ -287,16 +288,16 @@ private:
             }
     }
 
-    // The part of the pixel's samples that no surface nearer than `depth` hides.
+    // Returns the fraction of the pixel's samples that no surface nearer than `depth` hides.
     float past_surfaces(std::size_t pixel, float depth) const
     {
-        // As vectors, for g++ branches at each of the samples.
+        // Uses a vector, because g++ would branch at each sample.
         constexpr int samples = surface_samples * surface_samples;
         static_assert(samples == 4);
         typedef float Depths __attribute__((vector_size(samples * sizeof(float))));
         Depths of_pixel;
         std::memcpy(&of_pixel, &surfaces_.depth[samples * pixel], sizeof of_pixel);
-        const auto past = of_pixel > depth;  // -1, or 0
+        const auto past = of_pixel > depth;  // -1 or 0
         return static_cast<float>(-(past[0] + past[1] + past[2] + past[3])) / samples;
     }
 
@@ -306,13 +307,13 @@ private:
         if (!m.additive) pixel.open *= 1 - cover;
     }
 
-    // Only discs of a few pixels are shaded as balls.
+    // Only discs of several pixels are shaded as balls.
     static float roundness_of(const Mark& m)
     {
         return m.additive ? 0 : std::clamp((m.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
     }
 
-    // hidden: maybe, by surfaces.
+    // hidden: surfaces may hide parts of it.
     template <bool hidden>
     void disc(const Mark& m)
     {
@@ -324,7 +325,7 @@ private:
             if (squared >= reach * reach) return;
             const float away = std::sqrt(squared);
             float cover = m.opacity * std::min(reach - away, 1.0f);
-            // The ball's surface is nearer than its centre.
+            // The surface of the ball is nearer than its centre.
             const float edge = std::min(1.0f, away * inverse);
             const float bulge = std::sqrt(1 - edge * edge);
             if constexpr (hidden) cover *= past_surfaces(place, m.depth - bulge * m.metres);
@@ -334,14 +335,14 @@ private:
         });
     }
 
-    // A disc of the radius R that moves evenly along L: at the distance w from its line a pixel is behind it while
-    // |u - s L| <= sqrt(R² - w²), s from 0 to 1. Over the pixel's width that root is averaged, so that no line is
-    // brighter for where it falls among the pixels.
+    // Draws a disc of radius R that moves uniformly along L. It covers a pixel at distance w from its line while
+    // |u - s L| <= sqrt(R² - w²), s from 0 to 1. That root is averaged over the pixel's width, so that the brightness
+    // of a line does not depend on its alignment with the pixels.
     template <bool hidden>
     void streak(const Mark& m)
     {
         const float ux = m.dx / m.length, uy = m.dy / m.length, R = m.radius, inverse = 1 / m.length;
-        // The integral of sqrt(R² - w²).
+        // Returns the integral of sqrt(R² - w²).
         const auto area = [&](float w) {
             const float t = std::clamp(w / R, -1.0f, 1.0f);
             return 0.5f * R * R * (t * std::sqrt(1 - t * t) + std::asin(t));
@@ -358,7 +359,7 @@ private:
             if constexpr (hidden)
                 cover *= past_surfaces(place, m.depth + std::clamp(u * inverse, 0.0f, 1.0f) * m.ddepth - m.metres);
             if (roundness == 0) return add(pixel, m, cover, flat);
-            // As the nearest of the balls along the way.
+            // Shades it like the nearest ball along the way.
             const float past = u - std::clamp(u, 0.0f, m.length);
             const float nx = (ux * past - uy * side) / R, ny = (uy * past + ux * side) / R;
             const float shaded = shade(nx, ny, std::sqrt(std::max(0.0f, 1 - nx * nx - ny * ny)));
@@ -366,7 +367,7 @@ private:
         });
     }
 
-    // A pixel is on one of two pieces that follow each other, never on both.
+    // A pixel belongs to only one of two consecutive segments.
     template <bool hidden>
     void line(const Mark& m)
     {
@@ -381,7 +382,7 @@ private:
         });
     }
 
-    // Of a ball, where its normal in the view is (nx right, ny down, nz to the viewer).
+    // Returns the brightness of a ball with the normal (nx right, ny down, nz to the viewer) in the view.
     float shade(float nx, float ny, float nz) const
     {
         const Vec3f n = lens_.right * nx - lens_.up * ny - lens_.forward * nz;
@@ -392,11 +393,11 @@ private:
     const SurfaceTile& surfaces_;
     const Lens& lens_;
     const Light& light_;
-    int x0_, y0_, x1_, y1_;  // of the tile in the picture
+    int x0_, y0_, x1_, y1_;  // bounds of the tile in the picture
     std::array<Pixel, tile_pixels> pixels_;
 };
 
-// Depths are positive: their bits are in their order.
+// Depths are positive, so their bits sort like their values.
 std::uint64_t depth_key(float depth, std::size_t mark)
 {
     return std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | mark;
@@ -420,7 +421,7 @@ std::vector<float> shadow_opacity(const PointSet& points, const PictureScene& sc
     return opacity;
 }
 
-// A counting sort in two passes over blocks of points: each block has its own range in every tile.
+// Performs a counting sort in two passes over blocks of points. Each block has its own range in every tile.
 Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureScene& scene, const PictureView& view,
                  const Light& light)
 {
@@ -464,7 +465,7 @@ void draw_marks(const Marks& marks, const TileGrid& tiles, int tile, const Surfa
     order.assign(marks.of_tiles.begin() + marks.first[tile], marks.of_tiles.begin() + marks.first[tile + 1]);
     std::sort(order.begin(), order.end());
     TilePainter painter(tiles, tile, surfaces, lens, light);
-    constexpr std::size_t ahead = 8;  // marks that are fetched: in the order of depth they are anywhere in memory
+    constexpr std::size_t ahead = 8;  // marks to prefetch; in order of depth they are scattered in memory
     const auto mark = [&](std::size_t k) -> const Mark& { return marks.all[static_cast<std::uint32_t>(order[k])]; };
     for (std::size_t k = 0; k < order.size(); ++k) {
         if (k + ahead < order.size()) __builtin_prefetch(&mark(k + ahead));

@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// What was drawn for a view and its shapes, and for which.
+// The drawing of a view and its shapes, and the inputs for which it is valid.
 struct Painter::StillLayer {
     PictureOptions options;
     std::shared_ptr<const PictureScene> scene;
@@ -48,7 +48,7 @@ Picture Painter::draw(const PointSet& points, const PictureOptions& options,
                       const std::shared_ptr<const PictureScene>& scene, const PictureView& view)
 {
     if (!still_ || !still_->is_of(options, scene, view)) {
-        still_.reset();  // first: a large picture's are gigabytes
+        still_.reset();  // first, because those of a large picture take gigabytes
         still_ = std::make_unique<StillLayer>(options, scene, view);
     }
     Light& light = still_->light;

@@ -10,18 +10,18 @@
 namespace rapid {
 namespace {
 
-// m/s²: how fast points become that fall through the scene, for the scale of the speed colours.
+// m/s². The speed of points that fall through the scene sets the scale of the speed colours.
 constexpr double gravity = 9.81;
-constexpr double look_ahead = 0.5;  // s: how far points are followed along their velocity in the first frame
-constexpr double glide = 0.35;      // s: how soon the camera has done most of its way back
-constexpr double zoom = 0.2;        // s: the same of the size of a group that it frames
-constexpr double margin = 1.06;     // of the bounds, left free around them
-constexpr double room = 1.25;       // by how much the bounds grow beyond what has left them
+constexpr double look_ahead = 0.5;  // s: points are extrapolated by this time in the first frame
+constexpr double glide = 0.35;      // s: time constant of the camera's move back
+constexpr double zoom = 0.2;        // s: time constant of the zoom to the size of a followed group
+constexpr double margin = 1.06;     // the view exceeds the bounds by this factor
+constexpr double room = 1.25;       // the bounds grow by this factor when something leaves them
 constexpr double usual_fov = 0.61;  // radians
 const Vec3d view_from = Vec3d(0.55, 0.32, 1.0).normalized();  // from the scene to the camera
 
-// Bounds of the points but the outermost hundredth along each axis: a stray does not make the rest small. With where
-// they go in the time ahead, but not below `floor`.
+// Returns the bounds of the points without the outermost hundredth along each axis, so that a stray does not make the
+// rest small. Includes the positions after the time `ahead`, but not below `floor`.
 Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ahead, double floor)
 {
     const Strided<std::uint8_t> members = members_of(points, group);
@@ -29,7 +29,7 @@ Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ah
     const std::size_t step = std::max<std::size_t>(1, points.size() / sample_size);
     const Strided<Vec3f> all_P = points.P().read(), all_v = points.v().read();
     const Column<float>* pscale = points.find<float>("pscale");
-    std::vector<double> lows[3], highs[3];  // of the balls
+    std::vector<double> lows[3], highs[3];  // bounds of the balls
     for (std::size_t i = 0; i < points.size(); i += group.empty() ? step : 1) {
         if (!members[i]) continue;
         const Vec3d P = all_P[i].cast<double>();
@@ -85,7 +85,7 @@ Box3d scaled(const Box3d& box, double factor)
     return Box3d(box.center() - half, box.center() + half);
 }
 
-// Lines so many round metres apart that some eight are across the scene.
+// Returns a round spacing in metres that puts about eight lines across the scene.
 double spacing_of_lines(const Box3d& bounds)
 {
     const double wanted = std::max(1e-6, bounds.diagonal().norm()) / 8;
@@ -93,8 +93,8 @@ double spacing_of_lines(const Box3d& bounds)
     return decade * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
 }
 
-// Of the scene's shapes: emitters as they are, colliders as far as they are near what moves. A floor of a hundred
-// metres is no reason to stand a hundred metres away.
+// Returns the bounds of the scene's shapes: emitters in full, and colliders as far as they are near the moving points.
+// A floor of a hundred metres is no reason to place the camera a hundred metres away.
 Box3d shape_bounds(const PictureScene& scene, const Box3d& moving)
 {
     Box3d bounds = moving, colliders;
@@ -108,13 +108,13 @@ Box3d shape_bounds(const PictureScene& scene, const Box3d& moving)
     }
     if (colliders.isEmpty()) return bounds;
     if (bounds.isEmpty() || bounds.diagonal().norm() == 0) return bounds.merged(colliders);
-    // Only a collider that dwarfs the rest is cut.
+    // Only a collider that dwarfs the rest is clipped.
     if (colliders.diagonal().norm() < 6 * bounds.diagonal().norm()) return bounds.merged(colliders);
     const Box3d near = about(bounds, 0.8).intersection(colliders);
     return near.isEmpty() ? bounds : bounds.merged(near);
 }
 
-// Below it nothing falls: the lowest shape.
+// Returns the height of the lowest shape; nothing falls below it.
 double floor_of(const PictureScene& scene)
 {
     double floor = std::numeric_limits<double>::infinity();
@@ -125,7 +125,8 @@ double floor_of(const PictureScene& scene)
     return floor;
 }
 
-// As it is given; where it is not, where the box just fits, looking at its centre.
+// Returns the given camera. The parts that are not given are chosen so that the box just fits and the camera looks at
+// its centre.
 Camera fitted(const Box3d& bounds, const PictureOptions& options, const SceneCamera& of_scene)
 {
     Camera camera;
@@ -151,7 +152,8 @@ Camera fitted(const Box3d& bounds, const PictureOptions& options, const SceneCam
     return camera;
 }
 
-// The cube at the target that fills the picture's height, or one that reaches down to the ground if that is farther.
+// Returns the cube at the target that fills the picture's height, or one that reaches down to the ground if that is
+// farther.
 Box3d seen_by(const Camera& camera)
 {
     const double distance = std::max((camera.target - camera.position).norm(), std::abs(camera.position.y()));
@@ -159,7 +161,7 @@ Box3d seen_by(const Camera& camera)
     return Box3d(camera.target - half, camera.target + half);
 }
 
-// Whether there is one, which a snapshot may say otherwise.
+// Returns true if there is a valid view. A snapshot may contain anything.
 bool is_view(const std::optional<PictureView>& view)
 {
     return view && !view->bounds.isEmpty() && view->bounds.sizes().allFinite() && view->line_spacing > 0 &&
@@ -168,7 +170,7 @@ bool is_view(const std::optional<PictureView>& view)
 
 }  // namespace
 
-// The part of the way to the goal; the last hundredth is not seen, and ends the motion.
+// Moves the bounds by a fraction of the way to the goal. The last hundredth is invisible and ends the motion.
 void PictureFit::approach(double part)
 {
     Box3d& bounds = view_->bounds;
@@ -190,13 +192,13 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     if (!first)
         StateReader::expect(is_view(view_) && goal_.sizes().allFinite() && (!has_seen || seen_.sizes().allFinite()));
     const std::string& group = scene.camera.group;
-    // A group is followed, wherever it goes; while nobody has been in it, the scene is seen.
+    // A group is followed wherever it goes. As long as it has had no members, the scene is framed.
     Box3d moving = trimmed_bounds(points, group, first && group.empty() ? look_ahead : 0, floor_of(scene));
     const bool follows = !group.empty() && !(first && moving.isEmpty());
     if (first && !group.empty() && !follows) moving = trimmed_bounds(points, "", look_ahead, floor_of(scene));
     Box3d content = follows ? moving : shape_bounds(scene, moving);
     if (!content.isEmpty()) {
-        // A single point, a flat sheet: a metre or a tenth of the rest, so that there is something to look at.
+        // A single point or a flat sheet is extended to a metre or a tenth of the rest, to give the view a size.
         const double least = content.diagonal().norm() > 0 ? 0.1 * content.diagonal().norm() : 1.0;
         for (int axis = 0; axis < 3; ++axis)
             if (content.sizes()[axis] < least) {
@@ -216,12 +218,13 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
         view_.emplace();
         view_->bounds = goal_ = all;
     } else if (!group.empty()) {
-        // Its middle is followed at once, its size as a camera zooms.
+        // The group's centre is followed at once, its size gradually, like a zoom.
         view_->bounds.translate(all.center() - goal_.center());
         goal_ = all;
         approach(1 - std::exp(-passed / zoom));
     } else {
-        // It holds still while everything is in view. Then it goes back at once as far as will do for a while.
+        // The view holds still while everything is in it. When something leaves, it moves back far enough to hold still
+        // for a while.
         if (!scaled(goal_, margin).contains(all)) goal_ = scaled(goal_.merged(all), room);
         approach(1 - std::exp(-passed / glide));
     }
@@ -233,7 +236,7 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     const double fall = std::sqrt(gravity * view_->bounds.diagonal().norm());
     view_->full_speed = std::max({first ? 0.0 : view_->full_speed, fast_speed(points), 0.7 * fall, 1e-6});
 
-    // Few points are dots that one can see, many are fine grains.
+    // Few points are drawn as visible dots, many as fine grains.
     most_points_ = std::max(most_points_, points.size());
     const double dots = 2.6 * std::pow(std::max<double>(1000, static_cast<double>(most_points_)) / 1000, -0.16);
     view_->least_radius = std::max(0.75, dots) * options.height / 720;

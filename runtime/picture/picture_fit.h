@@ -1,9 +1,9 @@
 // The camera of a sequence.
 //
-// The later frames are unknown when the first is drawn, and a camera that jumps or drifts makes a sequence useless. So
-// the first frame with points is framed with room for where they go, and the camera holds still until something leaves
-// its view; then it glides back far enough to hold still again. The lines on the ground keep the first frame's scale;
-// under a camera that is given, the ground does not depend on the points.
+// Later frames are unknown when the first one is drawn, and a camera that jumps or drifts makes a sequence useless. The
+// first frame with points is therefore framed with room for their motion, and the camera holds still until something
+// leaves its view. It then glides back far enough to hold still again. The lines on the ground keep the scale of the
+// first frame. If the camera is given, the ground does not depend on the points.
 #pragma once
 
 #include <cstddef>
@@ -15,17 +15,17 @@
 
 namespace rapid {
 
-// Chooses the view of each frame from the ones before it. The camera of the options is taken, or else that of the
-// scene; what these leave open is fitted: to the first frame that has points (to them, to where they will be half a
-// second later, and to the shapes), or to a group of the points, which is then followed.
+// Chooses the view of each frame from the preceding ones. Uses the camera of the options, or else that of the scene,
+// and fits the parts that they leave open: to the first frame that has points (their positions now and half a second
+// later, and the shapes), or to a group of the points, which is then followed.
 class PictureFit {
 public:
     PictureView next(const PointSet& points, const FrameInfo& frame);
 
-    // Whether there have been points. Before that the view shows the shapes alone and may still jump.
+    // Returns true if there have been points. Before that the view shows only the shapes and may still jump.
     bool settled() const { return most_points_ > 0; }
 
-    // All that the next views depend on.
+    // The complete state for the following views.
     template <class Archive>
     void serialize(Archive& keep)
     {
@@ -43,8 +43,8 @@ private:
     void approach(double part);
 
     std::optional<PictureView> view_;
-    Box3d seen_;  // the bounds of everything so far, or of the group that is framed
-    Box3d goal_;  // to which those of the view glide
+    Box3d seen_;  // bounds of everything so far, or of the framed group
+    Box3d goal_;  // the bounds towards which those of the view glide
     double time_ = 0;
     std::size_t most_points_ = 0;
 };

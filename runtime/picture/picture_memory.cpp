@@ -18,7 +18,7 @@ void require_picture_size(int width, int height)
 void require_picture_memory(int width, int height, bool colliders, double count, const char* remedy)
 {
     require_picture_size(width, height);
-    constexpr double of_picture = 3, of_file = 6;  // bytes a pixel: rows, plain and compressed
+    constexpr double of_picture = 3, of_file = 6;  // bytes per pixel: rows, plain and compressed
     const double bytes = (surface_bytes_a_pixel(colliders) + of_picture + of_file) * count * width * height;
     if (!fits_in_memory(bytes)) throw beyond_memory(fmt::format("pictures of {}x{}", width, height), bytes, remedy);
 }

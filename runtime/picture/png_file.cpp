@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// libpng's description of one picture, freed in the end.
+// The image description of libpng, freed on destruction.
 struct PngImage : png_image {
     PngImage() : png_image{} { version = PNG_IMAGE_VERSION; }
     ~PngImage() { png_image_free(this); }
@@ -29,7 +29,8 @@ std::string big_endian(std::initializer_list<std::uint32_t> numbers)
     return bytes;
 }
 
-// A chunk of the file (PNG specification, 5.3): the length of the data, its name, the data, and a checksum of both.
+// Appends a chunk to the file (PNG specification, 5.3): the length of the data, its name, the data, and a checksum of
+// name and data.
 void append_chunk(std::string& file, std::string_view name, std::string_view data)
 {
     file.reserve(file.size() + data.size() + 12);
@@ -39,15 +40,15 @@ void append_chunk(std::string& file, std::string_view name, std::string_view dat
     file += big_endian({libdeflate_crc32(0, file.data() + begin, file.size() - begin)});
 }
 
-// The rows, each behind a byte for its filter (9.2), in zlib's format. No filter: the dither of a picture repeats every
-// eight pixels, which the compression finds, and a filter would hide.
+// Returns the rows in zlib's format, each after a byte for its filter (9.2). Uses no filter: the dither repeats every
+// eight pixels, which the compressor finds and a filter would hide.
 std::string compressed(const Picture& picture)
 {
     const std::size_t row = 3 * static_cast<std::size_t>(picture.width),
                       rows = static_cast<std::size_t>(picture.height);
     std::string plain(rows * (1 + row), '\0');
     for (std::size_t y = 0; y < rows; ++y) std::copy_n(&picture.rgb[y * row], row, &plain[y * (1 + row) + 1]);
-    // Level 1 takes a quarter of the time of level 6, for a fifth more bytes.
+    // Level 1 takes a quarter of the time of level 6, and a fifth more space.
     const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
         libdeflate_alloc_compressor(1), libdeflate_free_compressor);
     if (!compressor) throw std::bad_alloc();
@@ -67,7 +68,7 @@ std::string encode_png(const Picture& picture)
                    height = static_cast<std::uint32_t>(picture.height);
         append_chunk(file, "IHDR", big_endian({width, height}) + "\x08\x02\0\0\0"s);  // 8 bits of red, green and blue
         append_chunk(file, "sRGB", "\0"s);                                            // perceptual
-        // The same for readers that know no sRGB (11.3.2.5): gamma, white point and primaries, times 100,000.
+        // The equivalent for readers without sRGB support (11.3.2.5): gamma, white point and primaries, times 100,000.
         append_chunk(file, "gAMA", big_endian({45455}));
         append_chunk(file, "cHRM", big_endian({31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000}));
         append_chunk(file, "IDAT", compressed(picture));

@@ -1,4 +1,4 @@
-// Pictures as .png: 8 bits a channel, sRGB.
+// Pictures as .png files: 8 bits per channel, sRGB.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,10 @@
 
 namespace rapid {
 
-// The file's bytes. Error: there is not enough memory.
+// Returns the file's bytes. Throws Error if there is not enough memory.
 std::string encode_png(const Picture& picture);
 
-// Error: it can't be read, or is no .png.
+// Throws Error if the file can't be read or is not a .png.
 Picture read_png(const std::filesystem::path& file);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// What a picture shows and from where: options, the shapes of the scene, the camera.
+// The contents and the viewpoint of a picture: options, the shapes of the scene, the camera.
 #pragma once
 
 #include <optional>
@@ -10,43 +10,43 @@
 
 namespace rapid {
 
-// What a user may choose; the rest is chosen automatically.
+// Choices of the user. The rest is automatic.
 struct PictureOptions {
     int width = 1280, height = 720;
     std::optional<Vec3d> position = {};  // of the camera, m
-    std::optional<Vec3d> target = {};    // where it looks
-    std::optional<double> fov = {};      // radians, from the lower to the upper edge
+    std::optional<Vec3d> target = {};    // point that it looks at
+    std::optional<double> fov = {};      // radians, vertical
     bool grid = true;                    // lines on the ground, unless a plane of the scene is the ground
 };
 
-// How points look. What a style leaves open is as the styles before it say.
+// The look of points. Members that a style leaves open keep the value of earlier styles.
 struct PointStyle {
-    std::string group = {};              // whose points; empty: all
-    std::optional<bool> additive = {};   // they shine: they add light, and take none
-    std::optional<double> shutter = {};  // s that the picture is exposed, up to the frame's time
+    std::string group = {};              // group that it applies to; empty: all points
+    std::optional<bool> additive = {};   // glowing: the points add light and block none
+    std::optional<double> shutter = {};  // s, length of the exposure, which ends at the frame's time
 };
 
-// A camera as a scene gives it; what it leaves open is fitted.
+// A camera as stated by a scene. Members that it leaves open are fitted.
 struct SceneCamera {
     std::optional<Vec3d> position = {}, target = {};  // m
     std::optional<double> fov = {};                   // radians, vertical
-    std::string group = {};                           // whose points are framed; empty: the scene
+    std::string group = {};                           // group to frame; empty: the whole scene
 };
 
-// What is drawn besides the points of a frame, in world space, and how those are drawn.
+// The shapes of a frame, in world space, and the styles of its points.
 struct PictureScene {
     struct Body {
         MeshPtr mesh;
         enum Role { Collider, Emitter } role = Collider;
-        bool is_vessel = false;  // a collider with points in it: the sides between them and the viewer are left out
+        bool is_vessel = false;  // a collider that contains points: sides facing the viewer are not drawn
     };
     struct Plane {
         Vec3d normal = Vec3d::UnitY();
-        double offset = 0;  // its points have normal · x = offset
+        double offset = 0;  // the plane normal · x = offset
     };
     std::vector<Body> bodies;
     std::vector<Plane> planes;
-    std::vector<PointStyle> styles;  // the later one counts
+    std::vector<PointStyle> styles;  // later ones take precedence
     SceneCamera camera;
     bool grid = true;  // lines on the ground, unless a plane is the ground
 };
@@ -55,21 +55,21 @@ struct Camera {
     Vec3d position = {3, 2, 5}, target = Vec3d::Zero();
     double fov = 0.61;  // radians, vertical
 
-    // The picture's x, y (pixels from its left upper corner, pixel centres at .5) and the depth (m along the view).
-    // Depth at most 0: not in front of the camera.
+    // Returns x and y in pixels from the upper left corner (pixel centres at .5) and the depth in m along the view. If
+    // the depth is at most 0, P is not in front of the camera.
     Vec3d project(const Vec3d& P, int width, int height) const;
 };
 
-// What a sequence keeps, so that neither the camera nor the colours jump.
+// The state that a sequence keeps so that neither the camera nor the colours jump.
 struct PictureView {
     Camera camera;
     double full_speed = 1;    // m/s, the upper end of the colour ramp
     double least_radius = 1;  // pixels
-    Box3d bounds;             // what the camera is fitted to, m
+    Box3d bounds;             // m, the box that the camera is fitted to
     // The part of the world that a given camera looks at, m. The ground is drawn there, wherever points go. Without it,
     // the ground is drawn at the bounds.
     std::optional<Box3d> ground = {};
-    double line_spacing = 1;  // m, of the lines on the ground
+    double line_spacing = 1;  // m, between the lines on the ground
 };
 
 }  // namespace rapid

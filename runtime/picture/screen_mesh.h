@@ -1,4 +1,4 @@
-// Rasterises meshes: which samples their triangles cover, with depths and barycentric weights.
+// Rasterises meshes: the samples that their triangles cover, with depths and barycentric weights.
 #pragma once
 
 #include <tbb/parallel_for.h>
@@ -21,7 +21,7 @@ void for_each_band(int n, const F& f)
 
 struct ScreenCorner {
     Vec3f P, n;
-    Vec3f screen = Vec3f::Zero();  // x, y and 1 / depth (of parallel rays: depth)
+    Vec3f screen = Vec3f::Zero();  // x, y and 1 / depth (depth if parallel)
 };
 
 struct ScreenTriangle {
@@ -32,20 +32,20 @@ struct ScreenTriangle {
     float high_x() const { return std::max({corners[0].screen.x(), corners[1].screen.x(), corners[2].screen.x()}); }
 };
 
-// Samples from x0 to before x1, and so on.
+// A rectangle of samples: x from x0 up to but excluding x1, y likewise.
 struct RasterPart {
     int x0, y0, x1, y1;
 };
 
-// The triangles of a mesh on the raster, clipped at the near plane. A corner has the normal of its vertex, unless the
-// face turns away from that by more than 40°: edges stay sharp, round shapes round.
+// The triangles of a mesh on the raster, clipped at the near plane. A corner has the normal of its vertex unless the
+// face's own normal differs by more than 40°, so that edges stay sharp and round shapes round.
 class ScreenMesh {
 public:
     ScreenMesh(const Mesh& mesh, const Lens& lens, float near);
 
     const std::vector<ScreenTriangle>& triangles() const { return triangles_; }
 
-    // Calls f(x, y, weights of the corners, depth) for every sample of the part whose centre the triangle covers.
+    // Calls f(x, y, weights of the corners, depth) for every sample in the rectangle whose centre the triangle covers.
     template <class F>
     void cover(const ScreenTriangle& triangle, const RasterPart& part, const F& f) const
     {
@@ -70,7 +70,7 @@ public:
                 weights /= area;
                 if (weights.minCoeff() < 0) continue;
                 const float z = weights.dot(Vec3f(a.z(), b.z(), c.z()));
-                // Weights on the screen become weights on the triangle.
+                // Converts weights on the screen to weights on the triangle.
                 if (!lens_.parallel) weights = weights.cwiseProduct(Vec3f(a.z(), b.z(), c.z())) / z;
                 f(x, y, weights, lens_.parallel ? z : 1 / z);
             }

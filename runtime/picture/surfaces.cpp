@@ -18,7 +18,7 @@ namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
-// Linear colours. Dark enough that points of any colour stand out, light enough to see what they bounce off.
+// Linear colours, dark enough that points of any colour stand out, and light enough to show the obstacles.
 const Vec3f sky(0.0180f, 0.0215f, 0.0290f);      // at the upper edge
 const Vec3f horizon(0.0080f, 0.0090f, 0.0115f);  // at the lower edge
 const Vec3f collider_albedo(0.105f, 0.112f, 0.125f);
@@ -35,7 +35,7 @@ ShadedSample shade_collider(const Vec3f& P, const Vec3f& n, const Vec3f& to_eye,
     return {collider_albedo * (light_from_sky * from_sky) + Vec3f(0.045f, 0.052f, 0.066f) * rim + of_lamp, of_lamp};
 }
 
-// What is behind everything: a gradient, darker to the sides.
+// Returns the background colour: a gradient, darker at the sides.
 Vec3f backdrop(int x, int y, const PictureOptions& options)
 {
     const float down = (static_cast<float>(y) + 0.5f) / static_cast<float>(options.height);
@@ -43,11 +43,11 @@ Vec3f backdrop(int x, int y, const PictureOptions& options)
     return (sky + (horizon - sky) * down) * (1 - 0.3f * aside * aside);
 }
 
-// A body on the raster of samples, and which of its triangles may be in which tile.
+// A body on the raster of samples, with the triangles that may be in each tile.
 struct DrawnBody {
     const PictureScene::Body* body;
     ScreenMesh mesh;
-    std::vector<std::uint32_t> first, triangles;  // of each tile, in their order; and the end
+    std::vector<std::uint32_t> first, triangles;  // start of each tile in `triangles`, plus the end; triangles in order
 
     DrawnBody(const PictureScene::Body& drawn, const Lens& lens, float near, const TileGrid& tiles)
         : body(&drawn), mesh(*drawn.mesh, lens, near), first(tiles.count() + 1, 0)
@@ -76,12 +76,12 @@ struct DrawnBody {
 
 constexpr int samples_a_pixel = surface_samples * surface_samples;
 
-// What is nearest at a sample.
+// The nearest surface at a sample.
 struct Sample {
     Vec3f colour, lamp, P;
     float depth;
     const ScreenTriangle* triangle;  // null: the background
-    Vec3f weights;                   // of its corners
+    Vec3f weights;                   // of the triangle's corners
 };
 
 class SurfacePainter {
@@ -127,7 +127,7 @@ private:
                std::any_of(emitters_.begin(), emitters_.end(), has);
     }
 
-    // Backdrop and grounds alone, which need no more samples at once than those of a pixel.
+    // Draws a tile that only has backdrop and grounds, with just the samples of one pixel at a time.
     SurfaceTile draw_open(int tile) const
     {
         SurfaceTile result = empty_tile();
@@ -174,10 +174,12 @@ private:
         return finished(tile, std::move(result));
     }
 
-    // Through a place on the raster of samples, in half samples; not normalised: a metre of depth long.
+    // Returns the ray through a position on the raster of samples, in half samples. Not normalised: its depth is a
+    // metre.
     Vec3f ray(int half_x, int half_y) const { return columns_[half_x] + rows_[half_y]; }
 
-    // Backdrop and grounds, shaded once a pixel: lines on the ground are computed smooth. Depths are a sample's own.
+    // Draws backdrop and grounds, shaded once per pixel because lines on the ground are antialiased analytically. Each
+    // sample has its own depth.
     void draw_background(int x, int y, const Pixel& pixel) const
     {
         const Vec3f middle = ray((2 * x + 1) * surface_samples, (2 * y + 1) * surface_samples);
@@ -200,7 +202,7 @@ private:
         }
     }
 
-    // Calls f(sample, weights, depth, triangle) for the samples of a body that nothing drawn before hides.
+    // Calls f(sample, weights, depth, triangle) for the samples of a body that no surface drawn earlier hides.
     template <class Samples, class F>
     static void for_each_sample(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample,
                                 const F& f)
@@ -220,7 +222,7 @@ private:
         return (c[1].P - c[0].P).cross(c[2].P - c[0].P);
     }
 
-    // Which triangle is nearest. Of a vessel the sides towards the viewer are left out.
+    // Finds the nearest triangle. Skips the sides of a vessel that face the viewer.
     template <class Samples>
     void draw_collider(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample) const
     {
@@ -243,14 +245,15 @@ private:
         const Vec3f to_eye = (lens_.origin - here.P).normalized();
         const Vec3f n = face_of(*here.triangle).dot(to_eye) > 0 ? smooth : Vec3f(-smooth);
         const ShadedSample shaded = shade_collider(here.P, n, to_eye, light_);
-        // Far from the scene, as in the distant part of a floor, it dissolves into the backdrop.
+        // Far from the scene, such as in the distant part of a floor, it dissolves into the backdrop.
         const float away = near_scene_.exteriorDistance(here.P) / extent_, fade = std::exp(-away * away);
         const Vec3f open = backdrop(x / surface_samples, y / surface_samples, options_);
         here.colour = open + (shaded.colour - open) * fade;
         here.lamp = shaded.lamp * fade;
     }
 
-    // An emitter shows where points come from, and must not hide them: only its outline glows, over what is behind it.
+    // Draws the outline of an emitter as a glow over the background. It shows where points come from without hiding
+    // them.
     template <class Samples>
     void draw_emitter(const DrawnBody& body, int tile, const RasterPart& part, const Samples& sample) const
     {
@@ -288,7 +291,7 @@ private:
         return result;
     }
 
-    // From samples to a pixel.
+    // Combines samples into a pixel.
     void add_pixel(SurfaceTile& result, int tile, int x, int y, const Pixel& samples) const
     {
         const auto pixel = static_cast<std::size_t>((y - tiles_.top(tile)) * tile_size + x - tiles_.left(tile));
@@ -301,12 +304,12 @@ private:
         add_lit(result, static_cast<std::uint32_t>(pixel), samples);
     }
 
-    // Samples that are near each other among the cells of shadows share an entry.
+    // Samples whose positions in the shadow grid are close share an entry.
     void add_lit(SurfaceTile& tile, std::uint32_t pixel, const Pixel& samples) const
     {
         const std::size_t first = tile.lit.size();
         const Sample* before = nullptr;
-        std::size_t entry = 0;  // of `before`
+        std::size_t entry = 0;  // entry of `before`
         for (const Sample* sample : samples) {
             if (sample->lamp.isZero(0)) continue;
             const Vec3f lamp = sample->lamp / samples_a_pixel;
@@ -331,11 +334,11 @@ private:
     const Light& light_;
     TileGrid tiles_;
     Lens lens_;
-    std::vector<Vec3f> columns_, rows_;  // at each half sample: parts of a ray, which is their sum
+    std::vector<Vec3f> columns_, rows_;  // at each half sample; a ray is the sum of its column and its row
     std::vector<DrawnBody> colliders_, emitters_;
     std::vector<Ground> grounds_;
     Box3f near_scene_;
-    float extent_;  // m, of the scene
+    float extent_;  // m, size of the scene
 };
 
 }  // namespace

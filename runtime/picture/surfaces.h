@@ -1,5 +1,5 @@
-// The part of a picture that is not points: background, ground and the meshes of the scene. It is drawn once for a view
-// and its shapes; a frame adds what changes, the shadows of its points.
+// The part of a picture without points: background, ground and the meshes of the scene. It is drawn once per view and
+// set of shapes. Each frame adds the shadows of its points.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace rapid {
 
-// Samples along each edge of a pixel: surfaces are drawn that much larger, and averaged.
+// Samples along each edge of a pixel: surfaces are drawn that much larger and averaged.
 constexpr int surface_samples = 2;
 
-// The picture is drawn in squares, each by one thread.
+// The picture is drawn in square tiles, each by one thread.
 constexpr int tile_size = 32;  // pixels
 constexpr int tile_pixels = tile_size * tile_size;
 
-// The squares of a picture, row by row from the top; those at its right and lower edge may be cut.
+// The tiles of a picture, row by row from the top. Those at the right and lower edge may be cut.
 struct TileGrid {
-    int width, height;  // of the picture
+    int width, height;  // size of the picture
     int across = (width + tile_size - 1) / tile_size, down = (height + tile_size - 1) / tile_size;
 
     int count() const { return across * down; }
@@ -29,24 +29,24 @@ struct TileGrid {
 };
 
 struct SurfaceTile {
-    std::vector<Vec3f> colour;        // linear, where no point shades it; shape [tile_size][tile_size]
-    std::vector<std::uint8_t> bytes;  // of that, as they are in the picture: three a pixel
+    std::vector<Vec3f> colour;        // linear, without shadows of points; shape [tile_size][tile_size]
+    std::vector<std::uint8_t> bytes;  // the same as bytes of the picture: three per pixel
 
-    // m; shape [tile_pixels][samples of a pixel]; empty where there are no surfaces.
+    // m; shape [tile_pixels][samples of a pixel]; empty if there are no surfaces.
     std::vector<float> depth;
-    float nearest, farthest;  // of these
+    float nearest, farthest;  // extremes of `depth`
 
-    // Light that points can take from a pixel, and where they would be among the cells of their shadows. A pixel on an
-    // edge has several.
+    // Light that points can take from a pixel, and its position in their shadow grid. A pixel on an edge has several
+    // entries.
     struct Lit {
         std::uint32_t pixel;
         Vec3f lamp, cell;
     };
     std::vector<Lit> lit;
-    Box3f cells;  // bounds of the places
+    Box3f cells;  // bounds of the positions in the shadow grid
 };
 
-// Of the tiles; where there are colliders, of pixels that show one and that the lamp may reach.
+// Memory of the tiles per pixel. With colliders: of pixels that show one and that the lamp may reach.
 constexpr double surface_bytes_a_pixel(bool colliders)
 {
     constexpr double open = sizeof(Vec3f) + 3;
@@ -54,7 +54,7 @@ constexpr double surface_bytes_a_pixel(bool colliders)
     return colliders ? open + covered : open;
 }
 
-// The tiles of the picture.
+// Draws the tiles of the picture.
 std::vector<SurfaceTile> draw_surfaces(const PictureOptions& options, const PictureScene& scene,
                                        const PictureView& view, const Light& light);
 

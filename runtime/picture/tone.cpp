@@ -17,8 +17,8 @@ float srgb(float light) { return light <= 0.0031308f ? 12.92f * light : 1.055f *
 
 float tone(float light) { return light < 0.8f ? light : 1 - 0.2f * std::exp(-(light - 0.8f) / 0.2f); }
 
-// 255 srgb(tone(t²)) at even steps of t up to 2, where it is 255 to rounding. Between them it is interpolated, which is
-// off by less than a fiftieth of a step of the dither.
+// 255 srgb(tone(t²)) at equal steps of t up to 2, where it rounds to 255. Linear interpolation between them has an
+// error of less than a fiftieth of a step of the dither.
 constexpr int steps = 4096;
 constexpr float most_root = 2;
 
@@ -35,11 +35,11 @@ const std::vector<float>& curve()
     return values;
 }
 
-constexpr int dither_size = 8;  // pixels, along both edges
+constexpr int dither_size = 8;  // pixels along both edges
 constexpr int channels = 3;
-using DitherRow = std::array<float, channels * dither_size>;  // all channels of a pixel have the same
+using DitherRow = std::array<float, channels * dither_size>;  // all channels of a pixel have the same value
 
-// Bayer's thresholds of an ordered dither, from 1/128 to 127/128.
+// Returns Bayer's thresholds for an ordered dither, from 1/128 to 127/128.
 const std::array<DitherRow, dither_size>& thresholds()
 {
     static const std::array<DitherRow, dither_size> values = [] {
@@ -58,7 +58,7 @@ const std::array<DitherRow, dither_size>& thresholds()
     return values;
 }
 
-// The channels of dither_size pixels.
+// Writes the channels of dither_size pixels.
 void write_block(const float* light, const DitherRow& dither, const float* table, std::uint8_t* rgb)
 {
     typedef std::uint8_t Bytes __attribute__((vector_size(lanes)));
@@ -66,7 +66,7 @@ void write_block(const float* light, const DitherRow& dither, const float* table
         const Floats given = load_pack(light + k);
         Floats root, low, high;
         for (std::uint32_t l = 0; l < lanes; ++l) root[l] = std::sqrt(given[l]);
-        // Written so that NaN becomes 0.
+        // The comparison maps NaN to 0.
         const Floats at =
             (given > 0 ? (root > most_root ? Floats{} + most_root : root) : Floats{}) * (steps / most_root);
         const FloatFlags step = __builtin_convertvector(at, FloatFlags);

@@ -1,4 +1,4 @@
-// From linear light to the bytes of a picture.
+// Converts linear light to the bytes of a picture.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,12 @@
 
 namespace rapid {
 
-// The pixels of a row from x on, a multiple of 8. sRGB, 8 bits a channel, dithered against banding in dark gradients.
-// Light up to 0.8 keeps its value; brighter light is compressed below 1 instead of being cut off. NaN is black.
+// Writes the pixels of a row from x on, a multiple of 8. sRGB, 8 bits per channel, dithered against banding in dark
+// gradients. Light up to 0.8 keeps its value; brighter light is compressed below 1 instead of being clipped. NaN is
+// black.
 void write_pixels(std::span<const Vec3f> light, int x, int y, std::uint8_t* rgb);
 
-// The byte of one channel, without the dither.
+// Returns the byte of one channel, without dither.
 std::uint8_t display_byte(float light);
 
 }  // namespace rapid

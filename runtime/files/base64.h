@@ -6,11 +6,11 @@
 
 namespace rapid {
 
-// `bytes` bytes from the beginning of the text, whose length in characters is put into `length`. Error: it ends early,
-// or is no base64.
+// Decodes `bytes` bytes from the beginning of the text and sets `length` to the characters used. Throws Error if the
+// text ends early or is not Base64.
 std::vector<unsigned char> from_base64(std::string_view text, std::size_t bytes, std::size_t& length);
 
-// All that a text of whole groups of four characters holds.
+// Decodes a whole text, which must consist of complete groups of four characters.
 std::vector<unsigned char> from_base64(std::string_view text);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Hashes of contents (XXH3): equal bytes have equal ones, in any process and on any machine.
+// Hashes of contents (XXH3). Equal bytes have equal hashes, in any process and on any machine.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace rapid {
 
 std::uint64_t content_hash(std::string_view bytes);
 
-// The hash of bytes that come one part after another.
+// The hash of bytes that arrive in pieces.
 class ContentHash {
 public:
     ContentHash();
@@ -28,10 +28,10 @@ private:
     std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
-// Of a file, which is read piece by piece. Error: it can't be read.
+// Returns the hash of a file, which is read in pieces. Throws Error if it can't be read.
 std::uint64_t file_hash(const std::filesystem::path& path);
 
-// 16 digits.
+// Returns 16 hexadecimal digits.
 std::string hash_text(std::uint64_t hash);
 
 }  // namespace rapid

@@ -1,7 +1,7 @@
 // Errors of the file system, and a descriptor that closes itself.
 //
-// Errors have the system's reason but not the file's name, because what is written has a name only when it is complete:
-// the caller adds it (Error::at).
+// Errors contain the system's reason but not the file's name, because a file that is being written is named only when
+// complete. The caller adds the name (Error::at).
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// `can't be written: No space left on device`, and the like.
+// Returns an error such as `can't be written: No space left on device`.
 Error file_error(const std::string& what, int system_error);
 
 class Descriptor {

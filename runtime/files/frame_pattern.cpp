@@ -17,11 +17,11 @@ namespace fs = std::filesystem;
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 struct FrameNumber {
-    std::size_t begin, end;  // in the text
+    std::size_t begin, end;  // position in the text
     int digits;
 };
 
-// Reads the width that begins at `at`, and moves `at` to its end.
+// Reads the width that begins at `at` and moves `at` past it.
 int read_width(const std::string& text, std::size_t& at)
 {
     int width = 0;
@@ -85,7 +85,7 @@ std::string with_output(std::string text, std::string_view output)
 
 constexpr std::string_view part_variable = "{part}";
 
-// Where the dot, dash or low line is that text ends with; its end where it ends with none.
+// Returns the position of the dot, dash or underscore that ends the text, or the text's length if there is none.
 std::size_t separator_before(std::string_view text)
 {
     const bool separated = !text.empty() && std::string_view("._-").find(text.back()) != std::string_view::npos;
@@ -97,7 +97,7 @@ std::size_t separator_before(std::string_view text)
 std::string FramePattern::expand(int frame, std::string_view output) const
 {
     if (!digits_) return with_output(text_, output);
-    // A minus sign does not count as a digit: -1 is -0001, as in Houdini.
+    // The minus sign does not count as a digit: -1 is -0001, as in Houdini.
     const std::string number =
         fmt::format("{}{:0{}}", frame < 0 ? "-" : "", std::abs(static_cast<long long>(frame)), *digits_);
     return with_output(before_, output) + number + with_output(after_, output);
@@ -131,7 +131,7 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
         int frame = 0;
         const auto parsed = std::from_chars(number.data(), number.data() + number.size(), frame);
         if (parsed.ec != std::errc() || parsed.ptr != number.data() + number.size()) continue;
-        // Only the name that this pattern would give: 7 and 0007 are different files.
+        // Accepts only the name that this pattern would produce: 7 and 0007 are different files.
         if (fs::path(expand(frame, output)).filename() == name) found.emplace(frame, folder / name);
     }
     return found;
@@ -159,7 +159,7 @@ std::string with_part(const std::string& pattern, std::string_view part)
 
 OutputTarget parse_output_target(const std::string& text)
 {
-    // Attributes follow the last colon of the file's name, after the extension: C:/x.vdb and a:b.vdb have none.
+    // Attributes follow the last colon of the file's name, after the extension. C:/x.vdb and a:b.vdb have none.
     const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
     const std::size_t colon = text.find_last_of(':');
     const bool has_attributes =

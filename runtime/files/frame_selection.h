@@ -1,4 +1,4 @@
-// Frames that are chosen from a sequence: first, last and step.
+// A selection of frames from a sequence: first, last and step.
 #pragma once
 
 #include <cstdint>

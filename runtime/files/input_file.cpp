@@ -22,7 +22,7 @@ struct OpenFile {
 OpenFile open_regular(const std::filesystem::path& path)
 {
     if (path.native().find('\0') != std::string::npos) throw Error("can't be read: its name holds a byte 0");
-    // Opening a pipe would wait for its writer, were it not for O_NONBLOCK.
+    // O_NONBLOCK keeps the opening of a pipe from waiting for its writer.
     Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!descriptor) throw file_error("can't be read", errno);
     struct stat status = {};
@@ -56,11 +56,11 @@ std::string_view InputFile::text() const
 InputFile::InputFile(const std::filesystem::path& path)
 {
     const OpenFile file = open_regular(path);
-    if (const auto bytes = static_cast<double>(file.bytes); !fits_in_memory(bytes))  // a file of holes may be any size
+    if (const auto bytes = static_cast<double>(file.bytes); !fits_in_memory(bytes))  // a sparse file may have any size
         throw beyond_memory("the file, which is read whole,", bytes, "read a smaller one");
     bytes_ = std::make_unique_for_overwrite<unsigned char[]>(file.bytes);
     size_ = file.bytes;
-    constexpr std::size_t block = std::size_t{4} << 20;  // large enough for a thread's trouble, small enough to share
+    constexpr std::size_t block = std::size_t{4} << 20;  // large enough to amortise a task, small enough to distribute
     tbb::parallel_for(std::size_t{0}, (size_ + block - 1) / block, [&](std::size_t i) {
         read_block(file.descriptor.number(), bytes_.get(), i * block, std::min(size_, (i + 1) * block));
     });

@@ -1,4 +1,4 @@
-// A whole file, read into memory: unlike a mapped one it stays as it is when another process truncates it.
+// A whole file read into memory. Unlike a mapped file, it stays intact if another process truncates it.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@ namespace rapid {
 
 class InputFile {
 public:
-    // Error: no such file; no regular file (reading from a pipe might never end).
+    // Throws Error if the file does not exist or is not a regular file (reading from a pipe might never end).
     explicit InputFile(const std::filesystem::path& path);
 
     std::span<const unsigned char> bytes() const { return {bytes_.get(), size_}; }
-    // Without the mark of UTF-8's byte order that editors and spreadsheets may begin a file with.
+    // Returns the contents without the UTF-8 byte order mark that editors and spreadsheets may add.
     std::string_view text() const;
 
 private:
@@ -23,7 +23,7 @@ private:
     std::size_t size_ = 0;
 };
 
-// For a library that opens files by itself: its size. Error: as the constructor of InputFile.
+// Returns the size of a file, for a library that opens files itself. Throws Error like the constructor of InputFile.
 std::size_t check_readable(const std::filesystem::path& path);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// What readers of files leave out, for those who called them: a reader can't warn by itself.
+// Collects the parts of a file that a reader skips, for the caller: a reader can't warn itself.
 //
 //   LeftOut left_out;
 //   const PointSet points = read_points(path);
@@ -10,18 +10,19 @@
 
 namespace rapid {
 
-// To such a list, once for the same, and no more than fit in a message: further ones are "more than these 20".
+// Appends to the list unless it is already there. After 20 entries it appends only "more than these 20", so that the
+// list fits in a message.
 void add_left_out(std::vector<std::string>& list, const std::string& what);
 
 class LeftOut {
 public:
-    // Collects what is left out on this thread from now on, until it is destroyed.
+    // Collects everything that readers on this thread skip during its lifetime.
     LeftOut();
     ~LeftOut();
     LeftOut(const LeftOut&) = delete;
     LeftOut& operator=(const LeftOut&) = delete;
 
-    // Of a reader, as add_left_out. Lost where nobody collects.
+    // Called by readers; works like add_left_out(). Does nothing if there is no collector.
     static void add(const std::string& what);
 
     const std::vector<std::string>& list() const { return list_; }

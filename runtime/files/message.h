@@ -1,6 +1,6 @@
-// What one process tells another through memory that both see: values and arrays, one after another.
+// Messages between processes in shared memory: values and arrays, one after another.
 //
-// Who reads a message does not trust it: the other process may have gone wrong before it ended.
+// The receiver does not trust a message, because the other process may have failed before it ended.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ public:
     {
         put_array(std::span<const T>(&value, 1));
     }
-    // The values alone; who reads them knows how many there are.
+    // Writes only the values. The receiver must know how many there are.
     template <class T>
     void put_array(std::span<const T> values)
     {
@@ -56,7 +56,7 @@ public:
     {
         std::memcpy(static_cast<void*>(values.data()), take_bytes(values.size(), sizeof(T)), values.size_bytes());
     }
-    // As many values as the message still has, at least; for vectors that are made of it.
+    // Reads `count` values into a vector. Checks first that the message has that many.
     template <class T>
     std::vector<T> take_vector(std::size_t count)
     {
@@ -66,9 +66,9 @@ public:
         return values;
     }
     std::string take_text();
-    // All that has not been taken yet.
+    // Returns all bytes that have not been read yet.
     std::span<const unsigned char> left() const { return memory_.subspan(at_); }
-    // Error: fewer than `count` values of that many bytes are left.
+    // Throws Error if fewer than `count` values of this size are left.
     void check_left(std::size_t count, std::size_t bytes) const;
 
 private:

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view hidden_prefix = ".rapid-", hidden_suffix = ".unfinished";
 
-// Set when the process is about to end: files that are opened later do not stay.
+// Set when the process is about to end. Files that are opened afterwards are discarded.
 std::atomic<bool> ending{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
@@ -48,7 +48,7 @@ bool is_hidden_name(std::string_view name)
            name.ends_with(hidden_suffix);
 }
 
-// Removes a hidden file whose process is gone, with its lock.
+// Removes a hidden file if its process, and with it the lock, is gone.
 void remove_if_abandoned(const fs::path& path)
 {
     const Descriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
@@ -59,7 +59,7 @@ void remove_if_abandoned(const fs::path& path)
     ::unlink(path.c_str());
 }
 
-// Once for each folder, or seldom where there are very many.
+// Runs once per folder, or again later if there are very many folders.
 void remove_abandoned_files(const fs::path& folder)
 {
     constexpr std::size_t remembered = 1000;
@@ -68,13 +68,13 @@ void remove_abandoned_files(const fs::path& folder)
     const std::lock_guard lock(mutex);
     if (seen.size() == remembered) seen.clear();
     if (!seen.insert(folder).second) return;
-    std::error_code error;  // a folder that can't be listed may still be written
+    std::error_code error;  // a folder that can't be listed may still be writable
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         if (is_hidden_name(entry->path().filename().native())) remove_if_abandoned(entry->path());
 }
 
-// What tells a file that this process wrote from any that took its place or that another has changed: the last time of
-// a change too, which nobody can set.
+// Identifies a file that this process wrote and has not been replaced or changed. Includes the time of the last status
+// change, which no program can set.
 using Identity = std::array<std::int64_t, 7>;
 
 Identity identity_of(const struct stat& status)
@@ -88,7 +88,7 @@ Identity identity_of(const struct stat& status)
             status.st_ctim.tv_nsec};
 }
 
-// The last ones: a run that reads what it wrote does so soon.
+// The most recent files. A run that reads its own files usually does so soon.
 struct OwnFiles {
     static constexpr std::size_t most = 256;
     std::mutex mutex;
@@ -111,14 +111,14 @@ void remember_own(int descriptor)
     own.files.push_back(identity_of(status));
 }
 
-// A file without a name is named by way of /proc, which may be missing.
+// Returns true if /proc is available, through which an unnamed file gets its name.
 bool can_name_descriptors()
 {
     static const bool mounted = ::access("/proc/self/fd", X_OK) == 0;
     return mounted;
 }
 
-// The names to remove. Entries are reused but never freed: a signal handler may be traversing the list.
+// The names to remove. Entries are reused but never freed, because a signal handler may be traversing the list.
 struct Entry {
     enum State { Free, Claimed, Named };
     std::atomic<int> state{Claimed};
@@ -156,7 +156,7 @@ WritingProgram::WritingProgram(pid_t program)
         pid_t none = 0;
         if (!place.compare_exchange_strong(none, program)) continue;
         place_ = &place;
-        if (ending) ::kill(program, SIGKILL);  // nobody looks again
+        if (ending) ::kill(program, SIGKILL);  // remove_unfinished_files() will not run again
         return;
     }
 }
@@ -166,7 +166,7 @@ WritingProgram::~WritingProgram()
     if (place_) *place_ = 0;
 }
 
-// A random name, which is removed with the object, or by remove_unfinished_files(), unless it was given away.
+// A random name. The destructor or remove_unfinished_files() removes its file, unless the name was given away.
 class OutputFile::HiddenName {
 public:
     explicit HiddenName(const fs::path& folder)
@@ -189,7 +189,7 @@ public:
     HiddenName& operator=(const HiddenName&) = delete;
 
     const char* c_str() const { return path_.c_str(); }
-    // To be called once there is a file of that name.
+    // Call this once a file of that name exists.
     void check_not_ending() const
     {
         if (ending) throw ending_error();
@@ -222,7 +222,7 @@ OutputFile::OutputFile(const fs::path& path, Unfinished unfinished)
 
 OutputFile::~OutputFile() = default;
 
-// Leaves the file closed where there are none without names.
+// Leaves the file closed if the file system has no unnamed files.
 void OutputFile::open_unnamed()
 {
     descriptor_ = Descriptor(::open(folder_.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
@@ -239,13 +239,13 @@ void OutputFile::open_hidden()
         if (!descriptor_) throw file_error("can't be written", errno);
         hidden_->check_not_ending();
         lock();
-        // Another process may have taken it for abandoned before it was locked.
+        // Another process may have considered it abandoned before it was locked.
         struct stat status = {};
         if (::fstat(descriptor_.number(), &status) == 0 && status.st_nlink > 0) return;
     }
 }
 
-// Where the file system has no locks, nobody else gets one either.
+// If the file system has no locks, other processes cannot get one either.
 void OutputFile::lock()
 {
     while (::flock(descriptor_.number(), LOCK_EX) != 0 && errno == EINTR) {
@@ -275,8 +275,8 @@ void OutputFile::append(const void* data, std::size_t bytes)
     appended_ += bytes;
 }
 
-// All bytes have reached the file system, whatever it kept back (quotas, network). Closing any descriptor tells; a
-// duplicate's leaves the file, and its lock, open until it has its name.
+// Ensures that all bytes have reached the file system, even if it delays writes (quotas, network). Closing any
+// descriptor reports failures. Closing a duplicate leaves the file and its lock open until it has its name.
 void OutputFile::complete()
 {
     if (durable && ::fsync(descriptor_.number()) != 0) throw file_error("can't be written", errno);
@@ -284,7 +284,7 @@ void OutputFile::complete()
     if (duplicate < 0 || ::close(duplicate) != 0) throw file_error("can't be written", errno);
 }
 
-// False if the name is taken.
+// Returns false if the name is taken.
 bool OutputFile::link_to(const fs::path& name)
 {
     const std::string from = hidden_ ? hidden_->c_str() : fmt::format("/proc/self/fd/{}", descriptor_.number());
@@ -307,7 +307,7 @@ void OutputFile::link_to_hidden()
 void OutputFile::finish()
 {
     complete();
-    // A name that is taken is replaced by renaming, which a file without a name can't be.
+    // An existing name is replaced by renaming, which is impossible for an unnamed file.
     if (hidden_ || !link_to(path_)) {
         if (!hidden_) link_to_hidden();
         hidden_->rename_to(path_);
@@ -323,7 +323,7 @@ bool OutputFile::finish_unless_taken()
     return true;
 }
 
-// The name outlasts a power cut when the folder does.
+// The name survives a power cut only if the folder is synchronised too.
 void OutputFile::keep_name()
 {
     remember_own(descriptor_.number());

@@ -1,12 +1,12 @@
-// The way in which all files are written: a file gets its name when it is complete, and not before.
+// The way in which all files are written: a file gets its name only when it is complete.
 //
-// Where the file system has files without names (O_TMPFILE), an unfinished one is gone with its process, however that
-// ends. Elsewhere, and for the moment in which a file replaces another, it is called `.rapid-RANDOM.unfinished`, in its
-// final folder; a lock (flock) says that its process lives. The first file that a later process writes into the folder
-// removes those that nobody holds. Names are random, and made with O_EXCL: no process meets another's, and a link of
+// If the file system supports unnamed files (O_TMPFILE), an unfinished file disappears with its process, however that
+// ends. Otherwise, and while one file replaces another, its name is `.rapid-RANDOM.unfinished`, in its final folder. A
+// lock (flock) shows that its process is alive. The first file that a later process writes into the folder removes
+// those that are not locked. Names are random and created with O_EXCL, so processes never share one, and a link with
 // that name is not followed.
 //
-// Errors name the system's reason, not the file (file_error.h).
+// Errors give the system's reason but not the file's name (file_error.h).
 #pragma once
 
 #include <sys/types.h>
@@ -22,27 +22,28 @@ namespace rapid {
 
 class OutputFile {
 public:
-    // What an unfinished file is. Hidden is for file systems that have no others.
+    // The kind of unfinished file. Hidden is for file systems without unnamed files.
     enum class Unfinished { Unnamed, Hidden };
 
-    // Missing folders are made. Error: what has that name is not a regular file.
+    // Creates missing folders. Throws Error if the path exists and is not a regular file.
     explicit OutputFile(const std::filesystem::path& path, Unfinished unfinished = Unfinished::Unnamed);
     OutputFile(const OutputFile&) = delete;
     OutputFile& operator=(const OutputFile&) = delete;
-    // Of a file that is not finished nothing stays.
+    // Discards the file unless it is finished.
     ~OutputFile();
 
-    // From any thread; the file ends where the furthest write does.
+    // Thread-safe. The file ends at the end of the furthest write.
     void write_at(std::uint64_t offset, const void* data, std::size_t bytes);
-    // Writes after the bytes appended so far; from one thread.
+    // Writes after the bytes appended so far. Single-threaded.
     void append(const void* data, std::size_t bytes);
     std::uint64_t appended() const { return appended_; }
     // For another program that writes the file.
     int descriptor() const { return descriptor_.number(); }
 
-    // Names the file, in place of any other of that name. Error: whatever the file system kept back until now.
+    // Names the file and replaces any other file of that name. Throws Error if the file system reports a delayed
+    // failure.
     void finish();
-    // As finish(), unless the name is taken: then it returns false.
+    // Like finish(), but returns false if the name is taken.
     bool finish_unless_taken();
 
 private:
@@ -62,14 +63,14 @@ private:
     std::uint64_t appended_ = 0;
 };
 
-// Whether this process wrote the file, among the last that it wrote, and it is as it was.
+// Returns true if the file is unchanged and among the last that this process wrote.
 bool is_own_file(const std::filesystem::path& path);
 
-// From now on a file is on the disk when finish() returns (fsync), so that it outlasts a power cut.
+// From now on finish() returns only when the file is on the disk (fsync), so that it survives a power cut.
 void make_files_durable();
 
-// Another program that writes an unfinished file, and that remove_unfinished_files() ends. For as long as it lives the
-// program is not waited for. Of more than 16 the others end by themselves.
+// Another program that writes an unfinished file and that remove_unfinished_files() kills. Must be destroyed before the
+// program is waited for. Beyond 16 programs, further ones are not tracked and end by themselves.
 class WritingProgram {
 public:
     explicit WritingProgram(pid_t program);
@@ -81,7 +82,7 @@ private:
     std::atomic<pid_t>* place_ = nullptr;
 };
 
-// Removes all unfinished files, ends the programs that write them, and prevents further ones: for a signal handler or a
+// Removes all unfinished files, kills the programs that write them, and prevents new ones. For a signal handler or a
 // watchdog that ends the process next. Async-signal-safe.
 void remove_unfinished_files() noexcept;
 

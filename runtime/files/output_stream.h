@@ -1,5 +1,5 @@
-// A file as a stream, for libraries that write to one and do not check whether that succeeds: the stream throws the
-// file's own errors.
+// A file as a stream, for libraries that write to one without checking for failure. The stream throws the file's own
+// errors.
 #pragma once
 
 #include <ostream>
@@ -29,7 +29,7 @@ private:
     std::uint64_t end_ = 0;
 };
 
-// Its writer calls flush() at the end: a destructor can't tell that the disk is full.
+// The caller must call flush() at the end, because a destructor can't report a full disk.
 class OutputStream : public std::ostream {
 public:
     explicit OutputStream(OutputFile& file) : std::ostream(nullptr), buffer_(file)

@@ -43,7 +43,7 @@ ScalarType scalar_type(const std::string& name)
     return found->second;
 }
 
-// Whether a number of an ascii file is one of the type.
+// Returns true if a number from an ascii file is representable in the type.
 bool is_of(ScalarType type, double number)
 {
     if (is_floating(type)) return true;
@@ -92,7 +92,7 @@ void PlyFile::read_header()
     if (!formatted) throw Error("not a valid PLY file: its header has no \"format\"");
 }
 
-// Throws std::invalid_argument where the line is none of a header.
+// Throws std::invalid_argument if the line is not valid in a header.
 void PlyFile::read_line(const std::vector<std::string>& words)
 {
     if (words[0] == "format" && words.size() >= 2) {
@@ -117,11 +117,11 @@ void PlyFile::read_line(const std::vector<std::string>& words)
     }
 }
 
-// The file is long enough for the rows of an element, as far as that is known before its lists are read.
+// Checks that the file is long enough for the rows of an element, as far as that is known before its lists are read.
 void PlyFile::check_promise(const PlyElement& element) const
 {
     if (element.properties.empty()) return;
-    // A number of an ascii file is a digit and what parts it from the next.
+    // In an ascii file a number takes at least a digit and a separator.
     const std::size_t row = encoding_ == Encoding::Ascii ? 2 * element.properties.size() : element.stride();
     const std::size_t held = (text_.size() - at_) / row;
     if (element.count > held)

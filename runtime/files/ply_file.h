@@ -1,8 +1,7 @@
-// PLY files, ascii or binary of either byte order, for points and for meshes: the header, then the elements in the
-// order of the file.
+// PLY files for points and meshes, ascii or binary in either byte order: the header, then the elements in file order.
 //
-// Nothing in a file is trusted: what it promises is checked against its size before memory is taken, a number against
-// its type. Errors say what is wrong; who calls adds the file's name.
+// Nothing in a file is trusted: counts are checked against its size before memory is allocated, and numbers against
+// their types. Errors do not contain the file's name; the caller adds it.
 #pragma once
 
 #include <functional>
@@ -28,7 +27,7 @@ struct PlyElement {
     std::vector<PlyProperty> properties;
 
     bool has_lists() const;
-    std::size_t stride() const;  // bytes of its scalar properties, and of the counts of its lists
+    std::size_t stride() const;  // bytes of its scalar properties and of the counts of its lists
 };
 
 // The rows of an element without lists.
@@ -36,21 +35,21 @@ struct PlyRecords {
     std::span<const unsigned char> bytes;
     std::size_t stride;
     ByteOrder order;
-    std::vector<unsigned char> parsed;  // what an ascii file's bytes are
+    std::vector<unsigned char> parsed;  // storage for values from an ascii file
 };
 
 class PlyFile {
 public:
-    // `text` must outlive the object. Error: no header, or a wrong one.
+    // `text` must outlive the object. Throws Error if the header is missing or wrong.
     explicit PlyFile(std::string_view text);
 
     const std::vector<PlyElement>& elements() const { return elements_; }
 
-    // The elements are read, or passed over, in their order, and all of them: a file may be cut in its last one.
+    // Elements must be read or skipped in order, all of them, because a file may be truncated in its last one.
     PlyRecords read_records(const PlyElement& element);
     void read_lists(const PlyElement& element, std::size_t property,
                     const std::function<void(std::span<const std::int64_t> list)>& row);
-    // Of the row whose list is told: its numbers that are in no list, by property.
+    // Returns a scalar property of the row whose list is being passed to `row`.
     double number_of_row(std::size_t property) const { return numbers_[property]; }
     void pass_over(const PlyElement& element);
 
@@ -68,7 +67,7 @@ private:
     std::size_t at_ = 0;
     Encoding encoding_ = Encoding::Ascii;
     std::vector<PlyElement> elements_;
-    std::vector<double> numbers_;  // of the row that is read by read_lists()
+    std::vector<double> numbers_;  // of the current row in read_lists()
 };
 
 }  // namespace rapid

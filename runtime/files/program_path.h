@@ -1,12 +1,12 @@
-// Where other programs are: ffmpeg, dot, those of Slurm.
+// Finds other programs: ffmpeg, dot, those of Slurm.
 #pragma once
 
 #include <string>
 
 namespace rapid {
 
-// The first of this name on PATH; empty where there is none. Only in folders that PATH names from the root on: what
-// lies in the current folder may have come with a scene of others.
+// Returns the first program of this name on PATH, or an empty path. Only absolute folders are searched: a program in
+// the current folder may have come with a downloaded scene.
 std::string program_path(const std::string& name);
 
 }  // namespace rapid

@@ -25,12 +25,12 @@
 namespace rapid {
 namespace {
 
-// Of what a file may take: what the libraries need for any, and what they make of its bytes (a packed one may hold many
-// times its size).
+// Limits for reading a file: what the libraries need for any file, plus a multiple of its bytes (a compressed file may
+// unpack to many times its size).
 struct Limits {
     std::size_t memory;  // bytes
-    bool is_of_budget;   // memory is what the budget leaves, which says nothing about the file
-    unsigned seconds;    // of the processor
+    bool is_of_budget;   // memory comes from the budget, so exceeding it does not mean that the file is damaged
+    unsigned seconds;    // of processor time
 };
 
 Limits limits_of(std::size_t file_bytes, std::size_t most_memory)
@@ -46,7 +46,7 @@ enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
 
 struct Header {
     Outcome outcome;
-    std::size_t bytes;  // of the message
+    std::size_t bytes;  // size of the message
 };
 
 std::function<void()>& further_limits()
@@ -55,12 +55,12 @@ std::function<void()>& further_limits()
     return limits;
 }
 
-// Memory that both processes see; pages that nobody writes cost nothing.
+// Memory shared by both processes. Untouched pages cost nothing.
 class SharedMemory {
 public:
     explicit SharedMemory(std::size_t bytes) : bytes_(bytes)
     {
-        // Some systems promise no more than they have.
+        // Some systems refuse to reserve more than they have.
         constexpr std::size_t least = std::size_t{64} << 20;
         do start_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
         while (start_ == MAP_FAILED && errno == ENOMEM && (bytes_ /= 2) >= least);
@@ -71,7 +71,7 @@ public:
     SharedMemory& operator=(const SharedMemory&) = delete;
 
     Header& header() const { return *static_cast<Header*>(start_); }
-    // All that there is room for.
+    // Returns all the space after the header.
     std::span<unsigned char> message() const
     {
         return {static_cast<unsigned char*>(start_) + sizeof(Header), bytes_ - sizeof(Header)};
@@ -87,16 +87,16 @@ void limit(__rlimit_resource resource, rlim_t most)
     rlimit value;
     if (::getrlimit(resource, &value) != 0) ::_exit(1);
     value.rlim_cur = std::min(value.rlim_max, most);
-    // Where the two are the same, the processor's limit is told by SIGKILL, which does not say which one it was.
+    // If both limits are equal, exceeding the processor limit raises SIGKILL, which does not reveal the limit.
     value.rlim_max = std::min(value.rlim_max, resource == RLIMIT_CPU ? most + 1 : most);
     if (::setrlimit(resource, &value) != 0) ::_exit(1);
 }
 
-// The address space of this process, which the copy begins with: the least limit with which a page more is mapped.
-// /proc tells it, too, but may be out of reach (Landlock).
+// Returns the address space of this process, with which the copy starts: the smallest limit at which a page can still
+// be mapped. /proc reports it too, but may be inaccessible (Landlock).
 std::size_t address_space()
 {
-    // A stack that had to grow meanwhile would end the process.
+    // Touches the stack first, because a stack that grows under a low limit would end the process.
     volatile char room[1 << 14];
     for (std::size_t i = 0; i < sizeof room; i += 1 << 10) room[i] = 0;
 
@@ -114,11 +114,11 @@ std::size_t address_space()
     return high;
 }
 
-// A reader that waits, for a lock or a disk, takes no time of the processor: it ends when it has hardly taken any for
-// two intervals in a row. One alone may pass while all is stopped (SIGSTOP); and on a busy machine a reader that works
-// takes many.
+// A reader that waits for a lock or a disk uses no processor time. It ends when it has used hardly any in two
+// consecutive intervals. A single interval may pass while everything is stopped (SIGSTOP), and on a busy machine a
+// working reader may take many.
 constexpr unsigned interval = 15;           // s
-constexpr double least_in_interval = 0.01;  // s: one part in 1,500 of a processor
+constexpr double least_in_interval = 0.01;  // s: 1/1500 of a processor
 constexpr int status_of_waiting = 3;
 
 void end_where_it_waits(int)
@@ -137,16 +137,16 @@ void end_where_it_waits(int)
 void confine(pid_t parent, const Limits& limits)
 {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(1);  // it ended before the line above
+    if (::getppid() != parent) ::_exit(1);  // the parent ended before the line above
     for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM}) ::signal(signal, SIG_DFL);
     ::signal(SIGALRM, end_where_it_waits);
     sigset_t none;
     ::sigemptyset(&none);
     ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
-    // The libraries' last words are for nobody.
+    // Nobody reads the libraries' last output.
     const int nowhere = ::open("/dev/null", O_WRONLY);
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
-    // Through what it inherits a process that goes wrong would reach others.
+    // Closes inherited descriptors, through which a misbehaving process could reach others.
     ::close_range(STDERR_FILENO + 1, ~0U, 0);
     limit(RLIMIT_CORE, 0);
     limit(RLIMIT_CPU, limits.seconds);
@@ -210,8 +210,8 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
 {
     const Limits limits = limits_of(check_readable(path), most_memory);
     const SharedMemory shared(limits.memory);
-    // The copy has one thread. In an arena without workers TBB asks for no others, and takes no lock that one of this
-    // process's threads, of which the copy has none, may hold.
+    // The copy has only one thread. In an arena without workers TBB requests no others and takes no lock that a thread
+    // missing in the copy may hold.
     tbb::task_arena alone(1);
     alone.initialize();
     const pid_t parent = ::getpid(), child = ::fork();
@@ -231,7 +231,7 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
     int status = 0;
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-    const Header header = shared.header();  // of a process that may have gone wrong
+    const Header header = shared.header();  // the process may have failed, so this is untrusted
     const std::span<unsigned char> room = shared.message();
     MessageReader reader(room.first(std::min(header.bytes, room.size())));
     switch (header.outcome) {

@@ -1,12 +1,12 @@
-// Reading by a library that trusts files (OpenVDB, Assimp): in a process of its own, so that a damaged or hostile file
-// ends that process, beyond its limits or by a signal, and is an error of that file here.
+// Reads files with libraries that trust them (OpenVDB, Assimp) in a separate process. A damaged or hostile file then
+// ends that process, by a limit or a signal, and becomes an error of that file here.
 //
-// The process is a copy of this one (fork) with limits of memory and time by the file's size, and of memory by what
-// --memory leaves. What it has read comes
-// back in shared memory, and is checked. A file that this process wrote is read here. Where this process may start no
-// others (--untrusted), the reader process forks the copy (reader_process.h).
+// The process is a copy of this one (fork). Its limits of memory and time depend on the file's size, and memory also on
+// the rest of the --memory budget. The result is returned in shared memory and checked. A file that this process wrote
+// is read directly. If this process may not start others (--untrusted), the reader process forks the copy
+// (reader_process.h).
 //
-// It costs a few milliseconds and a copy of the result.
+// The overhead is a few milliseconds and a copy of the result.
 #pragma once
 
 #include <filesystem>
@@ -19,20 +19,20 @@
 
 namespace rapid {
 
-// Bytes that the budget of this process (memory_budget.h) leaves to a copy, and as many again to what the copy sends
-// back, as both are in memory at the same time. At least 64 MiB; without limit if no budget has been set.
+// Returns the bytes of this process's budget (memory_budget.h) that a copy may use. The message that it sends back may
+// use as many again, as both are in memory at the same time. At least 64 MiB; unlimited if no budget has been set.
 std::size_t memory_of_copy();
 
-// Calls `read` in another process, a copy of this one, and `receive` here. Throws Error if `read` does, or if the
-// process ends otherwise. The file's size limits the copy's memory, and so does `most_memory`.
+// Calls `read` in a copy of this process and `receive` here. Throws Error if `read` does, or if the process fails. The
+// copy's memory is limited by the file's size and by `most_memory`.
 void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
                   const std::function<void(MessageReader&)>& receive, std::size_t most_memory = memory_of_copy());
 
-// Called in each such process before it reads: what further confines it.
+// Sets a function that each such process calls before it reads, to confine itself further.
 void confine_copies(std::function<void()> further);
 
-// What a library reads from files. `what` is a part of the file, as the reader understands it: the name of a grid. An
-// object is made while the program starts, and lives as long.
+// A reader function for a library. `what` selects a part of the file, such as the name of a grid. Objects must be
+// created at program start and live as long as the program.
 template <class T>
 class ApartReader {
 public:
@@ -40,7 +40,7 @@ public:
     using Send = void (*)(const T&, MessageWriter&);
     using Receive = T (*)(MessageReader&);
 
-    // name: of its own among all readers.
+    // name: unique among all readers.
     ApartReader(const char* name, Read read, Send send, Receive receive) : name_(name), read_(read), receive_(receive)
     {
         define_reader(name, [=](const ReadRequest& request, MessageWriter& message) {

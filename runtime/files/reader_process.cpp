@@ -33,7 +33,7 @@ void read_in_copy(const ReadRequest& request, const std::function<void(MessageRe
         request.path, [&](MessageWriter& message) { reader(request, message); }, receive, most_memory);
 }
 
-// All of the bytes, or false: the other end is closed.
+// Writes all bytes. Returns false if the other end is closed.
 bool put(int pipe, const void* from, std::size_t bytes)
 {
     for (const char* at = static_cast<const char*>(from); bytes > 0;) {
@@ -68,7 +68,7 @@ bool take_text(int pipe, std::string& text)
     return take(pipe, text.data(), size);
 }
 
-// What a request comes back with: the message of the reader, or the text of an error.
+// The header of an answer: a message from the reader, or the text of an error.
 struct AnswerHeader {
     bool refused;
     std::size_t bytes;
@@ -100,7 +100,7 @@ bool answer(int pipe, const ReadRequest& request, std::size_t most_memory)
     }
 }
 
-// The end of a pipe that the reader process keeps, and the other one's.
+// A pipe between this process and the reader process.
 struct Pipe {
     Descriptor read, write;
 
@@ -109,21 +109,21 @@ struct Pipe {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC) != 0) throw file_error("the reader process has no pipe", errno);
         read = Descriptor(ends[0]), write = Descriptor(ends[1]);
-        ::fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // fewer switches between the two; not all systems allow it
+        ::fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // fewer switches between the two; some systems refuse it
     }
 };
 
 [[noreturn]] void serve(const Descriptor& requests, const Descriptor& answers)
 {
     ReadRequest request;
-    std::size_t most_memory = 0;  // of the budget of the process that asks
+    std::size_t most_memory = 0;  // budget of the requesting process
     while (take_text(requests.number(), request.reader) && take_text(requests.number(), request.path) &&
            take_text(requests.number(), request.what) && take(requests.number(), &most_memory, sizeof most_memory))
         if (!answer(answers.number(), request, most_memory)) break;
     ::_exit(0);
 }
 
-// What the process inherits and has no use for.
+// Closes all inherited descriptors but these two.
 void close_others(int first, int second)
 {
     const int low = std::min(first, second), high = std::max(first, second);
@@ -145,7 +145,7 @@ public:
         if (child == 0) begin(parent, requests.read, answers.write, confine);
         requests_ = std::move(requests.write);
         answers_ = std::move(answers.read);
-        answers.write = Descriptor();  // this end: its close is the other process's end
+        answers.write = Descriptor();  // closes this end, so that reading ends when the other process does
         std::string fault;
         if (!take_text(answers_.number(), fault)) fault = "the reader process ended";
         if (!fault.empty()) throw Error(fault);
@@ -176,8 +176,8 @@ private:
                                    const std::function<void()>& confine)
     {
         ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (::getppid() != parent) ::_exit(1);  // it ended before the line above
-        // It ends with the process that it serves, and not before.
+        if (::getppid() != parent) ::_exit(1);  // the parent ended before the line above
+        // It ends exactly when the process that it serves ends.
         for (const int signal : {SIGINT, SIGQUIT, SIGHUP, SIGTERM}) ::signal(signal, SIG_IGN);
         close_others(requests.number(), answers.number());
         std::string fault;

@@ -37,7 +37,7 @@ Scalar load_scalar(const unsigned char* from, ByteOrder order)
     return std::bit_cast<Scalar>(bytes);
 }
 
-// Calls f with a value of the C++ type.
+// Calls f with a value of the corresponding C++ type.
 template <class F>
 auto with_scalar(ScalarType type, const F& f)
 {

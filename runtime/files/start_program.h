@@ -1,4 +1,4 @@
-// Other programs that are started: ffmpeg, dot.
+// Starts other programs: ffmpeg, dot.
 #pragma once
 
 #include <sys/types.h>
@@ -9,13 +9,13 @@
 
 namespace rapid {
 
-// Starts a program. words: with its name, as it is to know it. descriptors: ours, and which one each is to it; others
-// it has as their flags say (O_CLOEXEC). Signals are as a program expects them: those of this thread may be blocked,
-// for a thread that waits for them. Error: the system's, with the path.
+// Starts a program. words: its arguments, including its own name. descriptors: pairs of our descriptor and its number
+// in the program. Other descriptors are inherited according to their flags (O_CLOEXEC). Signal handlers and mask are
+// reset, as those of this thread may be blocked. Throws Error with the path and the system's reason.
 pid_t start_program(const std::string& path, std::vector<std::string> words,
                     const std::vector<std::pair<int, int>>& descriptors);
 
-// Its status, as waitpid() gives it, when it has ended.
+// Waits for the program and returns its status, as waitpid() reports it.
 int wait_for_program(pid_t program);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// A folder of this process alone, removed with all that is in it.
+// A folder private to this process, removed with all its contents.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@ namespace rapid {
 
 class TemporaryFolder {
 public:
-    // Below the system's folder for such. `purpose` is a part of its name, and of the error that it can't be made.
+    // Created in the system's temporary folder. `purpose` is part of its name, and of the error if it can't be created.
     explicit TemporaryFolder(const std::string& purpose);
     ~TemporaryFolder();
     TemporaryFolder(const TemporaryFolder&) = delete;

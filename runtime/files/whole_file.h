@@ -1,4 +1,4 @@
-// Files that a command writes beside frames: reports, pictures of them.
+// Files that a command writes in addition to frames, such as reports.
 #pragma once
 
 #include <filesystem>
@@ -6,7 +6,7 @@
 
 namespace rapid {
 
-// Writes a file whole, or not at all. Error, with its name: the file system's.
+// Writes a file completely or not at all. Throws Error, with the file's name, if the file system does.
 void write_whole(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace rapid

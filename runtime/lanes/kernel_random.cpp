@@ -15,7 +15,7 @@ RandomKey key_in_frame(RandomKey key, double frame)
 
 double kernel_random(RandomKey key, std::uint64_t id, double use, double frame)
 {
-    // The points of a pass share the key: it takes as long as a number.
+    // The points of a pass share the key, and computing it takes as long as a random number.
     thread_local struct {
         std::uint64_t random = 0;
         double frame = 0;

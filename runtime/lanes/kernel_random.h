@@ -7,10 +7,10 @@
 
 namespace rapid {
 
-// The key of the numbers that differ from frame to frame; frame: its number, or a time.
+// Returns the key for numbers that differ between frames. frame: its number, or a time.
 RandomKey key_in_frame(RandomKey key, double frame);
 
-// A point's number for a use; frame: 0, or that of key_in_frame().
+// Returns a point's number for a use. frame: 0, or the one passed to key_in_frame().
 double kernel_random(RandomKey key, std::uint64_t id, double use, double frame);
 
 }  // namespace rapid

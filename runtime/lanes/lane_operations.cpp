@@ -1,4 +1,4 @@
-// The operations of lane programs. t, a, b and c are the slots of an instruction, k is its number.
+// The operations of lane programs. t, a, b and c are the slots of an instruction, and k is its number.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,7 +22,7 @@ constexpr double most_float = std::numeric_limits<float>::max();
 using Tile = LaneTile;
 using Now = LaneInstruction;
 
-// t = f(a), and f(a, b), by packs; of comparisons the flags.
+// t = f(a), or f(a, b), pack by pack. Comparisons return flags.
 template <class F>
 bool of_one(Tile& tile, const Now& now)
 {
@@ -38,7 +38,7 @@ bool of_two(Tile& tile, const Now& now)
     return true;
 }
 
-// t = g(f(a, b), c), and g(c, f(a, b)).
+// t = g(f(a, b), c), or g(c, f(a, b)).
 template <class F, class G>
 bool of_three(Tile& tile, const Now& now)
 {
@@ -50,7 +50,7 @@ struct SubtractFrom {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return b - a; }
 };
 
-// Of functions of one number, by lanes.
+// Applies a function of one number to each lane.
 template <class F>
 struct ByLane {
     Doubles operator()(const Doubles& a) const
@@ -66,7 +66,7 @@ struct Floor {
 struct Ceiling {
     double operator()(double a) const { return std::ceil(a); }
 };
-struct Modulo {  // as Lua's
+struct Modulo {  // like Lua's %
     Doubles operator()(const Doubles& a, const Doubles& b) const { return a - ByLane<Floor>()(a / b) * b; }
 };
 struct SquareRoot {
@@ -93,13 +93,13 @@ struct Power {
 struct Round {  // to a float
     Doubles operator()(const Doubles& a) const { return widen(narrow(a)); }
 };
-struct Whole {  // as an integer, which has no -0
+struct Whole {  // an integer has no -0
     Doubles operator()(const Doubles& a) const { return a + 0.0; }
 };
 struct And {
     Flags operator()(const Doubles& a, const Doubles& b) const { return as_flags(a) & as_flags(b); }
 };
-struct AndNot {  // a without b
+struct AndNot {  // a and not b
     Flags operator()(const Doubles& a, const Doubles& b) const { return as_flags(a) & ~as_flags(b); }
 };
 struct Or {
@@ -130,7 +130,7 @@ struct Most {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return most(a, b); }
 };
 
-// t = function k of a, and of a and b
+// t = function k of a, or of a and b
 bool call1(Tile& tile, const Now& now)
 {
     const double* const a = tile.numbers(now.a);
@@ -144,7 +144,7 @@ bool call2(Tile& tile, const Now& now)
     return true;
 }
 
-// t = kernel_random() of the use a and the frame b; c: whether all points share these
+// t = kernel_random() for the use a and the frame b. c: true if all points share both.
 bool random(Tile& tile, const Now& now)
 {
     const LaneChunk& chunk = tile.chunk;
@@ -181,7 +181,7 @@ template <class T>
         return narrow(x);
 }
 
-// Component c of the eight vectors that three packs are side by side.
+// Returns component c of eight vectors that are stored contiguously in three packs.
 template <int c, class P>
 [[gnu::always_inline]] inline P component(const P& p, const P& q, const P& r)
 {
@@ -288,7 +288,7 @@ bool load_flag(Tile& tile, const Now& now)
     return true;
 }
 
-// Bytes of 0 and 1 of the flags a.
+// Writes the flags a as bytes 0 and 1.
 void put_flags(const Tile& tile, const Now& now, std::uint8_t* into)
 {
     into += tile.first;
@@ -330,7 +330,7 @@ bool load_doubles(Tile& tile, const Now& now, const double* from)
 bool load_time(Tile& tile, const Now& now) { return load_doubles(tile, now, tile.chunk.times); }
 bool load_step(Tile& tile, const Now& now) { return load_doubles(tile, now, tile.chunk.steps); }
 
-// t = the point's place in the set, from 1
+// t = the point's index in the set, from 1
 bool index(Tile& tile, const Now& now)
 {
     double* const into = tile.numbers(now.to);
@@ -338,7 +338,7 @@ bool index(Tile& tile, const Now& now)
     return true;
 }
 
-// They fail where the flag a is set, and b is no number that a float can hold, or no integer of the type; Lua's are
+// Fail if flag a is set and b is not in the range of a float, or is not an integer of the type; Lua's integers are
 // those within 2^53.
 bool check_float(Tile& tile, const Now& now)
 {
@@ -355,7 +355,7 @@ bool check_integer(const Tile& tile, const Now& now, double least, double most)
 bool check_int32(Tile& tile, const Now& now) { return check_integer(tile, now, -0x1p31, 0x1p31 - 1); }
 bool check_int64(Tile& tile, const Now& now) { return check_integer(tile, now, -0x1p53, 0x1p53); }
 
-// It fails where the flag a is set.
+// Fails if flag a is set.
 bool fail(Tile& tile, const Now& now)
 {
     const Doubles* const a = tile.slot(now.a);

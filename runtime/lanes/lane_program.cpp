@@ -31,7 +31,7 @@ void LaneRunner::begin(const LaneProgram& program, const LaneChunk& chunk)
     steady_size_ = 0;
 }
 
-// Computes what is steady, unless the tile before had the same values.
+// Runs the steady instructions, unless the previous tile had the same values.
 void LaneRunner::keep_steady(LaneTile& now)
 {
     const LaneProgram& program = now.program;

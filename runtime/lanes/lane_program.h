@@ -1,8 +1,8 @@
-// Straight-line programs over many points: each instruction goes over a tile of points, eight at a time, before the
-// next one does. Branches are masks: what both sides make is computed, and the mask chooses.
+// Straight-line programs over many points. Each instruction processes a tile of points, eight at a time, before the
+// next one starts. Branches become masks: both sides are computed and the mask selects.
 //
-// A number is a double, and a flag all bits of a double's place or none. Arithmetic is IEEE's, lane by lane, so the
-// results are those of the same operations for one point at a time, to the bit.
+// A number is a double. A flag occupies the bits of a double, all set or all clear. Arithmetic follows IEEE lane by
+// lane, so results are bit-identical to those of the same operations for one point at a time.
 #pragma once
 
 #include <array>
@@ -20,65 +20,65 @@ namespace rapid {
 class LaneTile;
 struct LaneInstruction;
 
-// Of a tile. False: it fails, and what the points of the tile do is up to the caller.
+// Processes a tile. Returns false on failure; the caller then has to process the points of the tile itself.
 using LaneOperation = bool (*)(LaneTile& tile, const LaneInstruction& now);
 
-// The operation of a name in lane_operations.cpp, where they are described; null where there is none.
+// Returns the operation of this name, or null. lane_operations.cpp describes them.
 LaneOperation lane_operation(std::string_view name);
 
 struct LaneInstruction {
     LaneOperation operation = nullptr;
     std::uint16_t to = 0, a = 0, b = 0, c = 0;  // slots
-    std::uint16_t number = 0;                   // of a column, a group or a function
+    std::uint16_t number = 0;                   // index of a column, a group or a function
 };
 
 struct LaneProgram {
     using Function1 = double (*)(double);
     using Function2 = double (*)(double, double);
 
-    // What lies in the first slots: flags, the points to visit; then numbers that all points share, those of the chunk
-    // (frame, time, dt, substep), the constants, and the inputs.
+    // Layout of the first slots: flags of the points to visit, then numbers that all points share, which are those of
+    // the chunk (frame, time, dt, substep), the constants, and the inputs.
     static constexpr std::uint16_t visited = 0, first_of_chunk = 1, first_constant = 5;
 
     std::vector<double> constants;
     std::size_t inputs = 0;
-    std::vector<LaneInstruction> shared;  // of what all points share: once for a chunk
-    std::vector<LaneInstruction> steady;  // of a float column that mostly has one value: for tiles of other values
+    std::vector<LaneInstruction> shared;  // compute values that all points share: run once per chunk
+    std::vector<LaneInstruction> steady;  // depend on a mostly constant float column: run for tiles with new values
     std::uint16_t steady_column = 0;
-    std::vector<LaneInstruction> code;  // for each tile; the stores are its end
+    std::vector<LaneInstruction> code;  // run for each tile; the stores come last
     std::size_t slots = first_constant;
     std::vector<Function1> functions1;
     std::vector<Function2> functions2;
 };
 
-// The points that a program goes over.
+// The points that a program processes.
 struct LaneChunk {
-    // Of the first point's value in a column or a group; stride: bytes from point to point, 0 where all share one.
+    // Address of the first point's value in a column or group. stride: bytes between points, 0 if all share one value.
     struct Memory {
         void* data;
         std::size_t stride;
     };
 
     std::size_t size = 0;
-    double first = 0;                                  // place in the set of the first one
-    double number = 0, time = 0, dt = 0, substep = 0;  // of the frame, or the step
+    double first = 0;                                  // index of the first point in the set
+    double number = 0, time = 0, dt = 0, substep = 0;  // of the frame or the step
     std::span<const Memory> columns, groups;
     Memory ids{nullptr, 0};  // int64
     RandomKey random;
     std::uint8_t* kill = nullptr;
     std::uint8_t* result = nullptr;
     const std::uint8_t* members = nullptr;  // the points to visit; null for all
-    const double* times = nullptr;          // of an action
+    const double* times = nullptr;          // for actions
     const double* steps = nullptr;
     std::span<const double> inputs;
 };
 
-// Runs programs, in memory of its own.
+// Runs programs in its own memory.
 class LaneRunner {
 public:
     static constexpr std::size_t tile = 128;  // points
 
-    // Calls failed(begin, end) for tiles in which an instruction fails: of these nothing has been stored.
+    // Calls failed(begin, end) for each tile in which an instruction fails. Nothing is stored for such a tile.
     template <class Failed>
     void run(const LaneProgram& program, const LaneChunk& chunk, const Failed& failed)
     {
@@ -102,7 +102,7 @@ private:
     void keep_steady(LaneTile& now);
 
     std::vector<Slot> slots_;
-    std::array<float, tile> steady_;  // the values of which the slots hold what is steady
+    std::array<float, tile> steady_;  // values of the steady column for which the slots are valid
     std::size_t steady_size_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// What an operation works on: the slots, and the chunk's points of the tile.
+// The data of an operation: the slots, and the chunk's points in the tile.
 #pragma once
 
 #include <bit>
@@ -21,12 +21,12 @@ public:
 
     const LaneProgram& program;
     const LaneChunk& chunk;
-    const std::size_t first, size;  // of its points in the chunk; behind the last one slots hold anything
+    const std::size_t first, size;  // points of the tile in the chunk; lanes after the last point hold arbitrary values
 
     Doubles* slot(std::uint16_t place) const { return slots_[place].pack; }
     double* numbers(std::uint16_t place) const { return slots_[place].numbers(); }
 
-    // slot `to` = value(k), by packs.
+    // Sets slot `to` to value(k), pack by pack.
     template <class Value>
     void fill(std::uint16_t to, const Value& value) const
     {
@@ -34,7 +34,7 @@ public:
         for (std::size_t k = 0; k < packs; ++k) into[k] = value(k);
     }
 
-    // Whether a flag is set, by packs.
+    // Returns true if any flag is set.
     template <class IsSet>
     bool any_of(const IsSet& is_set) const
     {

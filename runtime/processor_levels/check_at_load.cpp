@@ -1,5 +1,5 @@
-// Hot files and the others must agree on the types that they share. Otherwise the process would crash later, or compute
-// with the wrong bytes.
+// Checks that hot files and the others agree on the types they share. Otherwise the process would crash later, or
+// compute with the wrong bytes.
 #include <cstdio>
 #include <cstdlib>
 

@@ -1,5 +1,5 @@
-// The types with packs or alignments of their own that hot files and other files pass to each other. Each file that
-// includes this has a table of its own, with the layouts for the processor that the file is compiled for.
+// The types with packs or special alignment that hot files and other files pass to each other. Each file that includes
+// this has its own table, with the layouts for the processor that the file is compiled for.
 #pragma once
 
 #include <span>

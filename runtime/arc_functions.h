@@ -1,4 +1,4 @@
-// The inverses of tangent, sine and cosine, with the same bits on any processor and the special cases of C.
+// Inverse tangent, sine and cosine, bit-identical on every processor, with the special cases of C.
 //
 // The error is below 0.8 units in the last place (tests/lanes/test_elementary_functions.cpp).
 #pragma once
@@ -6,7 +6,7 @@
 namespace rapid {
 
 double arc_tangent(double x);
-double arc_tangent(double y, double x);  // the angle of the point (x, y): C's atan2
+double arc_tangent(double y, double x);  // angle of the point (x, y): C's atan2
 double arc_sine(double x);
 double arc_cosine(double x);
 

@@ -1,4 +1,4 @@
-// Errors that rise out of a node carry its name and place.
+// Adds a node's name and location to errors that leave it.
 #pragma once
 
 #include <exception>
@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// Runs f. An Error that leaves it gets the node's name and place, unless it has them already.
+// Runs f. An Error that leaves it gets the node's name and location, unless it already has them.
 template <class F>
 decltype(auto) name_errors(const std::string& node, const Location& location, const F& f)
 {
@@ -21,7 +21,7 @@ decltype(auto) name_errors(const std::string& node, const Location& location, co
     }
 }
 
-// The same, and exceptions of libraries become Errors: what they say is all that is known.
+// Does the same, and also converts exceptions of libraries to Errors with their message.
 template <class F>
 decltype(auto) at_node(const std::string& node, const Location& location, const F& f)
 {

@@ -1,4 +1,4 @@
-// Ends what runs, from another thread, within loops too: they ask at each chunk of points and at each sub-step.
+// Cancels a run from another thread, also within loops: they check at each chunk of points and at each sub-step.
 #pragma once
 
 #include <atomic>
@@ -13,22 +13,22 @@ class Cancellation {
 public:
     static constexpr char text[] = "the run was cancelled";
 
-    // From any thread. What asks then ends with an Error that says why; the first text counts.
+    // Thread-safe. Subsequent checks throw an Error with this reason. The first reason counts.
     void request(const std::string& why = text);
     void forget();
     bool is_requested() const { return requested_.load(std::memory_order_relaxed); }
-    // Error: it has been requested.
+    // Throws Error if cancellation has been requested.
     void check() const
     {
         if (is_requested()) fail();
     }
 
-    // That of what this thread runs; null: none.
+    // Returns the cancellation of this thread's run, or null.
     static const Cancellation* current();
-    // Error: that of what this thread runs has been requested.
+    // Throws Error if the cancellation of this thread's run has been requested.
     static void check_current();
 
-    // Makes it that of what this thread runs, for as long as it lives. Loops over chunks hand it to their threads.
+    // Makes a cancellation current for this thread during its lifetime. Loops over chunks pass it on to their threads.
     class Scope {
     public:
         explicit Scope(const Cancellation* cancellation);
@@ -40,7 +40,7 @@ public:
         const Cancellation* before_;
     };
 
-    // The node that this thread evaluates, for as long as it lives, for those who end the thread from outside.
+    // Records the node that this thread evaluates during its lifetime, for code that ends the thread from outside.
     class Place {
     public:
         Place(const std::string& node, const Location& location);
@@ -55,7 +55,7 @@ public:
         const Location& location_;
         friend class Cancellation;
     };
-    // An error of the node that is evaluated now, if there is one.
+    // Returns an error with the node that is being evaluated, if there is one.
     Error error(const std::string& message) const;
 
 private:

@@ -1,5 +1,5 @@
-// JSON whose numbers are read as they are written. nlohmann's own types give any number for one that is too large for
-// the type that is asked for: 4294967297 is the int 1, and 1e30 undefined.
+// JSON with checked number conversions. With nlohmann's own types, a number that is too large for the requested type
+// becomes an arbitrary one: 4294967297 becomes the int 1, and 1e30 is undefined.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,8 @@ template <class T, class = void>
 struct CheckedNumber : nlohmann::adl_serializer<T> {
 };
 
-// Integers, enumerations among them. json::type_error: the value is no number, has a fraction, or is out of T's range.
+// Integers, including enumerations. Throws json::type_error if the value is not a number, has a fraction, or is out of
+// T's range.
 template <class T>
 struct CheckedNumber<T, std::enable_if_t<(std::is_integral_v<T> && !std::is_same_v<T, bool>) || std::is_enum_v<T>>> {
     template <class Json>
@@ -33,7 +34,7 @@ struct CheckedNumber<T, std::enable_if_t<(std::is_integral_v<T> && !std::is_same
             const auto refuse = [&](const std::string& what) {
                 throw nlohmann::json::type_error::create(302, what + json.dump(), &json);
             };
-            // Every integer of T lies in [-2^digits, 2^digits), whose ends a double holds.
+            // Every integer of T lies in [-2^digits, 2^digits), whose ends a double can represent.
             const double beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
             const double least = std::is_signed_v<T> ? -beyond : 0.0;
             if (json.is_number_unsigned()) {
@@ -57,10 +58,10 @@ struct CheckedNumber<T, std::enable_if_t<(std::is_integral_v<T> && !std::is_same
     }
 };
 
-// Members in the order in which they stand.
+// JSON whose members keep their order.
 using CheckedJson = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool, std::int64_t,
                                          std::uint64_t, double, std::allocator, CheckedNumber>;
-// Members by name, for what others write: a member of an object of n is found in log n.
+// JSON with members sorted by name, for files from elsewhere: finding a member of an object of n takes log n.
 using SortedCheckedJson = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t, std::uint64_t,
                                                double, std::allocator, CheckedNumber>;
 

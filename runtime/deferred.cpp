@@ -40,8 +40,8 @@ std::filesystem::path library() { return library_folder() / RAPID_DEFERRED_LIBRA
 
 void load_deferred()
 {
-    // glibc finds the unwinder when an exception first passes through its own code, as it does through std::call_once
-    // here and in OpenVDB, and ends the process where there is no memory for that. This finds it, or is told.
+    // glibc looks up the unwinder when an exception first passes through its own code, as in std::call_once here and in
+    // OpenVDB, and aborts the process if there is no memory for it. This call loads it in advance, or reports failure.
     void* frame;
     if (::backtrace(&frame, 1) == 0) throw std::bad_alloc();
     static std::once_flag once;

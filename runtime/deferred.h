@@ -1,13 +1,13 @@
-// Functions of the deferred part of the library: all that needs OpenVDB or Assimp. It is a library of its own
-// (rapid_deferred), which is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols takes
-// 40 ms at each start, and many a scene needs none of them: one without meshes from files, .vdb, and what asks for the
-// grid of a level set (grid_on_demand.h).
+// Functions in the deferred part of the library, which is everything that needs OpenVDB or Assimp. It is a separate
+// library (rapid_deferred) that is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols
+// takes 40 ms at each start, and many scenes need none of them, namely those without mesh files, .vdb files, and uses
+// of the grid of a level set (grid_on_demand.h).
 //
 // A function is declared in the header of its subject:
 //
 //   RAPID_DEFERRED(offset_level_set, LevelSetPtr(const LevelSetPtr& shape, double metres));
 //
-// and defined in a source that includes OpenVDB or Assimp, and so belongs to the deferred part (RapidLayer.cmake):
+// The definition is in a source that includes OpenVDB or Assimp and so belongs to the deferred part (RapidLayer.cmake):
 //
 //   LevelSetPtr offset(const LevelSetPtr& shape, double metres) { ... }
 //   RAPID_DEFINE(offset_level_set, offset);
@@ -18,16 +18,16 @@
 
 namespace rapid {
 
-// Loads the deferred part, once; from any thread. Error: the library is not beside this one, or can't be loaded.
+// Loads the deferred part once. Thread-safe. Throws Error if the library is not next to this one or can't be loaded.
 void load_deferred();
 
-// The deferred functions, by name: a program and its libraries may each have a Deferred object of the same function.
+// The deferred functions by name. A program and its libraries may each have a Deferred object for the same function.
 class DeferredFunctions {
 public:
     using Any = void (*)();
 
     static void define(const char* name, Any function);  // called while the deferred part is loaded
-    // Error: as load_deferred(); the part is of another version, without this function.
+    // Throws Error like load_deferred(), and if the deferred part has another version that lacks this function.
     static Any find(const char* name);
 };
 

@@ -1,7 +1,7 @@
-// Numbers as unevaluated sums of two doubles, twice as long as a double, for functions that round once at their end.
+// Numbers as unevaluated sums of two doubles, with twice the precision, for functions that round once at their end.
 //
 // The algorithms are those of Knuth (The Art of Computer Programming, 4.2.2) and Dekker (1971). None needs a fused
-// product, so their bits are the same on any processor. T is a double or a vector of doubles.
+// multiply-add, so the results are bit-identical on every processor. T is a double or a vector of doubles.
 #pragma once
 
 #include <bit>
@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// The types of the bits of a double, or of a vector of doubles.
+// Integer types with the size of a double, or of a vector of doubles.
 template <class T>
 struct Bits {
     typedef std::int64_t Signed __attribute__((vector_size(sizeof(T))));
@@ -26,7 +26,7 @@ struct DoubleDouble {
     T high, low;
 };
 
-// a + b, exactly.
+// Returns a + b, exactly.
 template <class T>
 [[gnu::always_inline]] inline DoubleDouble<T> exact_sum(const T& a, const T& b)
 {
@@ -34,7 +34,7 @@ template <class T>
     return {sum, (a - of_a) + (b - of_b)};
 }
 
-// Likewise, but faster. Precondition: a is 0, or |a| >= |b|.
+// Returns a + b exactly, but faster. Precondition: a is 0, or |a| >= |b|.
 template <class T>
 [[gnu::always_inline]] inline DoubleDouble<T> exact_sum_of_ordered(const T& a, const T& b)
 {
@@ -42,8 +42,8 @@ template <class T>
     return {sum, b - (sum - a)};
 }
 
-// a b, with a relative error below 2^-104. Each factor is split into halves of 26 and 27 bits, whose products fit into
-// a double but for a bit.
+// Returns a b with a relative error below 2^-104. Each factor is split into halves of 26 and 27 bits, whose products
+// fit into a double except for one bit.
 template <class T>
 [[gnu::always_inline]] inline DoubleDouble<T> exact_product(const T& a, const T& b)
 {
@@ -91,7 +91,7 @@ template <class T>
     return exact_sum_of_ordered(quotient, rest / b.high);
 }
 
-// The square root. Precondition: a is 0 or positive.
+// Returns the square root. Precondition: a is 0 or positive.
 inline DoubleDouble<double> square_root(const DoubleDouble<double>& a)
 {
     const double root = __builtin_sqrt(a.high);

@@ -12,13 +12,13 @@ using elementary::Quarters;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// An angle that is none, or infinite, is not within, either.
+// Returns false also for NaN and infinity.
 bool is_reduced(double x) { return std::abs(x) <= elementary::most_angle; }
 
 Quarters<double> quarters_of(double x)
 {
     if (is_reduced(x)) return Quarters<double>(x);
-    if (!(std::abs(x) < infinity)) return {0, x - x, 0};  // no number
+    if (!(std::abs(x) < infinity)) return {0, x - x, 0};  // NaN or infinity
     return quarters_of_large(x);
 }
 
@@ -49,7 +49,7 @@ SineAndCosine sine_and_cosine(double x)
     return {(reduced.n & 2) != 0 ? -sine : sine, ((reduced.n + 1) & 2) != 0 ? -cosine : cosine};
 }
 
-// sin / cos, or of an odd number of quarter turns -cos / sin, each in two parts.
+// Computes sin / cos, or for an odd number of quarter turns -cos / sin, each in two parts.
 double tangent(double x)
 {
     if (std::abs(x) < 0x1p-30) return x;

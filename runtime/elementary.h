@@ -1,5 +1,5 @@
-// sin, cos and exp of doubles, with the same bits on any processor and for eight numbers at once: those of the C
-// library differ between its versions, and between processors with fused multiplication and without.
+// sin, cos and exp of doubles, bit-identical on every processor and for eight numbers at once. Those of the C library
+// differ between its versions, and between processors with and without fused multiply-add.
 //
 // The error is below 0.9 units in the last place (tests/lanes/test_elementary.cpp).
 #pragma once
@@ -14,10 +14,10 @@ namespace rapid {
 
 namespace elementary {
 
-constexpr double most_angle = 0x1p20;    // rad, that is reduced exactly
-constexpr double to_integer = 0x1.8p52;  // added and taken off, it rounds; the integer is in the last bits
+constexpr double most_angle = 0x1p20;    // rad; larger angles need quarters_of_large()
+constexpr double to_integer = 0x1.8p52;  // adding and subtracting it rounds; the integer is in the last bits
 
-// p[0] + p[1] x + p[2] x² + ...
+// Returns p[0] + p[1] x + p[2] x² + ...
 template <class T, std::size_t n>
 [[gnu::always_inline]] inline T polynomial(const double (&p)[n], const T& x)
 {
@@ -26,7 +26,7 @@ template <class T, std::size_t n>
     return sum;
 }
 
-// The same polynomial, summed in pairs, pairs of pairs and so on (Estrin). It rounds differently. For a single number
+// Evaluates the same polynomial in pairs, pairs of pairs and so on (Estrin). It rounds differently. For a single number
 // it takes about half the time, since its products do not wait for each other.
 template <class T, std::size_t n>
 [[gnu::always_inline]] inline T polynomial_in_pairs(const T (&p)[n], const T& x)
@@ -49,7 +49,7 @@ requires(!std::is_same_v<T, double>) [[gnu::always_inline]] inline T
     return polynomial_in_pairs(of_lanes, x);
 }
 
-// An angle is n quarter turns and r + tail, at most an eighth turn either way (Cody and Waite).
+// Splits an angle into n quarter turns and r + tail, at most an eighth of a turn (Cody and Waite).
 template <class T>
 struct Quarters {
     typename Bits<T>::Signed n;
@@ -60,7 +60,7 @@ struct Quarters {
         const T biased = x * 0x1.45f306dc9c883p-1 + to_integer;
         const T count = biased - to_integer;
         n = std::bit_cast<typename Bits<T>::Signed>(biased);
-        // A quarter turn in three parts of 33 bits, so that the products are exact, and a rest.
+        // A quarter turn is split into three parts of 33 bits, so that the products are exact, and a rest.
         const DoubleDouble<T> second = exact_sum(x - count * 0x1.921fb544p+0, count * -0x1.0b4611a6p-34);
         const DoubleDouble<T> third = exact_sum(second.high, count * -0x1.3198a2e0p-69);
         const T rest = count * 0x1.b839a252049c1p-104 - (second.low + third.low);
@@ -73,8 +73,8 @@ struct Quarters {
     }
 };
 
-// Minimax polynomials, relative to what they are added to 2e-17 and less: of z = r², (sin r - r) / r³ and
-// (cos r - 1 + z/2) / z².
+// Minimax polynomials of z = r²: (sin r - r) / r³ and (cos r - 1 + z/2) / z². Their error is at most 2e-17 relative to
+// the sum that they are part of.
 template <class T>
 [[gnu::always_inline]] inline T sine_series(const T& z)
 {
@@ -94,7 +94,7 @@ template <class T>
 [[gnu::always_inline]] inline T sine_of_rest(const T& r, const T& tail)
 {
     const T z = r * r;
-    return r - ((0.5 * z * tail - tail) - z * r * sine_series(z));  // so that of -0 it is -0
+    return r - ((0.5 * z * tail - tail) - z * r * sine_series(z));  // this form keeps -0
 }
 
 template <class T>
@@ -104,7 +104,7 @@ template <class T>
     return most + (((1 - most) - half) + (z * z * cosine_series(z) - r * tail));
 }
 
-// The sine of an angle and `quarters` quarter turns.
+// Returns the sine of an angle plus `quarters` quarter turns.
 template <class T>
 [[gnu::always_inline]] inline T sine(const Quarters<T>& reduced, std::int64_t quarters)
 {
@@ -114,7 +114,8 @@ template <class T>
     return (n & 2) != 0 ? -value : value;
 }
 
-// e^x = 2^k e^(r + tail), with |r| at most half of log 2. x is clamped to a range at whose ends e^x is infinite and 0.
+// Splits e^x into 2^k e^(r + tail), with |r| at most half of log 2. x is clamped to a range beyond which e^x is
+// infinite or 0.
 template <class T>
 struct Octaves {
     T biased;  // k + to_integer
@@ -124,7 +125,7 @@ struct Octaves {
     {
         const T most = T{} + 710.0, least = T{} - 746.0;
         const T below = x > most ? most : x, within = below < least ? least : below;
-        // x = k log 2 + r, with log 2 in 33 bits and a rest.
+        // x = k log 2 + r, with log 2 split into 33 bits and a rest.
         biased = within * 0x1.71547652b82fep+0 + to_integer;
         const T count = biased - to_integer;
         const T high = within - count * 0x1.62e42fefp-1, low = count * 0x1.473de6af278edp-34;
@@ -132,7 +133,7 @@ struct Octaves {
         tail = (high - r) - low;
     }
 
-    // Returns value 2^k, in two steps, since the result may be subnormal.
+    // Returns value 2^k, in two steps because the result may be subnormal.
     [[gnu::always_inline]] T scale(const T& value) const
     {
         using Unsigned = typename Bits<T>::Unsigned;
@@ -168,7 +169,7 @@ struct SineAndCosine {
 };
 SineAndCosine sine_and_cosine(double x);
 
-// The same of each lane.
+// Apply the same functions to each lane.
 Doubles sine(const Doubles& x);
 Doubles cosine(const Doubles& x);
 [[gnu::always_inline]] inline Doubles exponential(const Doubles& x)

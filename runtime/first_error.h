@@ -1,5 +1,5 @@
-// The error of a parallel loop over points: among those that are thrown, the one that a serial loop would have thrown
-// first, whatever the scheduling.
+// The error of a parallel loop over points. Of all errors thrown, it keeps the one that a serial loop would have thrown
+// first, so that it does not depend on scheduling.
 #pragma once
 
 #include <atomic>
@@ -12,8 +12,8 @@ namespace rapid {
 
 class FirstError {
 public:
-    // Runs f, the part of a loop that begins at a point; `loop` numbers loops that would run one after the other.
-    // Returns false if f throws, or if an error before it has made it needless.
+    // Runs f, the part of a loop that begins at `point`. `loop` numbers loops that would run one after the other.
+    // Returns false if f throws. Also returns false, without running f, if an earlier point already has an error.
     template <class F>
     bool guard(std::size_t loop, std::size_t point, const F& f)
     {

@@ -1,7 +1,7 @@
-// Which file of a sequence stands for a frame.
+// Maps frames to the files of a sequence.
 //
-// A sequence has a file for each whole number from `first` to `last`. Frame f is that of the file f - offset; beyond
-// the ends the first or the last file holds, the files begin again, they run back and forth, or there is nothing.
+// A sequence has a file for each integer from `first` to `last`. Frame f uses the file f - offset. Beyond the ends, the
+// first or last file holds, the files repeat, they play back and forth, or there is no file.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ struct FrameSequence {
 
     std::int64_t first = 1, last = 1;
     Beyond before = Hold, after = Hold;
-    std::int64_t offset = 0;  // frames by which the files come later
+    std::int64_t offset = 0;  // frames by which the files are delayed
 
-    // Nothing where there is none.
+    // Returns the file of a frame, or nothing if there is none.
     std::optional<std::int64_t> file_of(std::int64_t frame) const
     {
         const std::int64_t file = frame - offset;
@@ -31,7 +31,7 @@ struct FrameSequence {
                 return first + place(n);
             case Mirror: {
                 if (n == 1) return first;
-                const std::int64_t at = place(2 * n - 2);  // the ends once each
+                const std::int64_t at = place(2 * n - 2);  // each end occurs once
                 return first + (at < n ? at : 2 * n - 2 - at);
             }
             case None:
@@ -40,7 +40,7 @@ struct FrameSequence {
         return std::nullopt;
     }
 
-    // The frames between which the file may change.
+    // The range of frames in which the file may change.
     double begins() const { return goes_on(before) ? -infinite : static_cast<double>(first + offset); }
     double ends() const { return goes_on(after) ? infinite : static_cast<double>(last + offset); }
 

@@ -9,8 +9,8 @@ namespace {
 
 using Parts = DoubleDouble<double>;
 
-constexpr double small = 0.25;  // below it e^x and e^-x cancel, and series are short
-constexpr double large = 22;    // beyond it e^-x is below the last digit of e^x
+constexpr double small = 0.25;  // below it e^x and e^-x cancel; the series are short
+constexpr double large = 22;    // above it e^-x is below the last digit of e^x
 
 // Taylor series. Precondition: |x| < small.
 Parts sine_of_small(double x)
@@ -27,7 +27,7 @@ Parts cosine_of_small(double x)
     return Parts{1, 0} + exact_sum_of_ordered(square.high, square.low + z * z * elementary::polynomial_in_pairs(c, z));
 }
 
-// e^x and e^-x. Precondition: 0 <= x <= large.
+// Computes e^x and e^-x. Precondition: 0 <= x <= large.
 struct Exponentials {
     Parts growing, falling;
 
@@ -40,7 +40,7 @@ struct Exponentials {
     }
 };
 
-// e^x / 2, which is finite for some x at which e^x overflows.
+// Returns e^x / 2, which is finite for some x at which e^x overflows.
 double half_exponential(double x)
 {
     const elementary::Octaves<double> octaves(x < 709 ? x : x - 64 * 0x1.62e42fefp-1);

@@ -1,4 +1,4 @@
-// Hyperbolic functions, with the same bits on any processor and the special cases of C.
+// Hyperbolic functions, bit-identical on every processor, with the special cases of C.
 //
 // The error is below 0.7 units in the last place (tests/lanes/test_elementary_functions.cpp).
 #pragma once

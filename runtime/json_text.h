@@ -1,10 +1,10 @@
-// JSON as a text that grows by one value at a time: the way in which all of Rapid writes it.
+// Builds JSON as a string, one value at a time. All of Rapid writes JSON through it.
 //
 //   JsonText json;
 //   json.object("frame", 3, "P", std::array{0.0, 1.0, 2.0}, "error", nullptr);
 //
-// It holds no tree of values, because memory may run out: the destructor of a list or an object of nlohmann's
-// allocates, and ends the program if it can't. That library formats single values.
+// It builds no tree of values, because memory may run out: nlohmann's destructor of a list or an object allocates, and
+// terminates the program if that fails. That library formats single values.
 #pragma once
 
 #include <concepts>
@@ -20,7 +20,7 @@ namespace rapid {
 
 class JsonText {
 public:
-    // With an indent (in spaces a level) each member and element has a line of its own.
+    // With an indent (spaces per level), each member and element gets its own line.
     explicit JsonText(std::size_t indent = 0) : indent_(indent) {}
 
     void begin_object() { begin('{', '}'); }
@@ -33,15 +33,15 @@ public:
         text_ += closing;
     }
 
-    // The name of the member whose value comes next.
+    // Writes the name of the member whose value comes next.
     void key(std::string_view name)
     {
         value(name);
         text_ += indent_ > 0 ? ": " : ":";
     }
 
-    // A number, a truth value, nullptr or a string, whose bytes that are no UTF-8 are replaced; an optional or a
-    // variant of these; a map with names, a list, or parsed JSON. A function is called to write the value.
+    // Writes a number, bool, nullptr or string (replacing invalid UTF-8), an optional or a variant of these, a map with
+    // string keys, a list, or parsed JSON. A function is called and must write the value itself.
     template <class T>
     void value(const T& value)
     {
@@ -69,7 +69,7 @@ public:
         }
     }
 
-    // Members of the object that is open: names and values in turn.
+    // Writes members of the open object. The arguments alternate between names and values.
     template <class T, class... Rest>
     void members(std::string_view name, const T& of_member, const Rest&... rest)
     {
@@ -89,7 +89,7 @@ public:
         if constexpr (sizeof...(Members) > 0) members(all...);
         end();
     }
-    // A member that is a list. `add` writes each element.
+    // Writes a member that is a list. `add` writes each element.
     template <class Range, class F>
     void list(std::string_view name, const Range& range, const F& add)
     {
@@ -108,7 +108,7 @@ private:
         text_ += opening;
         closing_ += closing;
     }
-    // A list or an object that has just been begun.
+    // Returns true if the innermost list or object has no content yet.
     bool is_empty() const { return text_.back() == '{' || text_.back() == '['; }
     void new_line()
     {
@@ -116,7 +116,7 @@ private:
     }
     void separate()
     {
-        if (closing_.empty() || text_.back() == ':' || text_.back() == ' ') return;  // a key has no other end
+        if (closing_.empty() || text_.back() == ':' || text_.back() == ' ') return;  // only keys end like this
         if (!is_empty()) text_ += ',';
         new_line();
     }
@@ -140,10 +140,10 @@ private:
 
     const std::size_t indent_;
     std::string text_;
-    std::string closing_;  // of what is open, the innermost last
+    std::string closing_;  // closing brackets of the open values, innermost last
 };
 
-// A value as a text of its own.
+// Returns a value as a complete JSON string.
 template <class T>
 std::string json_text(const T& value, std::size_t indent = 0)
 {

@@ -7,15 +7,15 @@
 namespace rapid {
 namespace {
 
-// The binary digits of 2/π after the point, 64 to a word. The largest double skips the first 969 of them, and the
-// quarter turns found from the next 192 have an error of 2^-137.
+// The binary digits of 2/π after the point, 64 per word. For the largest double the first 969 are skipped, and the
+// quarter turns computed from the next 192 have an error of 2^-137.
 constexpr std::uint64_t two_over_pi[] = {
     0xa2f9836e4e441529, 0xfc2757d1f534ddc0, 0xdb6295993c439041, 0xfe5163abdebbc561, 0xb7246e3a424dd2e0,
     0x06492eea09d1921c, 0xfe1deb1cb129a73e, 0xe88235f52ebb4484, 0xe99c7026b45f7e41, 0x3991d639835339f4,
     0x9c845f8bbdf9283b, 0x1ff897ffde05980f, 0xef2f118b5a0a6d1f, 0x6d367ecf27cb09b7, 0x4f463f669e5fea2d,
     0x7527bac7ebe5f17b, 0x3d0739f78a5292ea, 0x6bfb5fb11f8d5d08, 0x56033046fc7b6bab, 0xf0cfbc209af4361d};
 
-// Whole numbers of 256 bits, the least 64 of them first.
+// 256-bit integers, least significant word first.
 using Long = std::array<std::uint64_t, 4>;
 
 Long shifted_down(const Long& a, unsigned by)  // less than 64
@@ -26,7 +26,7 @@ Long shifted_down(const Long& a, unsigned by)  // less than 64
     return result;
 }
 
-// m times the 192 bits of 2/π that start at bit `first`.
+// Returns m times the 192 bits of 2/π that start at bit `first`.
 Long product(std::uint64_t m, unsigned first)
 {
     __extension__ typedef unsigned __int128 Wide;
@@ -44,7 +44,7 @@ Long product(std::uint64_t m, unsigned first)
     return result;
 }
 
-// A number below 2^64, exactly.
+// Converts an integer below 2^64 exactly.
 DoubleDouble<double> exactly(std::uint64_t n)
 {
     return {static_cast<double>(n >> 32) * 0x1p32, static_cast<double>(n & 0xffffffff)};
@@ -66,7 +66,7 @@ elementary::Quarters<double> quarters_of_large(double angle)
     const bool is_above = (turns[2] >> 61) != 0;  // nearer to the next quarter turn
     if (is_above) {
         ++quarters;
-        // The distance to it, but for 2^-190.
+        // The distance to the next quarter turn, up to 2^-190.
         turns = {~turns[0], ~turns[1], ~turns[2] & ~std::uint64_t{0} >> 2, 0};
     }
     const auto part = [&](std::size_t i, double unit) {

@@ -1,4 +1,4 @@
-// Reduction of angles that are too large for a few parts of π.
+// Range reduction for angles that are too large for a few parts of π.
 #pragma once
 
 #include "runtime/elementary.h"

@@ -1,14 +1,14 @@
-// Where the library is.
+// The location of the library.
 #pragma once
 
 #include <filesystem>
 
 namespace rapid {
 
-// The file that is loaded, without symbolic links. Empty if the system does not know it.
+// Returns the loaded library file, with symbolic links resolved. Empty if the system does not know it.
 std::filesystem::path library_file();
 
-// The folder that holds the other parts of the library. A library for one processor level lies below it, in
+// Returns the folder with the other parts of the library. A library for one processor level is below it, in
 // glibc-hwcaps/LEVEL (cmake/RapidLevels.cmake).
 std::filesystem::path library_folder();
 

@@ -16,11 +16,11 @@ namespace {
 
 constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
 
-std::atomic<std::uint64_t> budget{0};  // 0: not yet known
+std::atomic<std::uint64_t> budget{0};  // 0: not yet determined
 std::atomic<bool> is_budget_set{false};
-thread_local std::uint64_t budget_of_thread = 0;  // 0: that of the process
+thread_local std::uint64_t budget_of_thread = 0;  // 0: use that of the process
 
-// The first number of a file; none where there is none, as in "max".
+// Returns the number at the start of a file, or nothing if there is none, as in "max".
 std::optional<std::uint64_t> number_in(const std::filesystem::path& file)
 {
     std::uint64_t number = 0;
@@ -28,12 +28,12 @@ std::optional<std::uint64_t> number_in(const std::filesystem::path& file)
     return in >> number ? std::optional(number) : std::nullopt;
 }
 
-// Resident now.
+// Returns the resident memory of the process.
 std::uint64_t own_memory()
 {
     std::uint64_t pages = 0;
     std::ifstream in("/proc/self/statm");
-    in >> pages >> pages;  // of the address space; resident
+    in >> pages >> pages;  // the first number is the address space
     return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
@@ -49,7 +49,7 @@ std::uint64_t free_in_machine()
     return unlimited;
 }
 
-// Of the control group of the process and those around it, in either version.
+// Returns the free memory in the control group of the process and its ancestors, for cgroup v1 and v2.
 std::uint64_t free_in_groups()
 {
     std::uint64_t least = unlimited;

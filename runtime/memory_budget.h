@@ -1,5 +1,5 @@
-// The memory that a run may take. What needs much is estimated before it is begun, and refused with numbers where it
-// does not fit: the kernel would end the process without a word.
+// The memory that a run may use. Large allocations are estimated in advance and refused with numbers if they do not
+// fit, because the kernel would kill the process without a message.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,15 @@
 
 namespace rapid {
 
-// Bytes that the process may have in all. At first: what it has, and what the machine and its control group have free.
+// Returns the bytes that the process may use in total. The default is its current memory plus the free memory of the
+// machine and its control group.
 std::uint64_t memory_budget();
 void set_memory_budget(std::uint64_t bytes);
-// Whether somebody has set it, for the process or for this thread.
+// Returns true if a budget has been set, for the process or for this thread.
 bool is_memory_limited();
 
-// Another budget for what this thread begins, for as long as it lives: where one process runs several scenes. 0: that
-// of the process.
+// Sets another budget for the work that this thread starts during its lifetime, for processes that run several scenes.
+// 0 selects the budget of the process.
 class MemoryBudget {
 public:
     explicit MemoryBudget(std::uint64_t bytes);
@@ -28,19 +29,19 @@ private:
     std::uint64_t before_;
 };
 
-// What is less is not asked for.
+// Smaller amounts are not checked.
 constexpr std::uint64_t negligible_memory = std::uint64_t{64} << 20;  // bytes
 
-// Whether the process may have so many bytes more.
+// Returns true if the process may use this many additional bytes.
 bool fits_in_memory(double bytes);
 
-// Bytes that the process may have more.
+// Returns the additional bytes that the process may use.
 std::uint64_t free_memory();
 
-// "WHAT would take about 119.2 GiB, and 21.3 GiB are free; REMEDY, or set --memory"
+// Returns the error "WHAT would take about 119.2 GiB, and 21.3 GiB are free of 64.0 GiB; REMEDY, or set --memory".
 Error beyond_memory(const std::string& what, double bytes, const std::string& remedy);
 
-// "119.2 GiB", "12 MiB"
+// Returns a string such as "119.2 GiB" or "12 MiB".
 std::string memory_text(double bytes);
 
 }  // namespace rapid

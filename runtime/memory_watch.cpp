@@ -17,10 +17,10 @@
 namespace rapid {
 namespace {
 
-constexpr double look_seconds = 0.005;  // in which a run takes some 10 MB
+constexpr double look_seconds = 0.005;  // a run allocates about 10 MB in this time
 constexpr double grace_seconds = 1;
 
-// The process's memory that is no file's: libraries and files that are mapped can be let go by the system.
+// The memory of the process except for mapped files and libraries, which the system can drop.
 class OwnMemory {
 public:
     OwnMemory() : file_(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC)) {}
@@ -31,7 +31,7 @@ public:
     OwnMemory(const OwnMemory&) = delete;
     OwnMemory& operator=(const OwnMemory&) = delete;
 
-    // 0 where the system does not say.
+    // Returns 0 if the system does not report it.
     std::uint64_t bytes() const
     {
         std::array<char, 128> text{};
@@ -81,7 +81,7 @@ void MemoryWatch::watch(std::uint64_t most)
         if (ends_within(look_seconds)) return;
         bytes = memory.bytes();
         if (bytes <= most) continue;
-        malloc_trim(0);  // what has been freed is the process's still
+        malloc_trim(0);  // returns freed memory, which the process still holds
         bytes = memory.bytes();
     } while (bytes <= most);
 
@@ -92,7 +92,7 @@ void MemoryWatch::watch(std::uint64_t most)
             "--memory",
             memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)));
         beyond_(message);
-    } catch (const std::exception&) {  // on a thread that has no caller
+    } catch (const std::exception&) {  // this thread has no caller
     }
     if (!too_late_) return;
     for (double waited = 0; waited < grace_seconds && memory.bytes() <= most + most / 16; waited += look_seconds)

@@ -1,4 +1,4 @@
-// Ends a run that takes more memory than its budget: what nobody estimated, or what was estimated too low.
+// Ends a run that exceeds its memory budget because an allocation was not estimated, or estimated too low.
 #pragma once
 
 #include <condition_variable>
@@ -14,16 +14,16 @@ class MemoryWatch {
 public:
     using Tell = std::function<void(const std::string& message)>;
 
-    // Watches the process for as long as it lives, where the budget is set (memory_budget.h). Whatever that is, 128 MiB
-    // more than `at_first` are let pass: what is not asked for may come twice. Both are called from a thread of its
-    // own, at most once; what they throw, for want of memory, is dropped. beyond: asks the run to end. too_late, if
-    // set: the run has not ended within a second, or goes on to grow.
+    // Watches the process during its lifetime if a budget is set (memory_budget.h). The limit is at least 128 MiB above
+    // `at_first`, because two allocations too small to be checked may coincide. Both functions are called from a
+    // separate thread, at most once, and their exceptions are ignored. `beyond` asks the run to end. `too_late`, if
+    // set, is called if the run has not ended within a second or continues to grow.
     MemoryWatch(std::uint64_t at_first, Tell beyond, Tell too_late);
     ~MemoryWatch();
     MemoryWatch(const MemoryWatch&) = delete;
     MemoryWatch& operator=(const MemoryWatch&) = delete;
 
-    // Bytes that the process has now, but for files that are mapped.
+    // Returns the current memory of the process without mapped files.
     static std::uint64_t now();
 
 private:

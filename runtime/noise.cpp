@@ -7,7 +7,7 @@
 #include <bit>
 #include <cmath>
 
-// The corners of a cell are a long piece of code without branches: in g++'s default order, a third of it spills
+// The corners of a cell are a long piece of code without branches. In g++'s default order a third of it spills
 // registers.
 #pragma GCC optimize("schedule-insns", "sched-pressure")
 
@@ -15,7 +15,7 @@ namespace rapid {
 namespace {
 
 // The same code computes one point, or eight in SIMD vectors (types of g++ and clang; a machine without vectors of that
-// length gets several short ones).
+// length uses several short ones).
 struct One {
     using Real = double;
     using Bits = std::uint32_t;
@@ -63,20 +63,22 @@ struct Axis {
         below = below > x ? below - 1.0 : below;
         corner = Lane::low(std::bit_cast<typename Lane::Words>(below + whole));
         f = x - below;
-        // 1 just below a corner, where the fraction rounds to it. Beyond 2⁵¹ numbers have no fractions; NaN stays.
+        // f is 1 just below a corner, if the fraction rounds to it. Numbers beyond 2⁵¹ have no fractions. NaN stays
+        // NaN.
         f = ((f >= 0.0) & (f <= 1.0)) ? f : f - f;
         s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
         slope = f * f * (f * (f * 30.0 - 60.0) + 30.0);
     }
 };
 
-// The gradient of a lattice corner in space and time: three of its four components are 1 or -1, one is 0, chosen by six
-// bits. (At a fixed time these are the midpoints of a cube's edges, as Perlin's, and its corners.)
+// Returns the gradient of a lattice corner in space and time. Three of its four components are 1 or -1 and one is 0,
+// chosen by six bits. (At a fixed time these are the midpoints of a cube's edges, as in Perlin's noise, and its
+// corners.)
 template <int axes>
 inline void gradient_of(const Eight::Words& bits, Eight::Real (&g)[4])
 {
 #if defined(__AVX512F__) && !defined(__clang__)
-    // Looked up in registers, by the two bits that choose the 0 and the bit of the axis.
+    // Looks up the values in registers, by the two bits that choose the 0 and the bit of the axis.
     constexpr Eight::Real minus = {-1, -1, -1, -1, 1, 1, 1, 1};
     const auto with_0_at = [&](int at) {
         Eight::Real values = minus;
@@ -99,7 +101,7 @@ inline void gradient_of(const Eight::Words& bits, Eight::Real (&g)[4])
 #endif
 }
 
-// The same for one point, from a table.
+// Returns the same for one point, from a table.
 template <int axes>
 inline void gradient_of(One::Words bits, double (&g)[4])
 {
@@ -149,8 +151,8 @@ inline void add_octave(const double (&x)[3], const Octave& octave, double& value
     }
 }
 
-// The curl at x of an octave of three noises on one lattice, summed over the corners of the cell: the curl of the
-// corner's gradients by its weight, and the gradient of the weight crossed with the corner's values.
+// Computes the curl at x of an octave of three noises on one lattice, summed over the corners of the cell: the curl of
+// the corner's gradients times its weight, plus the gradient of the weight crossed with the corner's values.
 template <class Lane, bool moves>
 inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octave, typename Lane::Real (&curl)[3])
 {
@@ -158,7 +160,7 @@ inline void curl_of_octave(const typename Lane::Real (&x)[3], const Octave& octa
     using Real = typename Lane::Real;
     using Bits = typename Lane::Bits;
     const Axis<Lane> axes[3] = {Axis<Lane>(x[0]), Axis<Lane>(x[1]), Axis<Lane>(x[2])};
-    Real to[2][3];  // offsets from the corner below, and from the one above
+    Real to[2][3];  // offsets from the lower and the upper corner
     for (int axis = 0; axis < 3; ++axis) to[0][axis] = axes[axis].f, to[1][axis] = axes[axis].f - 1.0;
 
     for (std::uint32_t dw = 0; dw < (moves ? 2u : 1u); ++dw) {
@@ -207,7 +209,7 @@ public:
     {
         double amount = 1, fineness = 1;
         for (int k = 0; k < size_; ++k) {
-            // Shifted, or all octaves would be 0 at the corners of the first.
+            // Without the shift all octaves would be 0 at the corners of the first one.
             const double shift = 0.618033988749895 * k;
             const std::uint32_t seed = options.seed + 0x9e3779b9u * static_cast<std::uint32_t>(k);
             all_[k] = {amount, fineness, shift, seed, Axis<One>(options.time * fineness)};
@@ -224,17 +226,17 @@ private:
     std::array<Octave, NoiseOptions::most_octaves> all_;
 };
 
-// A position in the lattice of an octave.
+// Returns a position in the lattice of an octave.
 template <class Lane>
 inline void place_in(const Octave& octave, const typename Lane::Real (&P)[3], typename Lane::Real (&x)[3])
 {
     for (int axis = 0; axis < 3; ++axis) x[axis] = P[axis] * octave.fineness + (axis + 1) * octave.shift;
 }
 
-// 1 + r + r² + ..., n terms.
+// Returns 1 + r + r² + ..., n terms.
 double geometric(double r, int n) { return (1 - std::pow(r, n)) / (1 - r); }
 
-// An upper bound for any choice of gradients and any position in a cell: 1.5366 by hill climbing from 3,000 positions.
+// Upper bound for any choice of gradients and any position in a cell: 1.5366 by hill climbing from 3,000 positions.
 constexpr double largest_value = 1.54;
 // Root mean square length of the curl of one octave at whole times, measured at 3 · 10⁶ positions.
 constexpr double curl_length = 1.83;
@@ -244,8 +246,8 @@ double curl_scale(const NoiseOptions& options)
     return 1 / (curl_length * std::sqrt(geometric(roughness * roughness, options.octaves)));
 }
 
-// The curl of the octaves' potentials. The potential of an octave weakens as it gets finer, so that its curl is
-// `roughness` times that of the one before.
+// Computes the curl of the octaves' potentials. The potential of an octave weakens as it gets finer, so that its curl
+// is `roughness` times that of the previous octave.
 template <class Lane>
 inline void curl_of(const typename Lane::Real (&P)[3], const Octaves& octaves, double scale,
                     typename Lane::Real (&curl)[3])
@@ -290,7 +292,7 @@ void curl_noise(std::span<const Vec3d> P, const NoiseOptions& options, std::span
 {
     const Octaves octaves(options);
     const double scale = curl_scale(options);
-    // Transposed in blocks of several vectors: elements that were just stored one by one are slow to load as a vector.
+    // Transposes in blocks of several vectors: elements that were just stored one by one are slow to load as a vector.
     constexpr std::size_t block = 8 * Eight::size;
     Eight::Real x[3][8] = {}, result[3][8];
     for (std::size_t first = 0; first < P.size(); first += block) {

@@ -1,5 +1,5 @@
-// Objects as values of parameters: shapes, meshes, point sets, motions, functions. Immutable, and shared between nodes,
-// states and threads.
+// Objects as parameter values: shapes, meshes, point sets, motions, functions. They are immutable and shared between
+// nodes, states and threads.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ public:
     // Its name in messages: "mesh", "level set", "shape", "points", "motion", "function".
     virtual std::string_view kind() const = 0;
 
-    // Whether it changes with time: a motion that is not constant, and an object that it moves.
+    // Returns true if it changes with time, such as a motion that is not constant, or an object that one moves.
     virtual bool varies() const { return false; }
 };
 

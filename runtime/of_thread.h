@@ -1,10 +1,10 @@
-// A value that each thread has of its own and keeps until it ends, such as a function's buffer:
+// A per-thread value that is kept until the thread ends, such as a function's buffer:
 //
 //   thread_local OfThread<std::vector<double>> kept;
 //   std::vector<double>& phi = *kept;
 //
-// For values with a destructor. A thread_local std::vector does the same, but glibc takes memory for its destructor
-// when a thread first comes there, and ends the process where there is none; here that is a std::bad_alloc.
+// For values with a destructor. A thread_local std::vector does the same, but glibc allocates memory for its destructor
+// when a thread first uses it, and terminates the process if that fails. Here that is a std::bad_alloc.
 #pragma once
 
 #include <memory>
@@ -12,17 +12,17 @@
 
 namespace rapid {
 
-// What a thread destroys when it ends.
+// An object that is destroyed when its thread ends.
 struct KeptByThread {
     KeptByThread() = default;
     KeptByThread(const KeptByThread&) = delete;
     KeptByThread& operator=(const KeptByThread&) = delete;
     virtual ~KeptByThread() = default;
 
-    std::unique_ptr<KeptByThread> earlier;  // destroyed behind this one
+    std::unique_ptr<KeptByThread> earlier;  // destroyed after this one
 };
 
-// Keeps it until the calling thread ends; until the process does, where that is the first one.
+// Keeps an object until the calling thread ends. On the main thread, until the process ends.
 void keep_by_thread(std::unique_ptr<KeptByThread> kept);
 
 template <class Value>

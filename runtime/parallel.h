@@ -1,4 +1,4 @@
-// Parallel loops over points in chunks of a fixed size, so that chunks do not depend on the number of threads.
+// Parallel loops over points in chunks of fixed size, so that chunks do not depend on the number of threads.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -15,8 +15,8 @@ namespace rapid {
 // Points per chunk: its columns (P, v in double, a few floats) fit into a 1 MiB second-level cache.
 constexpr std::size_t chunk_size = 4096;
 
-// Calls f(begin, end) for each chunk of [0, n), in parallel and in any order. The first exception of f is rethrown.
-// Error: what runs is cancelled.
+// Calls f(begin, end) for each chunk of [0, n), in parallel and in any order. Rethrows the first exception of f. Throws
+// Error if the run is cancelled.
 template <class F>
 void for_each_chunk(std::size_t n, const F& f, std::size_t size = chunk_size)
 {

@@ -1,4 +1,4 @@
-// Lists of files and folders in variables of the environment, such as RAPID_PATH.
+// Lists of files and folders in environment variables such as RAPID_PATH.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-// The parts of "/a:/b", in order; empty ones are none.
+// Returns the parts of "/a:/b" in order, without empty ones.
 inline std::vector<std::string> parts_of_path_list(const std::string& list)
 {
     std::vector<std::string> parts;
@@ -20,7 +20,7 @@ inline std::vector<std::string> parts_of_path_list(const std::string& list)
     return parts;
 }
 
-// Those of a variable; none where it is not set.
+// Returns the parts of a variable. Empty if it is not set.
 inline std::vector<std::string> path_list_of(const char* variable)
 {
     const char* list = std::getenv(variable);

@@ -17,7 +17,7 @@ DoubleDouble<double> parts_of_logarithm(double x)
     return x < least_normal ? elementary::parts_of_logarithm(x * 0x1p54, -54) : elementary::parts_of_logarithm(x);
 }
 
-// The logarithm of 0, infinity, NaN and negative numbers.
+// Returns the logarithm of 0, infinity, NaN and negative numbers.
 double beyond_logarithms(double x) { return x == 0 ? -HUGE_VAL : x > 0 ? x : no_number; }
 
 bool is_whole(double y) { return std::floor(y) == y; }
@@ -93,7 +93,7 @@ double power(double x, double y)
 double times_power_of_two(double x, double exponent)
 {
     if (std::isnan(exponent)) return exponent;
-    constexpr double beyond = 5000;  // from any double to 0 or infinity
+    constexpr double beyond = 5000;  // takes any double to 0 or infinity
     return std::ldexp(x, static_cast<int>(std::clamp(exponent, -beyond, beyond)));
 }
 

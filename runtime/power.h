@@ -1,4 +1,4 @@
-// Logarithms and powers, with the same bits on any processor and for eight numbers at once, like the functions of
+// Logarithms and powers, bit-identical on every processor and for eight numbers at once, like the functions of
 // elementary.h.
 //
 // The error is below 0.53 units in the last place, and below 0.9 for natural logarithms
@@ -11,7 +11,7 @@ namespace rapid {
 
 namespace elementary {
 
-// A normal positive number is 2^k m, with m within a root of 2 of 1.
+// Splits a normal positive number into 2^k m, with m in [1/√2, √2].
 template <class T>
 struct Mantissa {
     T m, count;  // count = k + octaves
@@ -26,12 +26,12 @@ struct Mantissa {
     }
 };
 
-// (artanh s / s - 1 - z/3) / z², of z = s²
+// (artanh s / s - 1 - z/3) / z² as a series in z = s²
 constexpr double artanh_series[] = {1 / 5.0,  1 / 7.0,  1 / 9.0,  1 / 11.0, 1 / 13.0, 1 / 15.0,
                                     1 / 17.0, 1 / 19.0, 1 / 21.0, 1 / 23.0, 1 / 25.0};
 
-// The logarithm of 2^octaves x, for a normal positive x: with f = m - 1 and s = f / (2 + f),
-// log m = 2 artanh s = f - (f²/2 - s (f²/2 + 2 (artanh s / s - 1))).
+// Returns the logarithm of 2^octaves x, for a normal positive x. With f = m - 1 and s = f / (2 + f), log m = 2 artanh s
+// = f - (f²/2 - s (f²/2 + 2 (artanh s / s - 1))).
 template <class T>
 [[gnu::always_inline]] inline T logarithm(const T& x, std::int64_t octaves = 0)
 {
@@ -42,7 +42,7 @@ template <class T>
     return of_x.count * 0x1.62e42fefp-1 - ((half - (s * (half + rest) + low)) - f);
 }
 
-// The same logarithm with a relative error below 2^-65.
+// Returns the same logarithm with a relative error below 2^-65.
 template <class T>
 [[gnu::always_inline]] inline DoubleDouble<T> parts_of_logarithm(const T& x, std::int64_t octaves = 0)
 {
@@ -58,7 +58,7 @@ template <class T>
     return of_octaves + DoubleDouble<T>{2 * half.high, 2 * half.low};
 }
 
-// e^(x + below) / 2^k, where x has these octaves.
+// Returns e^(x + below) / 2^k, where `octaves` are those of x.
 template <class T>
 [[gnu::always_inline]] inline DoubleDouble<T> exponential(const Octaves<T>& octaves, const T& below)
 {
@@ -70,7 +70,7 @@ template <class T>
                                 ((first.low + second.low) + square.low) + (cube + tail * (second.high + cube)));
 }
 
-// x^y, given the logarithm of x. Precondition: |y| <= 1e300.
+// Returns x^y, given the logarithm of x. Precondition: |y| <= 1e300.
 template <class T>
 [[gnu::always_inline]] inline T power(const DoubleDouble<T>& logarithm_of_x, const T& y)
 {
@@ -88,13 +88,14 @@ double logarithm(double x);
 double logarithm10(double x);
 double logarithm(double x, double base);
 
-// x^y with the special cases of C's pow. x^2 is x * x, x^0.5 a square root and x^-1 a quotient, each rounded once.
+// Returns x^y with the special cases of C's pow. x^2 is x * x, x^0.5 a square root and x^-1 a quotient, each rounded
+// once.
 double power(double x, double y);
 
-// x 2^n, where n is the exponent rounded toward 0.
+// Returns x 2^n, where n is the exponent rounded toward 0.
 double times_power_of_two(double x, double exponent);
 
-// The same functions, lane by lane.
+// Apply the same functions lane by lane.
 Doubles logarithm(const Doubles& x);
 Doubles power(const Doubles& x, const Doubles& y);
 

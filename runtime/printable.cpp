@@ -7,7 +7,7 @@
 namespace rapid {
 namespace {
 
-// kept: control characters that stay as they are.
+// kept: control characters that are not escaped.
 std::string without_commands(std::string_view text, std::string_view kept)
 {
     std::string result;
@@ -33,7 +33,7 @@ std::string printable(std::string_view text) { return without_commands(text, "\n
 
 std::string printable_name(std::string_view name)
 {
-    constexpr std::size_t most = 200;  // bytes, as of a node's name in an error
+    constexpr std::size_t most = 200;  // the limit for a node's name in an error
     return without_commands(shortened(name, most), "");
 }
 
@@ -41,7 +41,7 @@ std::string shortened(std::string_view text, std::size_t most)
 {
     if (text.size() <= most) return std::string(text);
     const auto is_inside = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80; };
-    std::size_t head = most * 3 / 4, tail = text.size() - most / 4;  // whole characters of UTF-8
+    std::size_t head = most * 3 / 4, tail = text.size() - most / 4;  // at boundaries of UTF-8 characters
     while (head > 0 && is_inside(head)) --head;
     while (tail < text.size() && is_inside(tail)) ++tail;
     return fmt::format("{} [... {} bytes ...] {}", text.substr(0, head), tail - head, text.substr(tail));

@@ -1,4 +1,5 @@
-// Text of others (names in files, messages of libraries) for a terminal, which takes some characters for commands.
+// Makes foreign text (names in files, messages of libraries) safe for a terminal, which interprets some characters as
+// commands.
 #pragma once
 
 #include <cstddef>
@@ -7,16 +8,17 @@
 
 namespace rapid {
 
-// Control characters but tab and newline, also those of two bytes in UTF-8 (U+0080 to U+009F), as \xNN.
+// Escapes control characters other than tab and newline as \xNN, including those of two bytes in UTF-8 (U+0080 to
+// U+009F).
 std::string printable(std::string_view text);
 
-// With its middle left out where a name or a value makes it longer than so many bytes.
+// Replaces the middle of a text with more than `most` bytes.
 std::string shortened(std::string_view text, std::size_t most);
 
-// A name or a value from a file, in one line of bounded length: shortened, and tab and newline as \xNN, too.
+// Returns a name or value from a file as one line of bounded length: shortened, with tab and newline escaped, too.
 std::string printable_name(std::string_view name);
 
-// What a table has room for in the column of such a text: one that is endless does not make all lines as long.
+// Returns the column width for such a text in a table. It is bounded, so that a very long one does not widen all lines.
 std::size_t width_of(std::string_view text);
 
 }  // namespace rapid

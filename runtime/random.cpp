@@ -14,12 +14,13 @@
 namespace rapid {
 namespace {
 
-// Numbers of 32 bits, each in 64: what is above them does not count. As many as a register has room for: wider ones
+// 32-bit numbers in 64-bit lanes, whose upper halves are ignored. As many as fit into a register, because wider vectors
 // would go through memory between the products.
 typedef std::uint64_t Wide __attribute__((vector_size(sizeof(Register))));
 constexpr std::uint32_t width = sizeof(Register) / sizeof(double);
 
-// The low 32 bits of each lane, times m. g++ multiplies 64 bits by 64 where it may, which takes three times as long.
+// Returns the low 32 bits of each lane times m. By itself g++ multiplies 64 by 64 bits, which takes three times as
+// long.
 [[gnu::always_inline]] inline Wide product(const Wide& a, std::uint32_t m)
 {
 #if defined(__AVX512F__)
@@ -35,17 +36,17 @@ constexpr std::uint32_t width = sizeof(Register) / sizeof(double);
 
 [[gnu::always_inline]] inline Register as_reals(const Wide& a)
 {
-    // 2^52 and the number, less 2^52.
+    // Sets the mantissa of 2^52 to the number, then subtracts 2^52.
     return std::bit_cast<Register>((a & 0xffffffffu) | std::bit_cast<std::uint64_t>(0x1p52)) - 0x1p52;
 }
 
-constexpr std::size_t packs = 2;  // side by side, as each operation waits for the one before it
+constexpr std::size_t packs = 2;  // interleaved, because each operation waits for the previous one
 
-// The numbers of Philox4x32-10 for as many items, as they are before they are scaled.
+// The numbers of Philox4x32-10 for several items, before scaling.
 struct Draw {
     Wide c0[packs], c1[packs], c2[packs], c3[packs];
 
-    // items_of(p): those of a pack.
+    // items_of(p): the items of pack p.
     template <class Items>
     [[gnu::always_inline]] Draw(RandomKey key, const Items& items_of, std::uint64_t use)
     {
@@ -72,7 +73,7 @@ struct Draw {
 
 constexpr std::size_t at_once = packs * width;
 
-// For Draw: the items from `begin` on, one by one.
+// Supplies Draw with the items from `begin` on, one by one.
 template <class Item>
 [[gnu::always_inline]] inline auto one_by_one(const Item& item_at, std::size_t begin)
 {
@@ -112,7 +113,7 @@ void uniform4(RandomKey key, std::uint64_t first, std::uint64_t use, std::span<s
 void uniform4(RandomKey key, const Items& items, std::uint64_t use, std::span<std::array<double, 4>> out)
 {
     if (items.are_consecutive()) return uniform4(key, items.first(), use, out);
-    // The lanes behind the last item repeat it.
+    // Lanes after the last item repeat it.
     draw(
         key, [&](std::size_t i) { return items[std::min(i, out.size() - 1)]; }, use, out);
 }
@@ -126,7 +127,7 @@ double uniform53(RandomKey key, std::uint64_t item, std::uint64_t use)
 
 void uniform53(RandomKey key, std::span<const std::uint64_t> items, std::uint64_t use, std::span<double> out)
 {
-    // The lanes behind the last item repeat it.
+    // Lanes after the last item repeat it.
     const auto item_at = [&](std::size_t i) { return items[std::min(i, items.size() - 1)]; };
     for (std::size_t begin = 0; begin < items.size(); begin += at_once) {
         const bool is_whole = begin + at_once <= items.size();

@@ -1,5 +1,5 @@
-// Counter-based random numbers (Philox4x32-10, Salmon et al. 2011, Random123): a number depends only on its key and
-// counter, not on earlier draws, on the thread, or on the machine.
+// Counter-based random numbers (Philox4x32-10, Salmon et al. 2011, Random123). A number depends only on its key and
+// counter, not on earlier draws, the thread, or the machine.
 #pragma once
 
 #include <Random123/philox.h>
@@ -11,14 +11,14 @@
 
 namespace rapid {
 
-// The random stream of a node: of (seed, name), so that inserting a node changes no other stream.
+// The random stream of a node, derived from (seed, name), so that inserting a node changes no other stream.
 struct RandomKey {
     std::uint64_t value = 0;
 
     RandomKey() = default;
     RandomKey(std::uint64_t seed, std::string_view node)
     {
-        std::uint64_t hash = 14695981039346656037ull;  // FNV-1a of the name, then mixed with the seed by Philox itself
+        std::uint64_t hash = 14695981039346656037ull;  // FNV-1a of the name, then mixed with the seed by Philox
         for (const char c : node) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
         r123::Philox4x32 philox;
         const auto mixed = philox({{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32), 0, 0}},
@@ -27,8 +27,8 @@ struct RandomKey {
     }
 };
 
-// Four independent numbers, uniform in [0, 1) with 32 bits each, for an item (the id of a point, the number of a birth)
-// and a use (what they decide about it).
+// Returns four independent numbers, uniform in [0, 1) with 32 bits each, for an item (the id of a point, the number of
+// a birth) and a use (the quantity that they decide).
 inline std::array<double, 4> uniform4(RandomKey key, std::uint64_t item, std::uint64_t use)
 {
     r123::Philox4x32 philox;
@@ -39,7 +39,8 @@ inline std::array<double, 4> uniform4(RandomKey key, std::uint64_t item, std::ui
     return {bits[0] * unit, bits[1] * unit, bits[2] * unit, bits[3] * unit};
 }
 
-// The same for the items first, first + 1, ..., faster: out[i] is uniform4(key, first + i, use) to the bit.
+// Computes the same for the items first, first + 1, ..., faster: out[i] is bit-identical to uniform4(key, first + i,
+// use).
 void uniform4(RandomKey key, std::uint64_t first, std::uint64_t use, std::span<std::array<double, 4>> out);
 
 }  // namespace rapid

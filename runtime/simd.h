@@ -1,9 +1,10 @@
-// Packs of eight numbers, on which arithmetic is lane by lane; wider than a register they are computed in parts, with
-// the same bits on any processor.
+// Packs of eight numbers with lane-by-lane arithmetic. Packs wider than a register are computed in parts, with
+// bit-identical results on every processor.
 //
 // These are the compiler's vector types. Of Debian's libraries, Highway and xsimd size their vectors by the processor,
-// and a pack is part of the layout of records (contact packs) and of loops over whole points (24 coordinates); Vc has
-// packs of a given size, but is no longer developed. None promises more about bits than IEEE arithmetic by lane.
+// but here a pack is part of the layout of records (contact packs) and of loops over whole points (24 coordinates). Vc
+// has packs of a given size, but is no longer developed. None of them guarantees more about bits than IEEE arithmetic
+// per lane.
 #pragma once
 
 #include <array>
@@ -15,18 +16,18 @@
 
 #include "runtime/vec.h"
 
-// The calling convention of wide vectors depends on the processor that a file is compiled for, and g++ warns of that.
-// Functions that take or return packs are inlined, or stay within one file.
+// The calling convention of wide vectors depends on the processor that a file is compiled for, and g++ warns about
+// that. Functions that take or return packs are inlined, or stay within one file.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rapid {
 
 constexpr std::uint32_t lanes = 8;
 
-// g++ lays a vector type out on multiples of its size. But alignof, by which std::vector allocates, is at most the
-// width of a register: 16 bytes in code for x86-64-v2, whose memory code for x86-64-v4 then takes to be on 64. So each
-// struct of packs states its alignment (alignas), which files of all processor levels then agree on. An `aligned`
-// attribute here would not do: g++ drops it where a pack is the argument of a template, as in Vectors<Doubles>.
+// g++ aligns a vector type to its size. But alignof, which std::vector uses, is at most the width of a register: code
+// for x86-64-v2 allocates at 16 bytes, and code for x86-64-v4 assumes 64. Therefore each struct of packs states its
+// alignment (alignas), on which files of all processor levels agree. An `aligned` attribute here would not suffice: g++
+// drops it if a pack is a template argument, as in Vectors<Doubles>.
 typedef float Floats __attribute__((vector_size(4 * lanes)));
 typedef double Doubles __attribute__((vector_size(8 * lanes)));
 using Indices = std::array<std::uint32_t, lanes>;
@@ -34,31 +35,31 @@ using Indices = std::array<std::uint32_t, lanes>;
 [[gnu::always_inline]] inline Doubles widen(const Floats& x) { return __builtin_convertvector(x, Doubles); }
 [[gnu::always_inline]] inline Floats narrow(const Doubles& x) { return __builtin_convertvector(x, Floats); }
 
-// Comparisons of Doubles give Flags, of Floats FloatFlags: all bits of a lane, or none.
+// Comparisons return Flags for Doubles and FloatFlags for Floats: all bits of a lane are set, or none.
 typedef std::int64_t Flags __attribute__((vector_size(8 * lanes)));
 typedef std::int32_t FloatFlags __attribute__((vector_size(4 * lanes)));
 
 typedef std::int8_t LaneBytes __attribute__((vector_size(lanes)));
 
-// One byte per lane: lane l is the bits from 8 l on.
+// Returns one byte per lane: lane l is in the bits from 8 l on.
 [[gnu::always_inline]] inline std::uint64_t bytes(const Flags& flags)
 {
     return std::bit_cast<std::uint64_t>(__builtin_convertvector(flags, LaneBytes));
 }
 [[gnu::always_inline]] inline bool any(const Flags& flags) { return bytes(flags) != 0; }
-// One bit per lane: lane l is bit l.
+// Returns one bit per lane: lane l is bit l.
 [[gnu::always_inline]] inline std::uint32_t bits(const Flags& flags)
 {
     return static_cast<std::uint32_t>((bytes(flags) & 0x8040201008040201) * 0x0101010101010101 >> 56);
 }
-// The lanes of these bits.
+// Returns the flags of the lanes whose bits are set.
 [[gnu::always_inline]] inline FloatFlags float_flags(std::uint32_t bits)
 {
     const FloatFlags lane_bit = {1, 2, 4, 8, 16, 32, 64, 128};
     return (lane_bit & static_cast<std::int32_t>(bits)) != 0;
 }
 
-// From and to memory, without alignment.
+// Load and store without alignment.
 [[gnu::always_inline]] inline Floats load_pack(const float* from)
 {
     Floats pack;
@@ -78,7 +79,8 @@ template <class Pack, class T>
     std::memcpy(to, &pack, sizeof pack);
 }
 
-// As many doubles as a register holds. Where that is less than a pack, g++ compares and chooses lane by lane in a pack.
+// The doubles of one register. If a register is smaller than a pack, g++ would compare and select lane by lane in a
+// pack.
 #if defined(__AVX512F__)
 typedef Doubles Register;
 #elif defined(__AVX2__)
@@ -87,7 +89,7 @@ typedef double Register __attribute__((vector_size(32)));
 typedef double Register __attribute__((vector_size(16)));
 #endif
 
-// f of each part of a pack.
+// Applies f to each part of a pack.
 template <class F>
 [[gnu::always_inline]] inline Doubles by_registers(const Doubles& x, const F& f)
 {
@@ -112,7 +114,7 @@ template <class F>
     return root;
 }
 
-// Eight vectors.
+// Eight vectors, by coordinate.
 template <class Eight>
 struct alignas(sizeof(Eight)) Vectors {
     using Scalar = std::remove_cvref_t<decltype(Eight()[0])>;
@@ -155,7 +157,7 @@ typedef double Four __attribute__((vector_size(32)));
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-// The transpose of eight rows of four numbers, given two by two.
+// The transpose of eight rows of four numbers, given in pairs.
 struct alignas(sizeof(Doubles)) Columns {
     Doubles x, y, z, w;
 };
@@ -172,7 +174,7 @@ struct alignas(sizeof(Doubles)) Columns {
             __builtin_shufflevector(zw0, zw4, 4, 5, 6, 7, 12, 13, 14, 15)};
 }
 
-// The transpose back: the rows, two by two.
+// The inverse transpose: the rows in pairs.
 struct alignas(sizeof(Doubles)) Rows {
     Doubles of01, of23, of45, of67;
 };
@@ -197,13 +199,13 @@ struct alignas(sizeof(Doubles)) Rows {
     return __builtin_shufflevector(rows, rows, 4, 5, 6, 7);
 }
 
-// Stores the first `count` rows, each by store(lane, row).
+// Stores the first `count` rows with store(lane, row).
 template <class F>
 [[gnu::always_inline]] inline void store_rows(const Columns& columns, std::uint32_t count, const F& store)
 {
     const Rows rows = rows_of(columns);
     store(0, first(rows.of01));
-    if (count == lanes) {  // mostly
+    if (count == lanes) {  // the usual case
         store(1, second(rows.of01));
         store(2, first(rows.of23));
         store(3, second(rows.of23));

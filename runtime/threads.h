@@ -9,7 +9,7 @@ namespace rapid {
 
 class Threads {
 public:
-    // 0: as many as the machine has. More threads than that are made, too, so that tests can show their effects.
+    // 0: one per processor of the machine. Larger counts are honoured, too, so that tests can show their effects.
     explicit Threads(int count)
         : count_(count > 0 ? count : tbb::info::default_concurrency()),
           limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count_)),
@@ -19,7 +19,8 @@ public:
 
     int count() const { return count_; }
 
-    // Runs f with these threads. The limit is not enough: TBB's own arena never has more threads than the machine.
+    // Runs f with these threads. The limit alone is not enough, because TBB's own arena never has more threads than the
+    // machine.
     template <class F>
     auto run(const F& f)
     {

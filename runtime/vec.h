@@ -1,4 +1,4 @@
-// Vectors as the runtime holds them: packed x y z, single precision in columns, double inside a step.
+// Vectors of the runtime: packed x y z, single precision in columns, double precision inside a step.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,14 +17,14 @@ using Quatf = Eigen::Quaternionf;
 
 static_assert(sizeof(Vec3f) == 12 && sizeof(Vec3d) == 24 && sizeof(Quatf) == 16, "columns are packed");
 
-// The coordinates of many vectors one after the other, as loops that the compiler makes vectors of want them.
+// Returns the coordinates of many vectors as one contiguous array, so that the compiler can vectorise loops.
 template <class Vec3>
 auto* coordinates(std::span<Vec3> x)
 {
     return x.empty() ? nullptr : x.front().data();
 }
 
-// Shapes [n], [n]; to nearest.
+// Converts with rounding to nearest. Shapes [n], [n].
 inline void cast(std::span<const Vec3f> from, std::span<Vec3d> to)
 {
     const float* x = coordinates(from);
@@ -38,7 +38,8 @@ inline void cast(std::span<const Vec3d> from, std::span<Vec3f> to)
     for (std::size_t l = 0; l < 3 * from.size(); ++l) y[l] = static_cast<float>(x[l]);
 }
 
-// |x| as bits, which order as it does: those of infinity and NaN are at least `infinity_bits`, all others below.
+// Returns |x| as bits, which have the same order. Infinity and NaN give at least `infinity_bits`, all other values
+// less.
 inline std::uint32_t magnitude_bits(float x) { return std::bit_cast<std::uint32_t>(x) & 0x7fffffffu; }
 constexpr std::uint32_t infinity_bits = 0x7f800000u;
 

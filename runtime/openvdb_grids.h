@@ -1,7 +1,7 @@
-// OpenVDB with explicit instantiations of the grid types used here. Their virtual functions are in its library; without
-// the lines below, each file that creates a grid would compile all of them again, eight seconds per type. Functions
-// that are not inlined come from the library, too. It has all that g++ does not inline when it optimises. Sanitizers,
-// and clang with them, inline less and call functions that it lacks.
+// OpenVDB with extern template declarations of the grid types used here. Their virtual functions are in its library;
+// without the lines below, each file that creates a grid would compile all of them again, eight seconds per type.
+// Functions that are not inlined come from the library, too. It has all that g++ does not inline when it optimises.
+// Sanitizers, and clang with them, inline less and call functions that it lacks.
 #pragma once
 
 #include <openvdb/openvdb.h>

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view journal_magic = "\x89RAPIDJ\n";
 constexpr std::string_view suffix = ".rapid";
-constexpr double longest_wait = 5;  // s, for a process that ends
+constexpr double longest_wait = 5;  // s, for the owner of the lock to end
 
 struct Head {
     std::uint64_t bytes, hash;  // of the record
@@ -37,7 +37,7 @@ struct Head {
 
 Head head_of(std::string_view record) { return {record.size(), content_hash(record)}; }
 
-// Returns false if the file ends before.
+// Returns false if the file ends earlier.
 bool read_at(int file, std::uint64_t offset, void* data, std::size_t bytes)
 {
     for (char* to = static_cast<char*>(data); bytes > 0;) {
@@ -74,7 +74,7 @@ std::uint64_t RecordLog::size() const
     return static_cast<std::uint64_t>(status.st_size);
 }
 
-// In one call, where the system takes all of it: a process that is killed leaves no part of a small record.
+// Writes in one call if the system accepts everything, so that a killed process leaves no part of a small record.
 void RecordLog::append(std::string_view record)
 {
     const std::uint64_t size_before = size();
@@ -132,13 +132,13 @@ Descriptor FrameArchive::lock(const fs::path& folder, const fs::path& asked, con
     std::error_code error;
     fs::create_directories(folder, error);
     if (error) refuse("can't be made: " + error.message());
-    // A link would make a file elsewhere.
+    // Following a link would create a file elsewhere.
     Descriptor lock(::open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
     if (!lock && errno == ELOOP) refuse("its .lock is a link; give another folder");
     const Stopwatch waited;
     while (lock && ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
         if (errno == EINTR) continue;
-        if (errno != EWOULDBLOCK) break;  // a file system without locks
+        if (errno != EWOULDBLOCK) break;  // the file system has no locks
         if (waited.seconds() > longest_wait)
             refuse(fmt::format("another {} has it; wait for its end, or give another folder", who));
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -217,7 +217,7 @@ void FrameArchive::write_files()
             failure = fmt::format("{}: {}; the run goes on without this {}", job->path.string(), error.what(),
                                   name.substr(0, name.find('.')));
         }
-        job.reset();  // releases its columns before the next frame would copy them
+        job.reset();  // releases its columns, which the next frame would otherwise have to copy
         lock.lock();
         is_busy_ = false;
         if (!failure.empty()) failures_.push_back(std::move(failure));

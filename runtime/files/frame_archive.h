@@ -1,8 +1,8 @@
-// Folders in which runs keep frames, so that a later run finds them again: `--cache` of `rapid run` and of the viewer.
+// Folders in which runs store frames for later runs: `--cache` of `rapid run` and of the viewer.
 //
-// A folder has files by kind and frame, such as snapshot.0010.rapid, and a journal of what is known of each frame. A
-// file gets its name when it is complete, and a record of the journal has a checksum. So a run that is killed at any
-// moment leaves frames that are whole or absent.
+// A folder has files by kind and frame, such as snapshot.0010.rapid, and a journal with a record for each frame. A file
+// gets its name when it is complete, and each record of the journal has a checksum. A run that is killed at any moment
+// therefore leaves frames that are complete or absent.
 //
 //   "\x89RAPIDJ\n"                                  the journal's first bytes
 //   8 bytes, 8 bytes, the record; and so on         the length of the record, and its XXH3
@@ -27,21 +27,21 @@ namespace rapid {
 // A file that grows by records, each with its length and checksum.
 class RecordLog {
 public:
-    // Opens a file and keeps what it has, or creates it. The first record is written at the beginning. Throws Error if
-    // the file can't be opened, or is a link.
+    // Opens a file and keeps its contents, or creates it. The first record is written at the beginning. Throws Error if
+    // the file can't be opened or is a link.
     explicit RecordLog(const std::filesystem::path& path);
-    // A log in memory. Processes that fork from this one share it. It is gone when the last of them ends.
+    // Creates a log in memory. Processes that fork from this one share it. It disappears when the last of them ends.
     static RecordLog in_memory();
 
-    // Throws Error if the record can't be written; then the log is as it was.
+    // Throws Error if the record can't be written; the log is then unchanged.
     void append(std::string_view record);
-    // Reads the record at `place`, and moves `place` to the next one. Returns false if no whole record is there.
+    // Reads the record at `place` and moves `place` to the next one. Returns false if there is no complete record.
     bool read(std::uint64_t& place, std::string& record) const;
 
-    // The place of the next record.
+    // Returns the position of the next record.
     std::uint64_t end() const { return end_; }
-    // What is after `place` stays until records replace it: a run that goes on from an early snapshot writes the same
-    // records again, which a later snapshot may know of.
+    // Continues at `place`. Records after it stay until new ones replace them: a run that resumes from an early
+    // snapshot writes the same records again, and a later snapshot may refer to them.
     void go_on_at(std::uint64_t place) { end_ = place; }
     void clear();
 
@@ -61,22 +61,22 @@ public:
     FrameArchive(const FrameArchive&) = delete;
     FrameArchive& operator=(const FrameArchive&) = delete;
 
-    // Makes the folder and locks it for this process. Errors call it `--cache ASKED`, and its user `who`. Throws Error
-    // if another process keeps the lock for five seconds: one that was killed has it until its memory is freed.
+    // Creates the folder and locks it for this process. Errors call it `--cache ASKED` and its user `who`. Throws Error
+    // if another process keeps the lock for five seconds: a killed process holds it until its memory is freed.
     static Descriptor lock(const std::filesystem::path& folder, const std::filesystem::path& asked, const char* who);
 
     const std::filesystem::path& folder() const { return folder_; }
     std::filesystem::path file(std::string_view kind, std::int64_t frame) const;
-    // The files of one kind by frame.
+    // Returns the files of one kind by frame.
     std::map<std::int64_t, std::filesystem::path> files(std::string_view kind) const;
 
-    // Writes a file on a thread of the archive, while at most one other file waits. `write` throws why the file can't
-    // be written. Its captures are released when it is done. Thread-safe, as are the next two.
+    // Writes a file on a thread of the archive, while at most one other file waits. `write` throws if the file can't be
+    // written. Its captures are released when it is done. Thread-safe, as are the next two.
     using Write = std::function<void(const std::filesystem::path& path)>;
     void submit(std::string_view kind, std::int64_t frame, Write write);
     // Waits until all files are written.
     void finish();
-    // Why files could not be written, since the last call.
+    // Returns the reasons why files could not be written since the last call.
     std::vector<std::string> take_failures();
 
     std::filesystem::path journal() const { return folder_ / "journal"; }
@@ -86,9 +86,9 @@ public:
     };
     // Returns nothing if there is no journal. Throws Error if it can't be read.
     std::optional<Records> read_journal() const;
-    // Replaces the journal. Throws Error if it can't be written; then add() does nothing.
+    // Replaces the journal. Throws Error if it can't be written; add() then does nothing.
     void begin_journal(const std::vector<std::string>& records);
-    // Throws Error if the record can't be written; what was there stays.
+    // Throws Error if the record can't be written; the journal is then unchanged.
     void add(std::string_view record);
 
 private:
@@ -101,7 +101,7 @@ private:
     const std::filesystem::path folder_;
     std::optional<RecordLog> journal_;
 
-    std::mutex mutex_;  // of what follows
+    std::mutex mutex_;  // guards the members below
     std::condition_variable changed_;
     std::optional<Job> waiting_;
     bool is_busy_ = false, is_stopping_ = false;

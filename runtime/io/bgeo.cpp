@@ -3,16 +3,15 @@
 // Big-endian throughout:
 //
 //   "Bgeo" 'V' | int32: 5, points, lines, point groups, primitive groups 0, point attributes, 0, 0, 0
-//   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 5 vector), size defaults;
-//                         of texts the type 4, int32 texts, and for each int16 length, text
-//   for each point: float x y z 1, then the attributes; of a text its place, int32
-//   for each line (points/point_lines.h): int32 1, vertices, ':', then the place of each (int16 below 65536 points)
-//   for each group: int16 length, name, int32 points, and a bit for each point in int32 words, from the lowest bit on
+//   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 5 vector), default values;
+//       for strings type 4, int32 count, and for each string int16 length, text
+//   for each point: float x y z 1, then the attributes; for a string its index, int32
+//   for each line (points/point_lines.h): int32 1, vertices, ':', then the index of each (int16 below 65536 points)
+//   for each group: int16 length, name, int32 points, and a bit per point in int32 words, lowest bit first
 //   0x00 0xff: the (empty) extra section
 //
-// int64 (id) is written as int32, and refused where it does not fit. Partio reads no groups. Of primitives polygons are
-// read, and open ones are lines; other primitives, and the groups behind them, are not, as only Houdini knows their
-// size.
+// int64 (id) is written as int32, and refused if it does not fit. Partio reads no groups. Polygons are read, and open
+// ones become lines. Other primitives and the groups after them are skipped, because only Houdini knows their size.
 #include <fmt/format.h>
 
 #include <bit>
@@ -31,7 +30,7 @@
 namespace rapid {
 namespace {
 
-// Marks an ordered group, where the first byte of the length of a group's name is expected.
+// Marks an ordered group. It replaces the first byte of the length of the group's name.
 constexpr unsigned char ordered_mark = 1;
 constexpr std::size_t longest_group_name = 255;
 
@@ -79,7 +78,7 @@ HoudiniType houdini_type(const std::string& name, AttributeType type)
     return FloatType;
 }
 
-// The default value of the attribute, as words.
+// Returns the default value of the attribute as words.
 std::vector<std::uint32_t> default_words(const AnyColumn& column)
 {
     return std::visit(
@@ -97,7 +96,7 @@ std::vector<std::uint32_t> default_words(const AnyColumn& column)
         column);
 }
 
-// The section of all groups.
+// Returns the section of all groups.
 std::string group_section(const PointSet& points)
 {
     BigEndianText section;
@@ -120,7 +119,7 @@ constexpr std::int32_t polygon = 1;
 constexpr std::uint32_t run_of_primitives = 0xffffffff;
 constexpr char closed_mark = '<', open_mark = ':';
 
-// Bytes of a point's number in a primitive.
+// Bytes of a point index in a primitive.
 constexpr std::size_t number_bytes(std::size_t points) { return points < 65536 ? 2 : 4; }
 
 std::string line_section(const PointLines& lines)
@@ -138,7 +137,7 @@ std::string line_section(const PointLines& lines)
     return section.text();
 }
 
-constexpr std::size_t count_offset = 9;  // in the file, of the number of points
+constexpr std::size_t count_offset = 9;  // file offset of the number of points
 constexpr std::string_view end_section("\x00\xff", 2);
 
 void check_count(std::size_t points)
@@ -146,10 +145,10 @@ void check_count(std::size_t points)
     if (points > 0x7fffffff) throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points));
 }
 
-// The points as records hold them: of a text its place, an int32.
+// The points in the form of records: strings are replaced by their index, an int32.
 struct Recorded {
     PointSet points;
-    std::map<std::string, std::vector<Token>> texts;  // by attribute, each in its place
+    std::map<std::string, std::vector<Token>> texts;  // strings of each attribute, by index
 };
 
 Recorded recorded(const PointSet& points)
@@ -167,7 +166,7 @@ Recorded recorded(const PointSet& points)
     return result;
 }
 
-// What comes before the records.
+// Returns the part before the records.
 std::string header_section(const Recorded& recorded, const std::vector<std::string>& names, std::size_t lines)
 {
     BigEndianText header;
@@ -192,7 +191,7 @@ std::string header_section(const Recorded& recorded, const std::vector<std::stri
     return header.text();
 }
 
-// The names of the attributes, besides the position.
+// Returns the names of the attributes except P.
 std::vector<std::string> attribute_names(const PointSet& points)
 {
     std::vector<std::string> names = further_attributes(points);
@@ -258,7 +257,7 @@ private:
     std::size_t count_ = 0;
 };
 
-// Texts come before the points that have them.
+// A stream supports no strings, because they precede the points that use them.
 std::unique_ptr<PointStream> stream_bgeo(OutputFile& file, const PointSet& like)
 {
     if (!names_of_texts(like).empty()) return nullptr;
@@ -295,18 +294,18 @@ private:
     std::string_view section_ = "header";
 };
 
-// The attribute dictionary: the layout of a record.
+// The attribute dictionary, which determines the layout of a record.
 struct Dictionary {
     std::vector<RecordAttribute> attributes;
     std::size_t stride;
     std::vector<std::vector<std::uint32_t>> defaults = {};  // of the attributes, as words
-    std::map<std::string, std::vector<Token>> texts = {};   // of those that hold places of texts
+    std::map<std::string, std::vector<Token>> texts = {};   // of the attributes that store indices of strings
 };
 
 void set_default(PointSet& points, const std::string& name, const std::vector<std::uint32_t>& words)
 {
     AnyColumn* column = points.find(name);
-    if (!column) return;  // numbers that became several columns
+    if (!column) return;  // the numbers were split into several columns
     std::visit(
         [&]<class T>(Column<T>& c) {
             if constexpr (std::is_same_v<T, std::int64_t>) {
@@ -338,7 +337,7 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
             for (std::size_t c = 0; c < size; ++c) attribute.offsets.push_back(stride + 4 * c);
             stride += 4 * size;
         } else if (type == TextType) {
-            reader.take(size);  // its default
+            reader.take(size);  // default value
             stride += size;
             LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
         } else if (type == IndexType) {
@@ -363,7 +362,7 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
     return dictionary;
 }
 
-// The bytes of attributes that no point has, behind their dictionary.
+// Reads the dictionary of attributes that belong to no point. Returns their size in bytes.
 std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
 {
     const Dictionary dictionary = read_dictionary(reader, count, 0);
@@ -372,7 +371,8 @@ std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
     return dictionary.stride;
 }
 
-// Polygons of any attributes; open ones are lines. False: there are primitives of another kind, which end somewhere.
+// Reads polygons with any attributes; open ones become lines. Returns false at another kind of primitive, whose size is
+// unknown.
 bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t vertex_bytes, std::size_t polygon_bytes,
                 PointLines& lines)
 {
@@ -428,7 +428,7 @@ void read_group(BigEndianReader& reader, PointSet& points)
     }
     points.group(name) = std::move(column);
     if (!ordered) return;
-    // The members in order; a negative one is followed by the number of a curve.
+    // The members in order. A negative one is followed by the number of a curve.
     for (std::uint32_t left = reader.integer(4); left > 0; --left)
         if (static_cast<std::int32_t>(reader.integer(4)) < 0) reader.take(4);
 }
@@ -444,7 +444,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
     if (version != 5) throw Error(fmt::format("bgeo version {} can't be read; it must be 5", version));
     const std::size_t n = reader.integer(4);
     const std::uint32_t primitives = reader.integer(4), groups = reader.integer(4);
-    reader.take(4);  // groups of primitives, which come after those of points
+    reader.take(4);  // primitive groups, which follow the point groups
     const std::uint32_t attributes = reader.integer(4), of_vertices = reader.integer(4),
                         of_primitives = reader.integer(4), of_the_whole = reader.integer(4);
 
@@ -456,7 +456,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
                                 reader.rest().size() / dictionary.stride));
     PointSet points =
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
-    for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first, has none
+    for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first attribute, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
     for (const auto& [name, texts] : dictionary.texts) points.set(name, texts_of(points, name, texts));
     PointLines lines{std::move(points), {}, {}};
@@ -471,7 +471,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
     reader.take(stride_of_unread(reader, of_the_whole));
     reader.enter("groups");
     for (std::uint32_t g = 0; g < groups; ++g) read_group(reader, lines.points);
-    reader.enter("extra section");  // the shortest one, which all writers of the format end with
+    reader.enter("extra section");  // the shortest possible one, which every writer of the format appends
     reader.take(end_section.size());
     if (lines.points.find_group(trail_places_group)) return without_trail_places(std::move(lines.points));
     return in_order_of_lines(lines);

@@ -23,13 +23,13 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 
 double difference(double a, double b)
 {
-    if (a == b) return 0;  // infinities too
+    if (a == b) return 0;  // also for infinities
     if (std::isnan(a) && std::isnan(b)) return 0;
     const double d = std::abs(a - b);
     return std::isfinite(d) ? d : infinite;
 }
 
-// The components of a value, so that vectors and scalars of any type are compared in the same way.
+// The components of a value. Vectors and scalars of any type are compared in this form.
 using Numbers = Eigen::Array<double, 4, 1>;
 
 template <class T>
@@ -56,7 +56,7 @@ ValueDifference difference(const A& a, const B& b)
     if constexpr (std::is_integral_v<A> && std::is_integral_v<B>) {
         if (a == b) return {0, 0};
         const double amount = std::abs(static_cast<double>(a) - static_cast<double>(b));
-        return {std::max(1.0, amount), 0};  // int64 that differ may be one double
+        return {std::max(1.0, amount), 0};  // distinct int64 values may be the same double
     } else if constexpr (std::is_same_v<A, Token> || std::is_same_v<B, Token>) {
         if constexpr (std::is_same_v<A, B>)
             if (a == b) return {0, 0};
@@ -70,7 +70,7 @@ ValueDifference difference(const A& a, const B& b)
     }
 }
 
-// Fills in all except names and types, from the differences of the matched pairs.
+// Sets everything except names and types, from the differences of the matched pairs.
 void summarise(AttributeDifference& result, std::vector<double>& amounts, const IdMatch& match, const PointSet& a)
 {
     if (amounts.empty()) return;
@@ -83,7 +83,7 @@ void summarise(AttributeDifference& result, std::vector<double>& amounts, const 
     result.max = amounts[worst];
     result.worst_id = result.max > 0 ? a.id()[match.a[worst]] : -1;
     result.rms = std::sqrt(squares / static_cast<double>(amounts.size()));
-    // The least value that at least 95 % do not exceed.
+    // The smallest value that at least 95 % do not exceed.
     const std::size_t rank = (95 * amounts.size() + 99) / 100 - 1;
     std::nth_element(amounts.begin(), amounts.begin() + static_cast<std::ptrdiff_t>(rank), amounts.end());
     result.p95 = amounts[rank];
@@ -179,7 +179,7 @@ void check_ids_differ(const PointSet& points, const char* set)
 IdMatch match_by_id(const PointSet& a, const PointSet& b)
 {
     const std::vector<std::size_t> order_a = id_order(a.id()), order_b = id_order(b.id());
-    // Also behind the last one; without an order each has its own place.
+    // Also valid past the last element. Without an order, elements keep their own index.
     const auto index = [](const std::vector<std::size_t>& order, std::size_t i) {
         return i < order.size() ? order[i] : i;
     };
@@ -237,7 +237,7 @@ Comparison compare(const PointSet& a, const PointSet& b, double tolerance)
 
 namespace {
 
-// `3 points are only in A: ids 1, 2, 7`
+// Returns a text such as `3 points are only in A: ids 1, 2, 7`.
 std::string missing_text(const std::vector<std::int64_t>& ids, const char* set)
 {
     if (ids.empty()) return "";
@@ -271,7 +271,7 @@ std::string group_text(const AttributeDifference& d, std::size_t width)
     return head + (d.same ? std::string("equal\n") : fmt::format("{} differ (id {} first)\n", d.different, d.worst_id));
 }
 
-// The name of a type. A set that lacks the attribute has none.
+// Returns the name of a type, or nothing if the set lacks the attribute.
 std::optional<std::string> known(const std::string& type) { return type.empty() ? std::nullopt : std::optional(type); }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The differences of two point sets, between points of the same id, as `rapid diff` prints them.
+// Compares two point sets by id, for `rapid diff`.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,18 @@
 namespace rapid {
 
 // The points of two sets with the same id: a[i] and b[i] are the indices of a pair, in order of id. Repeated ids are
-// matched in turn.
+// matched in order.
 struct IdMatch {
     std::vector<std::size_t> a, b;
     std::vector<std::int64_t> only_a, only_b;  // ids without a match
 };
 IdMatch match_by_id(const PointSet& a, const PointSet& b);
 
-// Over the points that are in both sets. A difference is the norm of the difference vector, or the absolute value of a
-// scalar difference; NaN differs by 0 from NaN, and infinitely from everything else.
+// Differences of an attribute over the points in both sets. A difference is the norm of the difference vector, or the
+// absolute value of a scalar difference. NaN differs by 0 from NaN, and infinitely from everything else.
 struct AttributeDifference {
     std::string name;
-    std::string type_a, type_b;  // empty where the set lacks it
+    std::string type_a, type_b;  // empty if the set lacks it
     double max = 0, rms = 0, p95 = 0;
     std::int64_t worst_id = -1;  // the point with the largest difference; -1 without differences
     std::size_t different = 0;   // points beyond the tolerance
@@ -33,17 +33,17 @@ struct Comparison {
     std::vector<std::int64_t> only_a, only_b;  // ids
     double tolerance = 0;
     double tolerance_P = 0;                       // m
-    std::vector<AttributeDifference> attributes;  // P, v and the others by name
+    std::vector<AttributeDifference> attributes;  // P and v first, then the others by name
     std::vector<AttributeDifference> groups;      // `different` counts members; a missing group is empty
     bool same = true;
 };
 
-// P is the same within `tolerance` times the diagonal of the joint bounding box; other floats are within `tolerance`
-// times the larger of the two values (norms of vectors); integers and groups only if equal. An integer and a float
-// attribute are compared by value, because .csv does not distinguish them. An attribute of only one set is a
-// difference, unless there are no points.
+// P is the same within `tolerance` times the diagonal of the joint bounding box. Other floats are the same within
+// `tolerance` times the larger of the two values (norms of vectors), and integers and groups only if equal. An integer
+// and a float attribute are compared by value, because .csv does not distinguish them. An attribute of only one set is
+// a difference, unless there are no points.
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance = 1e-6);
 std::string to_text(const Comparison& comparison);
-std::string to_json(const Comparison& comparison);  // an object, in one line
+std::string to_json(const Comparison& comparison);  // one object on one line
 
 }  // namespace rapid

@@ -2,10 +2,10 @@
 //
 //   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then group:NAME, 0 or 1
 //
-// Floats have 9 significant digits, which identify the float. Texts are in quotes, of which one in a text is doubled
-// (RFC 4180). The file does not hold types: read back, a column whose first value is no number is of texts; any other
-// except id is float, unless it holds only integers and float would round one of them; then it is int32, or int64 where
-// that is too small.
+// Floats have 9 significant digits, which identify the float. Strings are quoted, with quotes inside doubled (RFC
+// 4180). The file does not store types. On reading, a column whose first value is not a number holds strings. Any other
+// column except id is float, unless it contains only integers and float would round one of them. It is then int32, or
+// int64 if that is too small.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -95,7 +95,7 @@ CsvTable csv_table(const PointSet& points)
     return table;
 }
 
-// The lines of the points at [begin, end) of the order.
+// Returns the lines of the points [begin, end) of the order.
 std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& order, std::size_t begin, std::size_t end)
 {
     std::size_t size = table.numbers * (number_chars + 1) * (end - begin);
@@ -153,7 +153,7 @@ std::unique_ptr<PointStream> stream_csv(OutputFile& file, const PointSet& like)
     return std::make_unique<CsvStream>(file, like);
 }
 
-// The end of the line that begins here: a newline that is not within quotes.
+// Returns the end of the line that begins here: a newline outside quotes.
 std::size_t line_end(std::string_view text, std::size_t begin, bool has_quotes)
 {
     if (!has_quotes) return text.find('\n', begin);
@@ -165,7 +165,7 @@ std::size_t line_end(std::string_view text, std::size_t begin, bool has_quotes)
     return std::string_view::npos;
 }
 
-// The start of each line, without the header and trailing empty lines.
+// Returns the start of each line, without the header and trailing empty lines.
 std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
 {
     const bool has_quotes = text.find('"') != std::string_view::npos;
@@ -181,18 +181,18 @@ std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
     return starts;
 }
 
-// A column of numbers: as double, which holds every float and int32; and as int64, where all of them are integers.
+// A column of numbers: as double, which represents every float and int32, and as int64 while all of them are integers.
 struct CsvColumn {
     std::vector<double> numbers;
     std::vector<std::int64_t> whole;
     bool is_whole = true;
-    std::vector<Token> texts = {};  // in place of numbers
+    std::vector<Token> texts = {};  // if it holds strings instead
     bool is_text = false;
 
     bool float_would_round() const
     {
         return std::any_of(whole.begin(), whole.end(), [](std::int64_t value) {
-            // Above 2^53 double is not exact either, and the cast back could overflow.
+            // Above 2^53 a double is not exact either, and the cast back could overflow.
             return std::abs(value) > (std::int64_t{1} << 53) ||
                    static_cast<std::int64_t>(static_cast<float>(value)) != value;
         });
@@ -222,7 +222,7 @@ const char* parse_text(const char* at, const char* stop, std::string& text)
     return nullptr;
 }
 
-// Whether a value is no number.
+// Returns true if a value is not a number.
 bool is_text(const char* at, const char* stop)
 {
     double number = 0;
@@ -231,7 +231,7 @@ bool is_text(const char* at, const char* stop)
            (parsed.ptr != stop && *parsed.ptr != ',' && *parsed.ptr != '\n' && *parsed.ptr != '\r');
 }
 
-// Those of which the first line has no number, of the columns that may be of texts.
+// Marks columns as strings if the first line has no number there. may_be_text: columns for which this is allowed.
 void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std::vector<CsvColumn>& columns)
 {
     const char *at = line.data(), *stop = line.data() + line.size();
@@ -247,7 +247,7 @@ void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
                                      const std::vector<std::string>& names, const std::vector<bool>& may_be_text)
 {
-    constexpr double bytes_a_number = sizeof(double) + sizeof(std::int64_t);  // as which it is kept until all are read
+    constexpr double bytes_a_number = sizeof(double) + sizeof(std::int64_t);  // per number, until all lines are read
     const double bytes = bytes_a_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
     if (!fits_in_memory(bytes))
         throw beyond_memory(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
@@ -262,7 +262,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
         column.numbers.resize(starts.size());
         column.whole.resize(starts.size());
     }
-    std::vector<std::atomic<bool>> broken(names.size());  // columns with a number that is not an integer
+    std::vector<std::atomic<bool>> broken(names.size());  // columns with a non-integer number
     for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
         std::string word;
         TokensOfTexts token_of_word;

@@ -52,7 +52,7 @@ void extend(AttributeSummary& summary, const Column<Token>& column)
     summary.first_texts.assign(texts.begin(), texts.end());
 }
 
-// "bark" "leaf" ... of 40
+// Returns a text such as "bark" "leaf" ... of 40 texts.
 std::string text_list(const AttributeSummary& a)
 {
     std::string list;

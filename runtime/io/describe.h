@@ -1,4 +1,4 @@
-// A summary of a point set, as `rapid info` prints it.
+// A summary of a point set for `rapid info`.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace rapid {
 struct AttributeSummary {
     std::string name;
     AttributeType type;
-    bool uniform;                               // all points have the same bits
-    std::vector<double> min, max;               // of each component; empty where no value is finite
+    bool uniform;                               // all points have bit-identical values
+    std::vector<double> min, max;               // per component; empty if no value is finite
     std::size_t not_finite = 0;                 // points with a NaN or an infinity
-    std::size_t texts = 0;                      // different ones, of a string
-    std::vector<std::string> first_texts = {};  // in order, the first few of them
+    std::size_t texts = 0;                      // number of distinct strings
+    std::vector<std::string> first_texts = {};  // the first few in order
 };
 
 struct GroupSummary {
@@ -34,6 +34,6 @@ struct PointSummary {
 
 PointSummary describe(const PointSet& points);
 std::string to_text(const PointSummary& summary);
-std::string to_json(const PointSummary& summary);  // an object, in one line
+std::string to_json(const PointSummary& summary);  // one object on one line
 
 }  // namespace rapid

@@ -21,7 +21,7 @@
 namespace rapid {
 namespace {
 
-constexpr int input = STDIN_FILENO, output = 3;  // of ffmpeg
+constexpr int input = STDIN_FILENO, output = 3;  // ffmpeg's descriptors
 
 std::string path_of_ffmpeg()
 {
@@ -30,7 +30,8 @@ std::string path_of_ffmpeg()
         "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
 }
 
-// Constant quality, that of a picture nearly; the matrix and the primaries of HD video, which players assume.
+// Returns encoder options: constant quality, close to that of the pictures, with the matrix and primaries of HD video,
+// which players assume.
 std::vector<std::string> encoder_for(std::string_view extension)
 {
     const std::vector<std::string> hd = {"-vf",
@@ -51,7 +52,7 @@ std::vector<std::string> encoder_for(std::string_view extension)
         arguments = {"-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-row-mt", "1", "-f", "webm"};
         arguments.insert(arguments.begin(), hd.begin(), hd.end());
     } else {
-        // A palette for each picture: one for all of them would have to wait for the last.
+        // Uses a palette per picture, because a common one would have to wait for the last picture.
         arguments = {"-filter_complex", "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1", "-f",
                      "gif"};
     }
@@ -87,7 +88,7 @@ Film::Film(OutputFile& file, std::string_view extension, int width, int height, 
                                       "pipe:0",
                                       "-an"};
     for (std::string& word : encoder_for(extension)) words.push_back(std::move(word));
-    // By its descriptor: the file has no name yet.
+    // Passes the descriptor, because the file has no name yet.
     for (const char* word : {"-y", "/proc/self/fd/3"}) words.emplace_back(word);
 
     int ends[2];
@@ -127,14 +128,14 @@ void Film::add(const Picture& picture)
 
 void Film::finish()
 {
-    frames_ = Descriptor();  // the end of its input
+    frames_ = Descriptor();  // ends its input
     const int status = wait();
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail();
 }
 
 int Film::wait()
 {
-    siginfo_t ended = {};  // its number is another program's when it has been waited for
+    siginfo_t ended = {};  // WNOWAIT: once reaped, its process id may belong to another program
     while (waitid(P_PID, static_cast<id_t>(ffmpeg_), &ended, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
     }
     writing_.reset();

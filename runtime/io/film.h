@@ -1,4 +1,4 @@
-// Films: pictures that ffmpeg, a program of its own, makes one file of.
+// Films, which the external program ffmpeg encodes from pictures.
 #pragma once
 
 #include <sys/types.h>
@@ -14,36 +14,37 @@
 
 namespace rapid {
 
-// A film that is being written. Pictures go through a socket to ffmpeg, and are stored nowhere. The file has its name
-// when it is complete, and is gone where it is not (OutputFile).
+// A film that is being written. Pictures are sent to ffmpeg through a socket and are stored nowhere. The file gets its
+// name when it is complete, and disappears otherwise (OutputFile).
 class Film {
 public:
-    // extension: .mp4, .webm or .gif. Error: no ffmpeg (require_ffmpeg()); a size that the format can't have.
+    // extension: .mp4, .webm or .gif. Throws Error if there is no ffmpeg (require_ffmpeg()) or the format does not
+    // allow the size.
     Film(OutputFile& file, std::string_view extension, int width, int height, double fps);
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
-    // Ends ffmpeg, where finish() has not.
+    // Ends ffmpeg, unless finish() has.
     ~Film();
 
-    // The next picture, of the film's size. Error: what ffmpeg says.
+    // Adds a picture of the film's size. Throws Error with ffmpeg's message.
     void add(const Picture& picture);
-    // Waits for ffmpeg. Error: what it says.
+    // Waits for ffmpeg. Throws Error with its message.
     void finish();
 
 private:
     [[noreturn]] void fail();
     int wait();
 
-    Descriptor frames_;    // to ffmpeg's input
-    Descriptor messages_;  // what it says, a file without a name
-    pid_t ffmpeg_ = -1;    // -1: it has ended
+    Descriptor frames_;    // to ffmpeg's standard input
+    Descriptor messages_;  // ffmpeg's output, in an unnamed file
+    pid_t ffmpeg_ = -1;    // -1 once it has ended
     std::optional<WritingProgram> writing_;
 };
 
-// Error: there is no ffmpeg on the PATH, with the package that has it.
+// Throws Error if ffmpeg is not on the PATH. The message names the package to install.
 void require_ffmpeg();
 
-// A film of even edges only: its colours are halved along both (4:2:0).
+// Returns true if the format requires even edges, because its colours are halved in both directions (4:2:0).
 bool needs_even_edges(std::string_view extension);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// .mp4, .webm, .gif: films (film.h). FrameWriter makes one of all frames; here a film has a single picture.
+// .mp4, .webm, .gif: films (film.h). FrameWriter makes one film of all frames; here a film has a single picture.
 #include "runtime/io/film.h"
 #include "runtime/io/format.h"
 #include "runtime/picture/frame_picture.h"

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_waiting = 100;  // pictures; each may hold the shapes of its frame, some megabytes
+constexpr std::size_t most_waiting = 100;  // pictures; each may hold several megabytes of shapes
 
 }  // namespace
 
@@ -55,7 +55,7 @@ void FrameWriter::finish(bool complete)
     }
     for (auto& [output, pictures] : pictures_) {
         if (!pictures.waiting.empty()) write_without_points(pictures);
-        pictures.painter.reset();  // it holds the shapes of the last frame
+        pictures.painter.reset();  // releases the shapes of the last frame
     }
     const auto films = std::exchange(films_, {});
     if (!complete) return;
@@ -174,7 +174,7 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
         throw error.at({path, 0});
     } catch (const std::bad_alloc&) {
         throw;
-    } catch (const std::exception& error) {  // of a library
+    } catch (const std::exception& error) {  // from a library
         throw Error(error.what()).at({path, 0});
     }
     const double spent = stopwatch.seconds();

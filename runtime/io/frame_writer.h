@@ -1,8 +1,8 @@
 // Writes frames while the next ones are computed.
 //
-// A thread of its own writes one frame after another (a format uses all threads for one file). When a few frames are
-// queued, submit() blocks, so that memory stays bounded. A file gets its name only when it is complete, and files
-// written before an error stay. A queued frame shares its columns with later ones, and costs only those that change.
+// A separate thread writes one frame after another (a format uses all threads for one file). When a few frames are
+// queued, submit() blocks to bound memory. A file gets its name only when it is complete, and files written before an
+// error are kept. A queued frame shares its columns with later ones, and costs memory only for those that change.
 #pragma once
 
 #include <chrono>
@@ -32,29 +32,30 @@ public:
         double seconds;
         std::uint64_t bytes;
         std::chrono::steady_clock::time_point end = {};
-        bool film = false;  // a frame of a film, which is complete with its last one
-        // Of a picture: what those of later frames go on from; null where it has waited for points.
+        bool film = false;  // part of a film, which is complete only with its last frame
+        // For a picture: the state from which later frames continue. Null if the picture had to wait for points.
         std::shared_ptr<const PictureFit> fit = nullptr;
     };
 
     using Write = std::function<void(const std::filesystem::path& file, const PointSet& points)>;
-    // waiting: the most frames in the queue, besides the one that is being written. write: what writes a file in place
-    // of the format of its extension, or empty. Error: an unknown extension.
+    // waiting: largest number of frames in the queue, in addition to the one being written. write: writes a file
+    // instead of the format of its extension, unless empty. Throws Error if an extension is unknown.
     explicit FrameWriter(const std::vector<OutputTarget>& targets, std::size_t waiting = 2, Write write = {});
-    // Completes the file that is being written, and drops the queue, which finish() would write.
+    // Completes the file that is being written and drops the queue; finish() would write it.
     ~FrameWriter();
 
-    // Queues a frame of one output for all targets. Throws the first error of an earlier frame.
-    // before: what the picture of an earlier frame, of another run, has left, in place of those of this one.
+    // Queues a frame of one output for all targets. Throws the first error of an earlier frame. before: picture state
+    // from another run, to continue from instead of this run's own state.
     void submit(PointSet points, FrameInfo frame, std::string output = "main",
                 std::shared_ptr<const PictureFit> before = nullptr);
-    // Waits until all frames are written. Throws the first error. complete: whether they are all that there should be;
-    // a film of some of them is dropped.
+    // Waits until all frames are written. Throws the first error. complete: whether the run has all its frames; an
+    // incomplete film is dropped.
     void finish(bool complete = true);
 
-    // The files that are complete since the last call, in order: a run of many frames keeps none of them.
+    // Returns the files completed since the last call, in order. The writer does not keep them, because a run may have
+    // many frames.
     std::vector<Written> take_written();
-    // The first of the submitted frames of which a file is still to come.
+    // Returns the first submitted frame with a file that is not written yet.
     std::optional<int> first_unwritten() const;
 
 private:
@@ -69,8 +70,8 @@ private:
         std::string output;
         std::shared_ptr<const PictureFit> before;
     };
-    // Pictures of one output. Those before the first points wait for them, because the camera is fitted to points. They
-    // hold none, but the shapes of their frame: a hundred wait, and where no points come they show the shapes alone.
+    // Pictures of one output. Those before the first points wait, because the camera is fitted to points. They hold no
+    // points, but the shapes of their frame, so at most a hundred wait. If no points come, they show only the shapes.
     struct Pictures {
         PictureFit fit;
         std::shared_ptr<Painter> painter;
@@ -105,9 +106,9 @@ private:
     std::deque<Job> jobs_;
     bool busy_ = false, stopping_ = false;
     std::exception_ptr error_;
-    std::vector<Written> written_;    // since they were last taken
-    std::map<int, std::size_t> due_;  // by frame: files that are still to come
-    std::thread thread_;              // the last member: it starts when the others are initialised
+    std::vector<Written> written_;    // since the last take_written()
+    std::map<int, std::size_t> due_;  // unwritten files per frame
+    std::thread thread_;              // must be the last member, because it uses the others
 };
 
 }  // namespace rapid

@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// By digits of eleven bits, the last one first; as many as the ids span.
+// Radix sort by digits of eleven bits, least significant first, with as many digits as the ids span.
 std::vector<std::size_t> id_order(const Column<std::int64_t>& id)
 {
     constexpr int bits = 11;

@@ -1,4 +1,4 @@
-// Points in order of id, which depends neither on a file format nor on removed points.
+// Orders points by id, which depends neither on a file format nor on removed points.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace rapid {
 
-// The indices of the points in order of id (stable), shape [size]; empty where they are in order already.
+// Returns the indices of the points in order of id (stable), shape [size]; empty if they are already in order.
 std::vector<std::size_t> id_order(const Column<std::int64_t>& id);
 
-// The points with these indices, shape [order]; the set itself where it is empty.
+// Returns the points with these indices, shape [order], or the set itself if `order` is empty.
 PointSet reordered(const PointSet& points, const std::vector<std::size_t>& order);
 
 }  // namespace rapid

@@ -20,7 +20,7 @@
 namespace rapid {
 namespace {
 
-// Points that are merged together; their list stays in the second-level cache.
+// Points that are merged together. Their list stays in the second-level cache.
 constexpr std::size_t bucket_points = 32768;
 
 void check_ids(const PointSet& points, std::size_t part, std::size_t count, const std::string& name)
@@ -41,7 +41,7 @@ void check_ids(const PointSet& points, std::size_t part, std::size_t count, cons
     });
 }
 
-// The type of a column in all parts that have points. Error: there is none.
+// Returns the type of a column in all parts that have points. Throws Error if the types are incompatible.
 AttributeType common_type(const std::string& name, const std::vector<PointSet>& parts,
                           const std::vector<std::string>& names)
 {
@@ -79,7 +79,7 @@ void check_columns(const std::vector<PointSet>& parts, const std::vector<std::st
                 .at({names[k], 0});
 }
 
-// The ids between two, wherever they are: [begin[k], end[k]) of part k, at `first` in the result.
+// The points in a range of ids: [begin[k], end[k]) of part k, starting at `first` in the result.
 struct Bucket {
     std::vector<std::size_t> begin, end;
     std::size_t first = 0, size = 0;
@@ -112,7 +112,7 @@ std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
     return buckets;
 }
 
-// A bucket's values of a column, those of each part one after the other.
+// Reads a bucket's values of a column, part by part.
 template <class T>
 void read_bucket(const std::vector<Strided<T>>& parts, const Bucket& bucket, std::vector<T>& values)
 {
@@ -125,7 +125,7 @@ void read_bucket(const std::vector<Strided<T>>& parts, const Bucket& bucket, std
     }
 }
 
-// For each point of the result its place among those of the parts, in order of id.
+// Finds, for each point of the result in order of id, its index among the points of the parts.
 void find_sources(const std::vector<std::int64_t>& ids, std::vector<std::uint32_t>& sources)
 {
     sources.clear();
@@ -138,7 +138,7 @@ void find_sources(const std::vector<std::int64_t>& ids, std::vector<std::uint32_
         std::sort(sources.begin(), sources.end(), [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; });
         return;
     }
-    // Ids are dense, mostly: each has its own place.
+    // Usually ids are dense, so each has its own slot.
     constexpr std::uint32_t none = UINT32_MAX;
     thread_local OfThread<std::vector<std::uint32_t>> kept;
     std::vector<std::uint32_t>& by_id = *kept;
@@ -157,13 +157,13 @@ T converted(const From& value)
     if constexpr (std::is_convertible_v<From, T>)
         return static_cast<T>(value);
     else
-        return Column<T>::zero();  // of a part without points
+        return Column<T>::zero();  // the part has no points
 }
 
 template <class T, class Get>
 Gather gather_into(std::span<T> values, const std::vector<PointSet>& parts, const Get& columns_of)
 {
-    // A column of the same type in all parts, which is the rule, or one that is converted.
+    // Handles both a column of the same type in all parts, which is the usual case, and one that must be converted.
     std::vector<Strided<T>> from;
     for (const PointSet& part : parts)
         if (const Column<T>* column = columns_of(part)) from.push_back(column->read());
@@ -192,7 +192,7 @@ AnyColumn column_of(const AnyColumn& column)
         column);
 }
 
-// The parts, with one type for each column.
+// Returns the parts with one type per column.
 std::vector<PointSet> of_one_type(const std::vector<PointSet>& parts, const std::vector<std::string>& names)
 {
     std::vector<PointSet> result = parts;

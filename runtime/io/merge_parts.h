@@ -1,4 +1,4 @@
-// The points of the parts of a run as one set.
+// Merges the parts of a run into one set.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace rapid {
 
-// parts: number k + 1 of all parts at k, whose points are in order of id. In order of id, as the whole run has them.
-// Columns must be of the same names; of the same types, too, but that whole numbers become floats, or longer, where a
-// text file has told no better. names: of the parts, for errors. Error: a point that belongs to another part; columns
-// that differ; points out of order.
+// Returns all points in order of id, as in the whole run. parts[k] is part number k + 1, with points in order of id.
+// All parts must have the same columns with the same types. If text files have lost the types, integers are converted
+// to floats or to wider integers. names: of the parts, for errors. Throws Error if a point belongs to another part, if
+// columns differ, or if points are out of order.
 PointSet merge_parts(const std::vector<PointSet>& parts, const std::vector<std::string>& names);
 
 }  // namespace rapid

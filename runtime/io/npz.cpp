@@ -1,14 +1,14 @@
-// .npz: NumPy's archive (numpy.lib.format): a zip file of arrays, a member NAME.npy for each attribute.
+// .npz: NumPy's archive (numpy.lib.format), a zip file of arrays with a member NAME.npy for each attribute.
 //
 //   0x93 "NUMPY" 1 0 | uint16: bytes of the header | {'descr': '<f4', 'fortran_order': False, 'shape': (n, 3), }
 //
 // padded by spaces to 64 bytes, then the numbers. P and every vec3 are <f4 (n, 3), a quaternion <f4 (n, 4) x y z w, a
-// float <f4 (n,), integers <i4 and <i8, a text <Un (n characters of its longest, 4 bytes each); a group is |b1
-// group_NAME. Members are stored, as by numpy.savez.
+// float <f4 (n,), integers <i4 and <i8, and a string <Un (n characters of the longest one, 4 bytes each). A group is
+// |b1 group_NAME. Members are stored uncompressed, as by numpy.savez.
 //
-// Reads archives of numpy.savez and numpy.savez_compressed, of any order of bytes and of dimensions. Arrays of objects
-// (which are Python programs), of more than two dimensions, of more than 16 numbers a point, and of other than n rows
-// are left out; a |b1 (n,) is a group.
+// Reads archives of numpy.savez and numpy.savez_compressed, in any byte and dimension order. Skips arrays of objects
+// (which are Python programs), with more than two dimensions, with more than 16 numbers per point, or without n rows. A
+// |b1 (n,) is a group.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -34,7 +34,7 @@ std::string_view numpy_type(AttributeType type)
     return type == AttributeType::Int64 ? "<i8" : "<f4";
 }
 
-// The characters of a text.
+// Returns the characters of a string.
 std::u32string characters_of(Token token)
 {
     std::u32string result;
@@ -94,7 +94,7 @@ void write_texts(ZipWriter& zip, const std::string& name, const Column<Token>& c
     const std::size_t bytes = longest * sizeof(char32_t);
     zip.begin(name + std::string(suffix), header.size() + column.size() * bytes);
     zip.write(header.data(), header.size());
-    // Each is as long as the longest, in the file alone.
+    // Each string is padded to the length of the longest. This happens only in the file.
     constexpr std::size_t most = std::size_t{1} << 20;
     std::string piece;
     for (std::size_t i = 0; i < column.size(); ++i) {
@@ -141,7 +141,7 @@ void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
     zip.finish();
 }
 
-// The header of an array: Python's dictionary of a text, a truth value and a tuple of whole numbers.
+// The header of an array: a Python dictionary with a string, a bool and a tuple of integers.
 class NpyHeader {
 public:
     explicit NpyHeader(std::string_view text) : text_(text)
@@ -157,7 +157,7 @@ public:
             else if (key == "shape")
                 read_shape();
             else
-                return;  // a list: a structure of several types
+                return;  // a list, which denotes a structure of several types
             accept(',');
         }
         complete = true;
@@ -217,7 +217,7 @@ private:
     std::string_view text_;
 };
 
-// Of a text: its characters, which are UInt32 (U) or UInt8 (S), as many as characters.
+// An element type. For strings `scalar` is the character type, UInt32 (U) or UInt8 (S), and `characters` their count.
 struct NumberType {
     ScalarType scalar;
     ByteOrder order;
@@ -238,7 +238,7 @@ std::optional<NumberType> text_type(std::string_view descr)
                       descr[0] == '>' ? ByteOrder::Big : ByteOrder::Little, false, characters};
 }
 
-// Nothing for types that are no numbers.
+// Returns nothing for types other than numbers.
 std::optional<NumberType> number_type(std::string_view descr)
 {
     static const std::map<std::string_view, ScalarType> types = {
@@ -254,12 +254,12 @@ std::optional<NumberType> number_type(std::string_view descr)
 
 struct Array {
     NumberType type;
-    std::size_t rows, numbers;  // of each row
+    std::size_t rows, numbers;  // per row
     bool fortran;
     std::span<const unsigned char> bytes;
 };
 
-// Nothing for arrays that are no attribute.
+// Returns nothing for arrays that can't be an attribute.
 std::optional<Array> array_in(std::span<const unsigned char> bytes)
 {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -281,7 +281,7 @@ std::optional<Array> array_in(std::span<const unsigned char> bytes)
     return Array{*type, rows, numbers, header.fortran, data};
 }
 
-// Shorter ones end with zeros.
+// Reads strings. Shorter ones end with zeros.
 Column<Token> texts_in(const Array& array)
 {
     Column<Token> column;
@@ -314,7 +314,7 @@ void read_array(PointSet& points, const std::string& name, const Array& array)
     attribute.group = array.type.truth && array.numbers == 1;
     attribute.name = attribute.group && name.starts_with(group_prefix) ? name.substr(group_prefix.size()) : name;
     const std::size_t number = scalar_bytes(array.type.scalar);
-    // In Fortran's order all first numbers come first.
+    // In Fortran order all first components come first.
     for (std::size_t c = 0; c < array.numbers; ++c)
         attribute.offsets.push_back(array.fortran ? c * array.rows * number : c * number);
     const std::size_t stride = array.fortran ? number : array.numbers * number;

@@ -1,12 +1,12 @@
-// .obj: Wavefront's text, as lines.
+// .obj: Wavefront's text format, as lines.
 //
-//   v x y z          each point, and behind them the places of trails
-//   p 1              a point of no line
-//   l 1 7 8 ...      a line: a trail, from the point itself backwards, or a curve (points/point_lines.h)
+//   v x y z       each point, followed by the positions of trails
+//   p 1           a point on no line
+//   l 1 7 8 ...   a line: a trail, from the point itself backwards, or a curve (points/point_lines.h)
 //
-// It holds places alone: no velocities, attributes and groups. The places of the lines of any such file are read as
-// points in the order of the lines, with the number of the line as the attribute `curve`, from 0; where there are no
-// lines, all of its vertices are.
+// It stores only positions, without velocities, attributes and groups. From any .obj file, the vertices of its lines
+// are read as points in line order, with the index of the line as the attribute `curve`, from 0. If there are no lines,
+// all vertices are read.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -26,7 +26,7 @@ void write_obj(OutputFile& file, const PointSet& given, const FrameInfo&)
     const PointSet& points = lines.points;
     std::vector<bool> is_on_line(points.size());
     for (const std::uint32_t i : lines.vertices) is_on_line[i] = true;
-    std::vector<std::size_t> begin = {0};  // of each line among the vertices
+    std::vector<std::size_t> begin = {0};  // start of each line among the vertices
     for (const std::uint32_t size : lines.sizes) begin.push_back(begin.back() + size);
 
     const std::string head = "# Rapid points, metres\n";
@@ -76,7 +76,8 @@ private:
     std::string_view line_;
 };
 
-// A line names a place by two bytes. A list that grows has three times its bytes for a moment; then come the columns.
+// A line takes at least two bytes per position. A growing list briefly takes three times its size, before the columns
+// are created.
 void check_memory(std::size_t places)
 {
     constexpr double bytes_a_place = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);
@@ -84,7 +85,7 @@ void check_memory(std::size_t places)
         throw beyond_memory(fmt::format("lines of at least {} places", places), bytes, "split the file");
 }
 
-// The whole of a word, or Error.
+// Parses a complete word. Throws Error if it is not a number.
 template <class T>
 T number_of(std::string_view word, std::size_t line)
 {
@@ -95,8 +96,8 @@ T number_of(std::string_view word, std::size_t line)
     return number;
 }
 
-// The vertex that an element of a line names: from 1, or from the last one backwards below 0; what follows a slash
-// is of its texture.
+// Returns the vertex that an element of a line refers to: from 1, or backwards from the last one if negative. The part
+// after a slash is its texture.
 std::size_t vertex_of(std::string_view word, std::size_t vertices, std::size_t line)
 {
     const auto index = number_of<std::int64_t>(word.substr(0, word.find('/')), line);

@@ -1,4 +1,4 @@
-// Text or bytes that are made in parallel and appended to a file in order.
+// Generates text or bytes in parallel and appends them to a file in order.
 #pragma once
 
 #include <tbb/parallel_pipeline.h>

@@ -1,10 +1,10 @@
 // .ply: binary little-endian PLY, an element "vertex".
 //
-// P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, a
-// quaternion also NAMEw; integers are int (an int64 that does not fit is refused); a group is uchar group_NAME. Lines
+// P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, and
+// a quaternion also NAMEw. Integers are int (an int64 that does not fit is refused). A group is uchar group_NAME. Lines
 // (points/point_lines.h) are elements "edge" with vertex1 and vertex2.
 //
-// Reads any PLY whose vertices have no lists (files/ply_file.h); red green blue become Cd.
+// Reads any PLY whose vertices have no lists (files/ply_file.h). red green blue become Cd.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::string_view white_space = " \t\r\n";
 
-// The names of an attribute's components in the file.
+// Returns the names of an attribute's components in the file.
 std::vector<std::string> ply_names(const std::string& name, const AnyColumn& column)
 {
     if (name == "P") return {"x", "y", "z"};
@@ -38,7 +38,7 @@ std::string_view ply_type(const AnyColumn& column)
     return type == AttributeType::Int32 || type == AttributeType::Int64 ? "int" : "float";
 }
 
-// element edge: two neighbours on a line each.
+// Returns the elements "edge". Each connects two neighbours on a line.
 std::string edge_section(const PointLines& lines)
 {
     std::string section;
@@ -92,7 +92,7 @@ void write_ply(OutputFile& file, const PointSet& given, const FrameInfo&)
     file.write_at(file.appended() + records.record_bytes() * points.size(), edges.data(), edges.size());
 }
 
-// Rapid's name for a property; the components of an attribute share a stem.
+// Returns Rapid's name for a property. The components of an attribute share a stem.
 std::string rapid_name(const std::string& property)
 {
     static const std::map<std::string, std::string> known = {{"x", "Px"},    {"y", "Py"},      {"z", "Pz"},
@@ -162,7 +162,7 @@ PointSet read_ply(const std::filesystem::path& path)
             file.pass_over(element);
     }
     if (!points) throw Error("the PLY file has no element \"vertex\"");
-    const bool has_trails = points->find_group(trail_places_group) != nullptr;  // whose edges are in the points
+    const bool has_trails = points->find_group(trail_places_group) != nullptr;  // the points define the trails
     for (const PlyElement& element : file.elements())
         if (element.name != "vertex" && element.count > 0 && !(has_trails && element.name == "edge"))
             LeftOut::add(fmt::format("its {} elements \"{}\"", element.count, element.name));

@@ -1,4 +1,4 @@
-// .png: a picture of the points (picture.h), 8 bits a channel, sRGB.
+// .png: a picture of the points (picture.h), 8 bits per channel, sRGB.
 #include <string>
 
 #include "runtime/io/format.h"

@@ -22,7 +22,7 @@ std::unique_ptr<PointStream> begin_stream(const Format& format, OutputFile& file
     return found != streams().end() ? found->second(file, like) : nullptr;
 }
 
-// Calls f; its errors name the file.
+// Calls f and adds the file to its errors.
 template <class F>
 auto of_file(const std::filesystem::path& path, const F& f)
 {
@@ -78,7 +78,7 @@ void PointFile::finish()
 
 void PointFile::keep(const PointSet& points)
 {
-    // Columns grow by as much again, and writing takes a part of them.
+    // Columns may grow to twice their size, and writing takes a part of them.
     const double bytes = static_cast<double>(kept_.bytes() + points.bytes());
     if (!fits_in_memory(bytes))
         throw beyond_memory(

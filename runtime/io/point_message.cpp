@@ -28,7 +28,7 @@ Column<T> receive_column(std::size_t points, MessageReader& message)
     return column;
 }
 
-// The other process has its own tokens.
+// The other process has its own tokens, so strings are sent.
 void send_column(const Column<Token>& column, MessageWriter& message)
 {
     const TextTable table = text_table(column);
@@ -72,7 +72,7 @@ PointSet receive_points(MessageReader& message)
 {
     const auto size = message.take<std::size_t>(), columns = message.take<std::size_t>(),
                groups = message.take<std::size_t>();
-    message.check_left(size, sizeof(Vec3f));  // of P, which is not the same everywhere
+    message.check_left(size, sizeof(Vec3f));  // readers set P point by point, so it is not uniform
     PointSet points;
     points.append(size);
     for (std::size_t i = 0; i < columns; ++i) {

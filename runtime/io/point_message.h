@@ -7,7 +7,7 @@
 namespace rapid {
 
 void send_points(const PointSet& points, MessageWriter& message);
-// Error: what the message holds is no set of points.
+// Throws Error if the message does not contain a valid set of points.
 PointSet receive_points(MessageReader& message);
 
 }  // namespace rapid

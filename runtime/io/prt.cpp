@@ -1,14 +1,15 @@
 // .prt: Krakatoa's particles, version 1.0 of the format ("PRT File Format", Thinkbox), as Krakatoa, Frost and Partio
-// read it. Version 1.1 has a longer header, and is read too.
+// read it. Version 1.1 has a longer header and is read too.
 //
 // Little-endian throughout:
 //
-//   0xc0 "PRT\r\n" 0x1a "\n" | int32: 56, bytes so far | char[32] "Extensible Particle Format" | int32: 1 | int64:
-//   points int32: 4 | int32: channels | int32: 44, bytes of each for each channel: char[32] name, int32 type, int32
-//   numbers a point, int32 offset in the record the records of all points, as one zlib stream
+//   0xc0 "PRT\r\n" 0x1a "\n" | int32: 56, header bytes | char[32] "Extensible Particle Format" | int32: 1
+//   int64: points | int32: 4 | int32: channels | int32: 44, bytes per channel
+//   for each channel: char[32] name, int32 type, int32 numbers per point, int32 offset in the record
+//   the records of all points, as one zlib stream
 //
-// P is Position, v is Velocity, id is ID; Cd, N, age, life, pscale and orient have the names that Krakatoa and Frost
-// give them; a group is uint8 group_NAME.
+// P is Position, v is Velocity, id is ID. Cd, N, age, life, pscale and orient have the names that Krakatoa and Frost
+// give them. A group is uint8 group_NAME.
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -32,13 +33,13 @@ constexpr std::string_view prt_magic = "\xc0PRT\r\n\x1a\n";
 constexpr std::string_view signature = "Extensible Particle Format";
 constexpr std::size_t header_bytes = 56, name_bytes = 32, channel_bytes = 44;
 
-// By number in the file.
+// Types by number in the file.
 constexpr ScalarType channel_types[] = {ScalarType::Int16,  ScalarType::Int32,  ScalarType::Int64,  ScalarType::Half,
                                         ScalarType::Float,  ScalarType::Double, ScalarType::UInt16, ScalarType::UInt32,
                                         ScalarType::UInt64, ScalarType::Int8,   ScalarType::UInt8};
 enum ChannelType : std::int32_t { Int32Channel = 1, Int64Channel = 2, FloatChannel = 4, UInt8Channel = 10 };
 
-// Krakatoa's names.
+// Krakatoa's channel names.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 9> channel_names = {{{"P", "Position"},
                                                                                          {"v", "Velocity"},
                                                                                          {"id", "ID"},
@@ -127,10 +128,10 @@ Layout layout_of(const PointSet& points)
     return layout;
 }
 
-// A chunk of a zlib stream, which ends at a byte.
+// Returns a chunk of a zlib stream that ends at a byte boundary.
 std::string deflated(const std::vector<unsigned char>& bytes)
 {
-    // Higher levels take five times as long for a twentieth less: floats are noise to them.
+    // Higher levels take five times as long and save only 5 %, because the bits of floats are mostly noise.
     z_stream stream = {};
     if (::deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, -MAX_WBITS, MAX_MEM_LEVEL, Z_DEFAULT_STRATEGY) != Z_OK)
         throw std::bad_alloc();
@@ -153,10 +154,10 @@ void write_prt(OutputFile& file, const PointSet& points, const FrameInfo&)
     const std::string header = std::string(prt_magic) + little_endian(header_bytes, 4) + padded(signature, 32) +
                                little_endian(1, 4) + little_endian(points.size(), 8) + little_endian(4, 4) +
                                little_endian(layout.names.size(), 4) + little_endian(channel_bytes, 4) +
-                               layout.channels + "\x78\x01";  // the beginning of the zlib stream (RFC 1950)
+                               layout.channels + "\x78\x01";  // start of the zlib stream (RFC 1950)
     file.append(header.data(), header.size());
 
-    // Each chunk is compressed by itself, so that all threads do; the stream's checksum is that of its parts.
+    // Chunks are compressed independently on all threads. The stream's checksum is combined from theirs.
     std::vector<uLong> checksums((points.size() + chunk_size - 1) / chunk_size);
     append_chunks(file, points.size(), [&](std::size_t begin, std::size_t end) {
         std::vector<unsigned char> records((end - begin) * record_bytes);
@@ -257,7 +258,7 @@ PointSet read_prt(const std::filesystem::path& path)
     if (version != 1 && version != 2) throw Error(fmt::format("version {} can't be read; it must be 1 or 2", version));
     const auto count = reader.integer<std::int64_t>();
     if (count < 0) throw Error("it was never completed: its header does not say how many points it holds");
-    reader.take(static_cast<std::size_t>(header) - header_bytes);  // what version 2 adds
+    reader.take(static_cast<std::size_t>(header) - header_bytes);  // additions of version 2
     reader.take(4);
     const Channels channels = read_channels(reader);
     const bool placed = std::any_of(
@@ -270,12 +271,12 @@ PointSet read_prt(const std::filesystem::path& path)
     if (n > held)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds at most {}", n, held));
     const std::size_t bytes = n * channels.stride;
-    // The records, and as much again for the points that are made of them.
+    // Accounts for the records and for the points made from them.
     if (const double both = 2.0 * static_cast<double>(bytes); !fits_in_memory(both))
         throw beyond_memory(fmt::format("{} points, decompressed,", n), both, "write fewer points to the file");
     const std::unique_ptr<unsigned char[]> records(new unsigned char[bytes]);
     uLongf found = bytes;
-    const bool is_empty = n == 0 && reader.rest().empty();  // nothing was compressed
+    const bool is_empty = n == 0 && reader.rest().empty();  // no data was compressed
     const int result =
         is_empty ? Z_OK : ::uncompress(records.get(), &found, reader.rest().data(), reader.rest().size());
     if (result == Z_MEM_ERROR) throw std::bad_alloc();

@@ -31,7 +31,7 @@ void store_word(unsigned char* to, std::uint32_t word)
     std::memcpy(to, &word, sizeof word);
 }
 
-// words: a template parameter, so that the loop over it unrolls.
+// words: a template parameter, so that the loop over it is unrolled.
 template <bool swapped, std::size_t words>
 void interleave_words(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
                       std::size_t n)
@@ -44,7 +44,7 @@ template <bool swapped>
 void interleave_narrowed(const unsigned char* from, std::size_t stride, unsigned char* to, std::size_t record,
                          std::size_t n)
 {
-    // The low word of a little-endian int64; the range was checked when the column was added.
+    // Takes the low word of a little-endian int64. The range was checked when the column was added.
     for (std::size_t i = 0; i < n; ++i, from += stride, to += record) store_word<swapped>(to, load_word(from));
 }
 
@@ -71,12 +71,12 @@ auto with_loader(ScalarType type, ByteOrder order, const F& f)
     });
 }
 
-// The numbers of an attribute.
+// Reads the numbers of an attribute.
 struct Numbers {
     const Records& records;
     const RecordAttribute& attribute;
 
-    // out[i * step] = the number at `offset` of record i.
+    // Sets out[i * step] to the number at `offset` of record i.
     template <class Number>
     void read(std::size_t offset, Number* out, std::size_t step) const
     {
@@ -94,7 +94,7 @@ struct Numbers {
         });
     }
 
-    // Calls f(i, number) for each.
+    // Calls f(i, number) for each record.
     template <class F>
     void check(std::size_t offset, const F& f) const
     {
@@ -106,7 +106,7 @@ struct Numbers {
         });
     }
 
-    // Of floating numbers, which must be whole ones.
+    // Checks that floating-point ids are integers.
     void check_ids(std::size_t offset) const
     {
         check(offset, [](std::size_t i, auto number) {
@@ -116,7 +116,7 @@ struct Numbers {
         });
     }
 
-    // Of unsigned integers of 64 bits.
+    // Checks that unsigned 64-bit integers fit into int64.
     void check_fits_int64(std::size_t offset) const
     {
         check(offset, [this](std::size_t i, auto number) {
@@ -216,7 +216,7 @@ void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t poi
 {
     // The records of a chunk, 32 to 128 bytes each, and their columns stay in the second-level cache.
     for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
-        // A buffer per thread that is kept, so that its pages are touched once.
+        // The buffer is kept per thread, so that its pages are touched only once.
         thread_local OfThread<std::vector<unsigned char>> kept;
         std::vector<unsigned char>& records = *kept;
         records.resize((end - begin) * record_bytes_);

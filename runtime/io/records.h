@@ -1,8 +1,8 @@
-// Records of fixed size, one for each point, as in .bgeo, .ply and .prt; or a record of one attribute, which is an
-// array, as in .npz and .vtp.
+// Records of fixed size, one per point, as in .bgeo, .ply and .prt; or a record of one attribute, which is an array, as
+// in .npz and .vtp.
 //
-// Columns are interleaved into records, and separated again, chunk by chunk in parallel. The records of a chunk stay in
-// cache until they are written, so that writing costs little more than writing the same bytes from an array.
+// Columns are interleaved into records, and separated again, in parallel chunks. The records of a chunk stay in the
+// cache until they are written, so writing costs little more than writing the same bytes from an array.
 #pragma once
 
 #include <cstdint>
@@ -19,21 +19,21 @@ namespace rapid {
 // Interleaves columns, in the order of the calls. The columns must outlive it.
 class RecordWriter {
 public:
-    // int64 is written as int32, or as it is.
+    // Narrow writes int64 as int32, Wide keeps it.
     enum Integers { Narrow, Wide };
     explicit RecordWriter(ByteOrder order, Integers integers = Narrow) : order_(order), integers_(integers) {}
 
-    // Floats and int32 unchanged; of a text the place in the file's table (text_table.h) is added, as an int32. Error:
-    // an int64 that has to be narrowed and does not fit, naming .vdb and .csv.
+    // Adds a column. Floats and int32 are unchanged; a string becomes its index in the file's table (text_table.h), an
+    // int32. Throws Error if an int64 that must be narrowed does not fit; the message suggests .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
-    // Membership as a UInt8.
+    // Adds membership as a UInt8.
     void add_group(const Column<std::uint8_t>& members);
-    // The same number in every record.
+    // Adds the same number to every record.
     void add_constant(float value);
 
     std::size_t record_bytes() const { return record_bytes_; }
     void write(OutputFile& file, std::uint64_t offset, std::size_t points) const;
-    // The records of the points [begin, end), shape [(end - begin) * record_bytes()].
+    // Writes the records of the points [begin, end), shape [(end - begin) * record_bytes()].
     void interleave(std::size_t begin, std::size_t end, unsigned char* records) const;
 
 private:
@@ -41,7 +41,7 @@ private:
     struct Part {
         enum Encoding { Words, Narrowed, Byte } encoding;
         const unsigned char* from;
-        std::size_t stride;  // bytes from point to point; 0 for a uniform column
+        std::size_t stride;  // bytes between points; 0 for a uniform column
         std::size_t words;
         std::size_t offset;  // in the record
     };
@@ -59,9 +59,9 @@ private:
 struct RecordAttribute {
     std::string name;
     ScalarType type;
-    std::vector<std::size_t> offsets;  // of the numbers in the record, bytes
+    std::vector<std::size_t> offsets;  // byte offsets of the numbers in the record
     bool group = false;
-    double scale = 1;  // factor, which makes integers floats (colours stored as bytes)
+    double scale = 1;  // factor that converts integers to floats (colours stored as bytes)
 };
 
 // Records in memory, which must outlive it.
@@ -71,10 +71,11 @@ struct Records {
     ByteOrder order;
 };
 
-// Sets an attribute of the points. Three floats become a vec3, four a quaternion; integers become int32; integers
-// beyond 32 bits, unsigned 32-bit ones and id become int64. Error: an id that is not whole; an integer beyond int64.
+// Sets an attribute of the points. Three floats become a vec3, four a quaternion. Integers become int32, but id,
+// unsigned 32-bit and wider integers become int64. Throws Error if an id is not an integer, or an integer exceeds
+// int64.
 void read_attribute(PointSet& points, const Records& records, const RecordAttribute& attribute);
-// Ids from 0, in order.
+// Assigns ids from 0, in order.
 void number_points(PointSet& points);
 
 // Reads points from records. Without an id, points are numbered from 0.

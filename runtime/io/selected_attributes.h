@@ -1,4 +1,4 @@
-// The part of the points that a file is to hold.
+// Selects the attributes that a file will contain.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace rapid {
 
-// The points with only P, v, id and the named attributes and groups. Error: an unknown name, with the nearest.
+// Returns the points with only P, v, id and the named attributes and groups. Throws Error if a name is unknown,
+// suggesting the nearest.
 PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names);
 
 }  // namespace rapid

@@ -23,36 +23,36 @@ namespace rapid {
 namespace {
 
 constexpr std::string_view state_magic = "\x89RAPID\r\n";
-constexpr int most_depth = 8;  // of lists within lists in a header: who copies one calls itself for each
+constexpr int most_depth = 8;  // nesting in a header: copying JSON recurses per level
 constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // KeptColumn's
 static_assert(std::size(types) == std::variant_size_v<KeptColumn>);
 constexpr std::string_view type_of_bytes = "bytes";
 
-// Compressed and read on all threads. Blosc sorts the bytes of numbers by their place, which makes ids a hundredth; LZ4
-// on its first level reads and writes gigabytes a second. Of positions and velocities it takes a tenth off, and more
-// time than the tenth takes to be written: what does not become half of itself is stored as it is.
+// Pieces are compressed and read on all threads. Blosc groups the bytes of numbers by significance, which shrinks ids
+// to 1 %. LZ4 at level 1 reads and writes gigabytes per second. It only saves a tenth of positions and velocities,
+// which takes more time than writing that tenth, so blocks that do not shrink to half are stored uncompressed.
 constexpr std::size_t piece_bytes = std::size_t{1} << 20;
 constexpr std::size_t sample_bytes = std::size_t{1} << 16;
-constexpr double worthwhile = 0.5;  // of the bytes, that are left of a sample
+constexpr double worthwhile = 0.5;  // largest compressed fraction of a sample
 constexpr int level = 1;
 constexpr const char* codec = "lz4";
-constexpr std::uint64_t most_codec_expansion = 1024;  // more than any codec's
+constexpr std::uint64_t most_codec_expansion = 1024;  // more than any codec achieves
 
-// What is in a block before it is compressed.
+// A block before compression.
 struct Raw {
     const char* data;
-    std::size_t bytes, scalar;  // scalar: bytes of a number
+    std::size_t bytes, scalar;  // scalar: bytes per number
 
     std::size_t pieces() const { return (bytes + piece_bytes - 1) / piece_bytes; }
 };
 
-// As it is in the file.
+// A piece as stored in the file.
 struct Piece {
-    std::unique_ptr<char[]> packed;  // null: the block's own bytes
+    std::unique_ptr<char[]> packed;  // null: the block's own bytes are used
     std::span<const char> bytes;
 };
 
-// Into room for the worst case, which each thread has once; what is kept of a piece takes no more than its bytes.
+// Compresses into a buffer for the worst case, one per thread. The returned piece is copied to its exact size.
 Piece packed(std::span<const char> bytes, std::size_t scalar)
 {
     thread_local OfThread<std::vector<char>> kept;
@@ -80,7 +80,7 @@ bool is_worth_packing(const Raw& raw)
 
 [[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
 
-// A piece of the size of its content is stored.
+// A piece as large as its content is stored uncompressed.
 void unpack(std::string_view piece, char* data, std::size_t bytes)
 {
     if (piece.size() == bytes) {
@@ -111,7 +111,7 @@ std::size_t values_of(const KeptColumn& column)
     return std::visit([](const auto& values) { return values.size(); }, column);
 }
 
-// The texts of columns that hold their places so far.
+// Replaces table indices by strings in string columns.
 void take_texts(const CheckedJson& blocks, SavedState& state)
 {
     for (std::size_t k = 0; k < state.columns.size(); ++k) {
@@ -140,7 +140,7 @@ void write_to(const std::function<void(const void* data, std::size_t bytes)>& wr
               const SavedState& state)
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
-    // Of a column of texts the block holds the places, and the header its texts.
+    // For a string column the block contains table indices and the header the strings.
     std::vector<KeptColumn> columns = state.columns;
     std::vector<std::vector<Token>> texts(columns.size());
     for (std::size_t k = 0; k < columns.size(); ++k)
@@ -210,7 +210,7 @@ std::string text_of_state(CheckedJson header, const SavedState& state)
 bool StateFile::is_one(const std::filesystem::path& path)
 {
     std::error_code none;
-    if (!std::filesystem::is_regular_file(path, none)) return false;  // of a pipe reading would wait
+    if (!std::filesystem::is_regular_file(path, none)) return false;  // opening a pipe would block
     std::ifstream file(path, std::ios::binary);
     std::array<char, state_magic.size()> head{};
     return file.read(head.data(), head.size()) && std::string_view(head.data(), head.size()) == state_magic;
@@ -254,7 +254,7 @@ SavedState StateFile::state() const
         std::size_t bytes;
     };
     std::vector<Place> places;
-    // No more memory is taken than a file of this size can fill.
+    // Allocates no more memory than a file of this size can decompress to.
     std::uint64_t left = (end - at) * most_codec_expansion;
     const auto add = [&](const CheckedJson& block, std::size_t bytes_a_value, const auto& allocate) {
         const std::uint64_t values = block.at("values").get<std::uint64_t>();

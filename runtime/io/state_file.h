@@ -1,14 +1,14 @@
-// Files of a SavedState, as a cache of a run holds them. In the order of the file, numbers as the machine has them:
+// Files of a SavedState, as used by a run's cache. Contents in file order, with numbers in the machine's format:
 //
-//   "\x89RAPID\r\n"    what the file is
-//   8 bytes            the length of the header
-//   the header         JSON: what its writer says of it, "format", and "blocks": each with "type", "values" and
-//                      "pieces", their sizes in bytes
-//   the blocks         the bytes of the state, then its columns, in pieces of a megabyte, which Blosc has compressed
-//                      where that makes them smaller
-//   8 bytes            XXH3 of all that is before
+//   "\x89RAPID\r\n"   identifies the file
+//   8 bytes           length of the header
+//   the header        JSON: fields of the writer, "format", and "blocks", each with "type", "values" and
+//                     "pieces", which are sizes in bytes
+//   the blocks        the bytes of the state, then its columns, in pieces of a megabyte, compressed by Blosc if that
+//                     makes them smaller
+//   8 bytes           XXH3 of everything before
 //
-// The checksum finds damage. It is no protection from those who mean harm: what is in a state is checked by whose it is
+// The checksum detects damage but does not protect from malice. The owner of a state checks its contents
 // (points/state_archive.h).
 #pragma once
 
@@ -24,33 +24,34 @@
 
 namespace rapid {
 
-// The "format" of the files that this Rapid writes, and of those that it reads.
+// The "format" that this version writes, and the only one that it reads.
 inline constexpr int state_format = 5;
 
 // Compresses on all threads. `header` is an object. Throws Error if the file can't be written.
 void write_state(const std::filesystem::path& path, CheckedJson header, const SavedState& state);
-// The same file in memory.
+// Returns the same file as a string.
 std::string text_of_state(CheckedJson header, const SavedState& state);
 
 class StateFile {
 public:
-    // Reads and checks the whole file. Error: it can't be read; it is no such file, torn or damaged.
+    // Reads and checks the whole file. Throws Error if it can't be read, is not a state file, or is truncated or
+    // damaged.
     explicit StateFile(const std::filesystem::path& path) : StateFile(Content{InputFile(path), {}}) {}
-    // The same of what text_of_state() has returned.
+    // Reads a string from text_of_state().
     static StateFile in_memory(std::string text) { return StateFile(Content{{}, std::move(text)}); }
 
     const CheckedJson& header() const { return header_; }
     std::uint64_t bytes() const { return text().size(); }
-    // Decompresses, on all threads. Error: it is damaged.
+    // Decompresses on all threads. Throws Error if the file is damaged.
     SavedState state() const;
 
-    // Whether the file begins as one, and so is to be read as one.
+    // Returns true if the file begins like a state file and should be read as one.
     static bool is_one(const std::filesystem::path& path);
 
 private:
     struct Content {
         std::optional<InputFile> file;
-        std::string text;  // without a file
+        std::string text;  // if there is no file
     };
     explicit StateFile(Content content);
     std::string_view text() const { return content_.file ? content_.file->text() : content_.text; }

@@ -1,5 +1,5 @@
-// A column of texts as files hold one: each text once, in the order in which points first have it, and for each point
-// the place of its own. So a file's bytes do not depend on the numbers of tokens.
+// A column of strings as files store it: each distinct string once, in order of first use, and for each point the index
+// of its string. The file's bytes therefore do not depend on token numbers.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ namespace rapid {
 
 struct TextTable {
     std::vector<Token> texts;
-    Column<std::int32_t> places;  // of each point, among the texts
+    Column<std::int32_t> places;  // index of each point's string
 };
 TextTable text_table(const Column<Token>& column);
 
-// token_of() for the texts of a file: the table of the process, which is locked, is asked once for each of the last
-// 65,536.
+// Calls token_of() for the strings of a file. The last 65,536 are cached, because the process-wide table is locked for
+// each access.
 class TokensOfTexts {
 public:
     Token operator()(std::string_view text);
@@ -27,12 +27,13 @@ private:
     std::unordered_map<std::string_view, Token> known_;
 };
 
-// The column of a table that was read. -1: the empty text. Error: a place beyond the texts.
+// Builds a column from a table that was read. Index -1 means the empty string. Throws Error if an index is out of
+// range.
 Column<Token> texts_at(const std::vector<Token>& texts, const Column<std::int32_t>& places);
 
-// The points without their columns of texts, for formats that hold none.
+// Returns the points without string columns, for formats that do not support them.
 PointSet without_texts(const PointSet& points);
-// The names of these columns.
+// Returns the names of the string columns.
 std::vector<std::string> names_of_texts(const PointSet& points);
 
 }  // namespace rapid

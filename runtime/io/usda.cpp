@@ -1,11 +1,11 @@
-// .usda: USD's text, a prim "points" of the type Points with a sample of each attribute at the frame's time code, as
-// usdview, Houdini and Blender read it. Files of one sequence are joined by value clips.
+// .usda: USD's text format, with a Points prim "points" that has a sample of each attribute at the frame's time code,
+// as usdview, Houdini and Blender read it. Value clips join the files of a sequence.
 //
 //   point3f[] points.timeSamples = { 12: [(x, y, z), ...], }
 //
 // P is points, v is velocities, id is ids, pscale is half of widths, N is normals, Cd is primvars:displayColor, Alpha
-// is primvars:displayOpacity; any other attribute is primvars:NAME, a group bool[] primvars:group_NAME. Floats have 9
-// significant digits, which identify the float. usda_points.h has what is read.
+// is primvars:displayOpacity. Any other attribute is primvars:NAME, and a group is bool[] primvars:group_NAME. Floats
+// have 9 significant digits, which identify the float. For reading see usda_points.h.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -44,7 +44,8 @@ std::string_view usd_type(AttributeType type)
     return names[static_cast<std::size_t>(type)];
 }
 
-// USD's name and type of an attribute. An attribute that is of another type than USD's of that name is a primvar.
+// Returns USD's name and type of an attribute. If its type differs from that of USD's attribute of this name, it is a
+// primvar.
 UsdName usd_name(const std::string& name, AttributeType type, std::string& storage)
 {
     const bool vec3 = type == AttributeType::Vec3;
@@ -56,7 +57,7 @@ UsdName usd_name(const std::string& name, AttributeType type, std::string& stora
     return {name, storage, usd_type(type)};
 }
 
-// USD's identifiers.
+// Throws Error if the name is not a USD identifier.
 void check_identifier(std::string_view name)
 {
     const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
@@ -99,7 +100,7 @@ void put_tuple(std::string& text, std::initializer_list<float> numbers)
     text += ')';
 }
 void put(std::string& text, const Vec3f& value) { put_tuple(text, {value.x(), value.y(), value.z()}); }
-// The real part first.
+// Writes the real part first.
 void put(std::string& text, const Quatf& value) { put_tuple(text, {value.w(), value.x(), value.y(), value.z()}); }
 
 void put(std::string& text, Token value)
@@ -163,7 +164,7 @@ private:
         check_column_names(names, "");
     }
 
-    // The box that viewers fit their camera to and cull by.
+    // Writes the bounding box, which viewers use for framing and culling.
     void write_extent()
     {
         if (points_.empty()) return;
@@ -197,8 +198,8 @@ private:
     template <class T, class F>
     void write_array(std::string_view type, std::string_view name, const Column<T>& column, const F& stored)
     {
-        // A primvar is constant unless it says otherwise. What is the same for all points is written for each, so that
-        // frames can be joined: the interpolation is that of all of them.
+        // A primvar is constant unless it states otherwise. Uniform values are written for each point too, because
+        // joined frames must have the same interpolation.
         if (name.starts_with(primvar))
             append(fmt::format("    {}[] {} (\n        interpolation = \"vertex\"\n    )\n", type, name));
         append(fmt::format("    {}[] {}.timeSamples = {{\n        {}: [", type, name, frame_.number));
@@ -230,7 +231,7 @@ std::string attribute_of_property(std::string_view name)
     return std::string(name.starts_with(primvar) ? name.substr(primvar.size()) : name);
 }
 
-// One of them, or one for each point.
+// Returns one string for all points, or one per point.
 Column<Token> texts_of(const UsdArray& array, std::size_t size)
 {
     std::vector<Token> texts(array.rows());
@@ -252,7 +253,7 @@ PointSet read_usda(const std::filesystem::path& path)
     std::vector<std::string> names;
     for (const UsdArray& array : arrays) {
         const bool constant = array.rows() == 1;
-        if (array.name == "extent") continue;  // of no point
+        if (array.name == "extent") continue;  // not a value per point
         if (array.rows() != points.size() && !constant) {
             LeftOut::add(fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
             continue;

@@ -28,7 +28,7 @@ bool is_word(char c)
            std::string_view("_:.+-").find(c) != std::string_view::npos;
 }
 
-// An array of numbers by the name of its type ("point3f[]"); nothing for other types.
+// Returns an empty array for the name of its type ("point3f[]"), or nothing for unsupported types.
 std::optional<UsdArray> array_of(std::string_view type)
 {
     if (!type.ends_with("[]")) return {};
@@ -86,7 +86,7 @@ public:
             if (std::exchange(found, true))
                 throw wrong("there are several prims of the type Points; there must be one");
             skip_space();
-            skip_value();  // its name
+            skip_value();  // name
             if (skip_space(), is_at('(')) skip_value();
             if (skip_space(), !is_at('{')) throw wrong("the prim of points has no { }");
             ++at_;
@@ -105,7 +105,7 @@ private:
     bool is_at(char c) const { return at_ < text_.size() && text_[at_] == c; }
     bool at_word() const { return at_ < text_.size() && is_word(text_[at_]); }
 
-    // Passes over white space and comments; whether there was an end of a line.
+    // Skips white space and comments. Returns true if a line ended.
     bool skip_space()
     {
         bool line = false;
@@ -129,7 +129,7 @@ private:
         if (found == std::string_view::npos) throw wrong(fmt::format("no {} follows", end));
         at_ = found + end.size();
     }
-    // A text, a path of a file or of a prim, or one other character.
+    // Skips a string, a path of a file or prim, or one other character.
     void skip_mark()
     {
         const char c = text_[at_];
@@ -148,7 +148,7 @@ private:
             ++at_;
         }
     }
-    // A text in quotes, with what is escaped in it.
+    // Returns a quoted string with escapes resolved.
     std::string text_value()
     {
         if (!is_at('"') && !is_at('\'')) throw wrong("there is no text where there should be one");
@@ -174,7 +174,7 @@ private:
         }
         return text;
     }
-    // A word, a text, a path, or all between brackets.
+    // Skips a word, a string, a path, or everything between brackets.
     void skip_value()
     {
         if (at_word()) {
@@ -205,7 +205,7 @@ private:
         }
     }
 
-    // [custom] TYPE NAME [= VALUE] [(METADATA)], or a prim within this one, which is passed over.
+    // Reads [custom] TYPE NAME [= VALUE] [(METADATA)], or skips a prim within this one.
     void read_statement()
     {
         std::string_view type, name;
@@ -234,7 +234,7 @@ private:
     {
         constexpr std::string_view samples = ".timeSamples";
         std::optional<UsdArray> array = array_of(type);
-        // Others than primvars say how the prim is placed and drawn.
+        // Strings other than primvars describe how the prim is placed and drawn.
         if (!array || (array->texts && !name.starts_with("primvars:"))) {
             if (type.ends_with("[]")) LeftOut::add(fmt::format("{} of the type {}", name, type));
             return skip_value();
@@ -253,7 +253,7 @@ private:
         bool found = false;
         while (skip_space(), !is_at('}')) {
             if (!at_word()) throw wrong("a time sample has no time");
-            word();  // the time, with its colon
+            word();  // time, followed by a colon
             if (skip_space(), is_at(':')) ++at_;
             skip_space();
             if (std::exchange(found, true))
@@ -278,7 +278,7 @@ private:
         by_name_.emplace(name, arrays_.insert(arrays_.end(), std::move(array)));
     }
 
-    // [1, 2], [(1, 2, 3), (4, 5, 6)]
+    // Reads [1, 2] or [(1, 2, 3), (4, 5, 6)].
     void read_numbers(UsdArray& array)
     {
         ++at_;
@@ -302,7 +302,7 @@ private:
         ++at_;
     }
 
-    // A number is two bytes of text, and more while it grows with others and becomes a column.
+    // A number takes at least two bytes of text, and more memory while its array grows and is converted to a column.
     void check_memory(const UsdArray& array) const
     {
         if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
@@ -345,7 +345,7 @@ private:
     std::size_t at_ = 0;
     std::list<UsdArray> arrays_;
     std::map<std::string_view, std::list<UsdArray>::iterator> by_name_;
-    std::set<std::string_view> names_;  // of arrays so far, each with its time samples and without
+    std::set<std::string_view> names_;  // of all arrays so far, with and without time samples
 };
 
 }  // namespace

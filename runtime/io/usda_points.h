@@ -1,6 +1,6 @@
-// The arrays of a prim of points in USD's text: those of its default values, or of its one time sample.
+// Reads the arrays of a Points prim in USD's text format: its default values, or its only time sample.
 //
-// Nothing in a file is trusted. Errors say what is wrong, with the line; who calls adds the file's name.
+// Nothing in a file is trusted. Errors have the line but not the file's name; the caller adds it.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,17 @@ namespace rapid {
 
 struct UsdArray {
     std::string name;
-    ScalarType type;    // in memory: UInt8 (of truth values), Int32, Int64 or Double; of texts UInt32, their tokens
-    std::size_t tuple;  // numbers of a row
-    bool quaternion;    // the real part first
-    std::int64_t least, most;  // of integers
+    ScalarType type;           // in memory: UInt8 (bools), Int32, Int64 or Double; strings are UInt32 tokens
+    std::size_t tuple;         // numbers per row
+    bool quaternion;           // real part first
+    std::int64_t least, most;  // range of integers
     std::vector<unsigned char> bytes;
     bool texts = false;
 
     std::size_t rows() const { return bytes.size() / (tuple * scalar_bytes(type)); }
 };
 
-// Error: no USD text; no prim of the type Points, or several; several time samples.
+// Throws Error if the text is not USD, has no Points prim or several, or has several time samples.
 std::vector<UsdArray> usda_points(std::string_view text);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// .vdb among the formats; its writer and reader (vdb_write.cpp, vdb_read.cpp) are loaded when they are needed.
+// Registers .vdb. Its writer and reader (vdb_write.cpp, vdb_read.cpp) are loaded on demand.
 #include "runtime/io/vdb.h"
 
 namespace rapid {

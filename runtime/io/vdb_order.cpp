@@ -20,21 +20,21 @@ namespace {
 
 using openvdb::Coord;
 
-// Buffers of the threads, for as long as they write one file. Not thread_local: of a library that is loaded later glibc
-// takes these when a thread first comes there, and ends the process where there is no memory.
+// Per-thread buffers for the time of writing one file. Not thread_local, because in a library that is loaded later
+// glibc allocates those on a thread's first use, and terminates the process if that fails.
 template <class T>
 using OfThreads = tbb::enumerable_thread_specific<T>;
 
-// Points that are looked up together: at most 64 parts, each with a list of its leaves.
+// Points per block; at most 64 blocks, each with its own list of leaves.
 constexpr std::size_t least_block = 65536, most_blocks = 64;
-// Points of columns in files that are sorted together, in memory.
+// Points of columns in files that are sorted together in memory.
 constexpr std::size_t cell_points = 131072;
-// Points that are put into cells together.
+// Points that are distributed to cells together.
 constexpr std::size_t stretch = 131072;
 
 constexpr std::int32_t leaf_edge = 8;
 
-// Voxels that contain positions; the nearest centre, as in OpenVDB.
+// Maps positions to voxels: the nearest voxel centre, as in OpenVDB.
 class Voxels {
 public:
     explicit Voxels(double edge) : per_metre_(1 / edge) {}
@@ -55,7 +55,7 @@ std::uint32_t place_in_leaf(const Coord& voxel)
     return static_cast<std::uint32_t>((voxel.x() & mask) << 6 | (voxel.y() & mask) << 3 | (voxel.z() & mask));
 }
 
-// The order of OpenVDB's tree: nodes of the root, of 4096³ voxels, then of 128³, then leaves.
+// Compares in the order of OpenVDB's tree: root nodes of 4096³ voxels, then nodes of 128³, then leaves.
 bool before_in_tree(const Coord& a, const Coord& b)
 {
     for (const std::int32_t edge : {4096, 128, leaf_edge}) {
@@ -65,7 +65,7 @@ bool before_in_tree(const Coord& a, const Coord& b)
     return false;
 }
 
-// Numbers leaves as they come.
+// Numbers leaves in the order of their first use.
 class LeafNumbers {
 public:
     LeafNumbers() : slots_(1024) {}
@@ -80,7 +80,7 @@ public:
         }
         return slot.number;
     }
-    // Of one that has been added.
+    // Returns the number of a leaf that has been added.
     std::uint32_t operator[](const Coord& leaf) const { return const_cast<LeafNumbers*>(this)->slot_of(leaf).number; }
     const std::vector<Coord>& leaves() const { return leaves_; }
 
@@ -106,24 +106,24 @@ private:
         for (std::uint32_t k = 0; k < leaves_.size(); ++k) slot_of(leaves_[k]) = {leaves_[k], k};
     }
 
-    std::vector<Slot> slots_;  // a power of two
+    std::vector<Slot> slots_;  // the size is a power of two
     std::vector<Coord> leaves_;
 };
 
-// A stretch of the points, and the leaves that it touches.
+// A range of points and the leaves that it touches.
 struct Block {
     std::size_t begin, end;
-    std::vector<std::uint32_t> leaves;  // by the number that a leaf has in this block
-    std::vector<std::size_t> counts;    // of its points in them
+    std::vector<std::uint32_t> leaves;  // indexed by the leaf's number in this block
+    std::vector<std::size_t> counts;    // points of this block per leaf
 };
 
-// What is known of a point: its place in the set, and the voxel within its leaf.
+// Packs a point's index in the set and its voxel within the leaf.
 std::int64_t entry(std::uint32_t voxel, std::size_t place)
 {
     return static_cast<std::int64_t>(std::uint64_t{voxel} << 32 | place);
 }
 
-// Entries of one leaf, in order of their places, by voxel. sorted: room for as many.
+// Sorts the entries of one leaf by voxel, keeping their order within a voxel. sorted: scratch memory of the same size.
 void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf, std::vector<std::int64_t>& sorted)
 {
     std::array<std::uint32_t, 512> at{};
@@ -140,7 +140,7 @@ void sort_leaf(std::span<std::int64_t> entries, VdbLeaf& leaf, std::vector<std::
     std::copy(sorted.begin(), sorted.end(), entries.begin());
 }
 
-// The blocks of a set, the leaves in the order of the tree, and for each point the number of its leaf in its block.
+// The blocks of a set, the leaves in tree order, and the number of each point's leaf within its block.
 struct Lookup {
     std::vector<Block> blocks;
     Column<std::int32_t> numbers;
@@ -189,12 +189,12 @@ Lookup look_up(const Strided<Vec3f>& P, std::size_t size, const Voxels& voxels)
     return result;
 }
 
-// The entries of all points, in order.
+// Returns the entries of all points, in order.
 Column<std::int64_t> sorted_entries(const Strided<Vec3f>& P, const Voxels& voxels, Lookup& lookup)
 {
     Column<std::int64_t> result(0);
     const std::span<std::int64_t> entries = result.append_for_writing(lookup.numbers.size());
-    // Where a block's points of each of its leaves go.
+    // The next index for a block's points in each of its leaves.
     std::vector<std::size_t> next(lookup.leaves.size());
     for (std::size_t k = 0; k < next.size(); ++k) next[k] = lookup.leaves[k].first;
     for (Block& block : lookup.blocks)
@@ -216,7 +216,7 @@ Column<std::int64_t> sorted_entries(const Strided<Vec3f>& P, const Voxels& voxel
 
 // Leaves that are sorted together.
 struct Cell {
-    std::size_t first_leaf, end_leaf, first, end;  // leaves and points
+    std::size_t first_leaf, end_leaf, first, end;  // ranges of leaves and of points
 };
 
 std::vector<Cell> cells_of(const std::vector<VdbLeaf>& leaves)
@@ -232,15 +232,15 @@ std::vector<Cell> cells_of(const std::vector<VdbLeaf>& leaves)
     return cells;
 }
 
-// Points that follow each other in one order and in another.
+// Points that are consecutive both before and after sorting.
 struct Run {
     std::size_t from, to, size;
 };
 
-// A stretch of the points on its way into cells: in which order it is read, and where the runs of this order go.
+// How a range of points is distributed to cells: the order in which it is read, and the destinations of its runs.
 struct Scatter {
-    std::vector<std::uint32_t> order;  // places in the stretch
-    std::vector<Run> runs;             // from: in `order`
+    std::vector<std::uint32_t> order;  // indices in the range
+    std::vector<Run> runs;             // `from` is an index in `order`
 };
 
 template <class T>
@@ -250,21 +250,21 @@ void read_column(const Strided<T>& column, std::size_t begin, std::size_t size, 
     read_values(values.data(), column, begin, size);
 }
 
-// A column on its way into another order.
+// A column while it is reordered.
 struct MovedColumn {
-    // Points from `begin` on, into cells.
+    // Distributes points, starting at `begin`, to cells.
     std::function<void(std::size_t begin, const Scatter& scatter)> scatter;
-    // The points from `first` on are to be these, by their places from `first` on.
+    // Replaces the points from `first` on by these, given as indices relative to `first`.
     std::function<void(std::size_t first, std::span<const std::int64_t> entries)> sort;
 };
 
-// What a thread has of a column at a time, as it is read and in its new order.
+// A thread's part of a column, as read and in its new order.
 template <class T>
 struct Stretch {
     std::vector<T> read, moved;
 };
 
-// One for each type of values.
+// One per type of values.
 template <class Any>
 struct StretchesOf;
 template <class... T>
@@ -293,7 +293,7 @@ MovedColumn moved(const Column<T>& column, Column<T>& into, Stretches& stretches
             }};
 }
 
-// The places where the next point of each cell goes.
+// The next free index in each cell.
 class CellEnds {
 public:
     CellEnds(const std::vector<Cell>& cells, std::size_t leaves) : cell_of_(leaves)
@@ -305,7 +305,7 @@ public:
         }
     }
 
-    // The leaves of a stretch of points.
+    // numbers, leaves: the leaves of a range of points.
     void add(std::span<const std::int32_t> numbers, const std::vector<std::uint32_t>& leaves, Scatter& scatter)
     {
         const auto cell_of = [&](std::int32_t number) { return cell_of_[leaves[static_cast<std::size_t>(number)]]; };
@@ -324,10 +324,10 @@ public:
     }
 
 private:
-    std::vector<std::size_t> cell_of_, next_;  // by leaf, and by cell
+    std::vector<std::size_t> cell_of_, next_;  // per leaf; per cell
 };
 
-// The points themselves in order: first each into its cell, then cell by cell.
+// Returns the points in order: distributes them to cells, then sorts each cell.
 PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& lookup)
 {
     PointSet result;

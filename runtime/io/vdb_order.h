@@ -1,6 +1,6 @@
-// Points in the order of OpenVDB's tree: leaf by leaf (8³ voxels), in a leaf by voxel, in a voxel by their place in the
-// set. It is the order of openvdb::tools::PointIndexGrid, in a quarter of its memory. Columns that lie in files
-// (column_files.h) are sorted there, a few leaves at a time.
+// Points in the order of OpenVDB's tree: leaf by leaf (8³ voxels), then by voxel, then by index in the set. This is the
+// order of openvdb::tools::PointIndexGrid, in a quarter of its memory. Columns in files (column_files.h) are sorted
+// there, a few leaves at a time.
 #pragma once
 
 #include <cstdint>
@@ -13,18 +13,18 @@ namespace rapid {
 
 struct VdbLeaf {
     openvdb::Coord origin;                   // in voxels
-    std::size_t first = 0;                   // of its points, in the order
-    std::uint32_t size = 0;                  // of its points
-    openvdb::util::NodeMask<3> voxels = {};  // those that have points
-    std::vector<std::uint32_t> counts = {};  // points of these, in their order
+    std::size_t first = 0;                   // of its first point in the order
+    std::uint32_t size = 0;                  // number of points
+    openvdb::util::NodeMask<3> voxels = {};  // voxels with points
+    std::vector<std::uint32_t> counts = {};  // points per voxel of `voxels`, in order
 };
 
 class VdbOrder {
 public:
-    // voxel: the length of an edge, m, a power of two. P is finite, and fits into 2^30 voxels.
+    // voxel: edge length, m, a power of two. P must be finite and within 2^30 voxels.
     VdbOrder(const PointSet& points, double voxel);
 
-    // Those with points, in the order of the tree.
+    // Returns the leaves that have points, in tree order.
     const std::vector<VdbLeaf>& leaves() const { return leaves_; }
     // The k-th point in order is points() at place(k).
     const PointSet& points() const { return points_; }
@@ -32,7 +32,7 @@ public:
 
 private:
     PointSet points_;
-    bool is_sorted_;  // points_ are in order
+    bool is_sorted_;  // points_ itself is in order
     Column<std::int64_t> entries_;
     std::vector<VdbLeaf> leaves_;
 };

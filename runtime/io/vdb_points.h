@@ -1,4 +1,4 @@
-// OpenVDB's grids of points, as runtime/openvdb_grids.h has those of values.
+// Declares OpenVDB's point grids as extern templates, like the value grids in runtime/openvdb_grids.h.
 #pragma once
 
 #include <openvdb/points/PointDataGrid.h>

@@ -28,7 +28,7 @@ using vdb::points::PointDataGrid;
 using vdb::points::PointDataTree;
 using Leaf = PointDataTree::LeafNodeType;
 
-// Whether the voxels' offsets ascend, up to the length of the arrays. A leaf without points has arrays of one value.
+// Returns true if the voxels' offsets ascend and stay within the arrays. A leaf without points has arrays of one value.
 bool has_valid_offsets(const Leaf& leaf)
 {
     for (vdb::Index voxel = 1; voxel < Leaf::SIZE; ++voxel)
@@ -48,7 +48,7 @@ bool have_same_attributes(const Leaf& leaf, const Leaf& other)
     return true;
 }
 
-// The number of points of a grid. Throws if reading them would lead out of a leaf's arrays.
+// Returns the number of points of a grid. Throws if reading them would exceed a leaf's arrays.
 std::size_t checked_count(const PointDataGrid& grid)
 {
     std::size_t count = 0;
@@ -65,7 +65,7 @@ std::size_t checked_count(const PointDataGrid& grid)
     return count;
 }
 
-// A leaf with points, and the index of its first point in the set.
+// A leaf with points and the index of its first point in the set.
 struct LeafRange {
     const Leaf* leaf;
     std::size_t first;
@@ -100,7 +100,7 @@ void read_positions(const PointDataGrid& grid, const std::vector<LeafRange>& ran
             for (; k < leaf.getValue(voxel_of_leaf); ++k) {
                 const vdb::Vec3f offset = offsets.get(k);
                 vdb::Vec3d index;
-                // At voxel 0 nothing is added, so that -0 is kept.
+                // At voxel 0 nothing is added, which preserves -0.
                 for (int axis = 0; axis < 3; ++axis)
                     index[axis] = voxel_index[axis] == 0 ? static_cast<double>(offset[axis])
                                                          : voxel_index[axis] + static_cast<double>(offset[axis]);
@@ -111,7 +111,7 @@ void read_positions(const PointDataGrid& grid, const std::vector<LeafRange>& ran
     });
 }
 
-// The column `name`, added where an earlier grid had none.
+// Returns the column `name`. Adds it if an earlier grid had none.
 template <class T>
 Column<T>& column_for(PointSet& points, const std::string& name)
 {
@@ -171,7 +171,7 @@ void read_texts(PointSet& points, const std::vector<LeafRange>& ranges, const st
     });
 }
 
-// By OpenVDB's name of the type; matrices are not read.
+// Readers by OpenVDB's name of the type. Matrices are not read.
 const std::map<std::string, ReadAttribute>& readers()
 {
     static const std::map<std::string, ReadAttribute> all = {
@@ -237,7 +237,7 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
     }
 }
 
-// The points of a file, in its order.
+// The points of a file, in file order.
 struct VdbPoints {
     PointSet points;
     bool has_id = false;

@@ -1,4 +1,4 @@
-// Rapid's attribute types and OpenVDB's.
+// Conversions between Rapid's attribute types and OpenVDB's.
 #pragma once
 
 #include <type_traits>
@@ -9,14 +9,14 @@
 
 namespace rapid {
 
-// Before any other use of OpenVDB.
+// Must be called before any other use of OpenVDB.
 inline void initialize_openvdb()
 {
     static const bool done = (openvdb::initialize(), true);
     (void)done;
 }
 
-// OpenVDB's type for a T of Rapid's, with the same layout.
+// OpenVDB's type for Rapid's type T, with the same layout.
 template <class T>
 struct VdbValue {
     using Type = T;
@@ -33,13 +33,13 @@ struct VdbValue<Quatf> {
     static Type from(const Quatf& value) { return {value.x(), value.y(), value.z(), value.w()}; }
 };
 
-// A text is its number among those of the grid, from 1 on; 0 is the empty text.
+// A string is its number among those of the grid, from 1; 0 is the empty string.
 template <>
 struct VdbValue<Token> {
     using Type = openvdb::Index;
 };
 
-// Rapid's value of an OpenVDB value, of any precision.
+// Converts an OpenVDB value of any precision to Rapid's.
 template <class T, class Value>
 T rapid_value(const Value& value)
 {

@@ -13,15 +13,15 @@
 namespace rapid {
 namespace {
 
-// Points per leaf (8³ voxels) that the voxel size aims at. Fewer make leaves costly (each holds 2 KiB of offsets and an
-// array per attribute); more make spatial queries slow and leave the threads nothing to share.
+// Target number of points per leaf (8³ voxels). Fewer make leaves costly (each has 2 KiB of offsets and an array per
+// attribute). More make spatial queries slow and leave the threads nothing to share.
 constexpr double leaf_points = 2048;
 constexpr double leaf_width = 8;  // voxels
 
-// OpenVDB refuses a map whose determinant, the cube of the voxel size, is below 3e-15: 2^-16 m is the finest.
+// OpenVDB refuses a map whose determinant, the cube of the voxel size, is below 3e-15, so 2^-16 m is the finest.
 constexpr int smallest_exponent = -16;
 
-// The largest |coordinate|. Error: one that is not finite.
+// Returns the largest |coordinate|. Throws Error if one is not finite.
 double largest_coordinate(const PointSet& points)
 {
     const Strided<Vec3f> P = points.P().read();
@@ -39,7 +39,7 @@ double largest_coordinate(const PointSet& points)
     return largest;
 }
 
-// The number of cells of the size 2^exponent that hold a sample point.
+// Returns the number of cells of size 2^exponent that contain a sample point.
 std::size_t occupied_cells(const std::vector<Vec3f>& sample, int exponent)
 {
     std::unordered_set<std::uint64_t> cells;
@@ -58,8 +58,8 @@ std::size_t occupied_cells(const std::vector<Vec3f>& sample, int exponent)
 
 }  // namespace
 
-// A sample of the points gives the width of a cell that holds several of them, and the dimension (line, surface,
-// volume) with which their number grows with the width. From these follows the width of a cell with leaf_points points.
+// A sample of the points gives the width of a cell that contains several of them, and the dimension (line, surface,
+// volume) with which their number grows with the width. The width of a cell with leaf_points points follows from these.
 int voxel_exponent(const PointSet& points)
 {
     const double largest = largest_coordinate(points);
@@ -76,7 +76,7 @@ int voxel_exponent(const PointSet& points)
         trim_columns();
     }
 
-    // From the coarsest, one cell for all, to finer ones.
+    // Goes from the coarsest, one cell for all, to finer ones.
     int cell = std::ilogb(largest) + 2;
     std::size_t coarser = 1, occupied = 1;
     for (; cell - 1 > finest + 3; --cell) {

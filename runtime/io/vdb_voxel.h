@@ -1,12 +1,12 @@
-// The voxel size of a grid of points.
+// Chooses the voxel size of a point grid.
 #pragma once
 
 #include "runtime/points/point_set.h"
 
 namespace rapid {
 
-// The exponent e of the voxel size 2^e m with which a leaf that holds points holds some 2,000 of them. Error: a
-// position that is not finite.
+// Returns the exponent e of a voxel size 2^e m at which an occupied leaf has about 2,000 points. Throws Error if a
+// position is not finite.
 int voxel_exponent(const PointSet& points);
 
 }  // namespace rapid

@@ -1,6 +1,6 @@
-// Writes .vdb (vdb.h): OpenVDB writes the header and the tree of a grid whose leaves have no attributes; these are
-// written here, page by page, as OpenVDB's own leaves would. So no grid is held in memory, values are packed once, not
-// twice, and by all threads.
+// Writes .vdb (vdb.h). OpenVDB writes the header and the tree of a grid whose leaves have no attributes. The attributes
+// are written here, page by page, in the format of OpenVDB's own leaves. No complete grid is held in memory, and values
+// are packed once instead of twice, by all threads.
 #include <fmt/format.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
@@ -46,7 +46,7 @@ void check_names(const PointSet& points)
     for (const auto& [name, members] : points.groups()) check(name, "group");
 }
 
-// A leaf without points, like one whose points were all removed: it defines the attributes.
+// Returns a tree with one empty leaf that defines the attributes, like a leaf whose points were all removed.
 PointDataTree::Ptr empty_tree(const PointSet& points)
 {
     using Position = vdb::points::TypedAttributeArray<vdb::Vec3f>;
@@ -67,10 +67,10 @@ PointDataTree::Ptr empty_tree(const PointSet& points)
     return tree;
 }
 
-// Of each text its number in the grid's list.
-using TextNumbers = std::vector<vdb::Index>;  // by token
+// The number of each string in the grid's list, by token.
+using TextNumbers = std::vector<vdb::Index>;
 
-// The grid's list of texts, in its metadata, in the order in which points have them.
+// Stores the grid's list of strings in its metadata, in order of first use.
 TextNumbers list_texts(PointDataTree& tree, const PointSet& points)
 {
     TextNumbers numbers;
@@ -86,13 +86,13 @@ TextNumbers list_texts(PointDataTree& tree, const PointSet& points)
     return numbers;
 }
 
-// What a leaf holds of an attribute.
+// An attribute's values in the leaves.
 struct Attribute {
-    std::size_t bytes = 0;  // of a value
+    std::size_t bytes = 0;  // per value
     std::uint8_t flags = 0;
-    // Whether all points of a leaf have the same bits, which are then written once.
+    // Returns true if all points of a leaf have bit-identical values, which are then written once.
     std::function<bool(const VdbLeaf& leaf)> is_uniform;
-    // The values of the first n points of a leaf.
+    // Copies the values of the first n points of a leaf.
     std::function<void(const VdbLeaf& leaf, std::uint32_t n, char* to)> copy;
 };
 
@@ -116,7 +116,7 @@ Attribute attribute_of_positions(const VdbOrder& order, double voxel)
     return result;
 }
 
-// A value as the file holds it.
+// Returns a value in the file's representation.
 template <class T>
 typename VdbValue<T>::Type value_in_file(const T& value, const TextNumbers&)
 {
@@ -146,7 +146,7 @@ Attribute attribute_of(const VdbOrder& order, const Column<T>& column, const Tex
     return result;
 }
 
-// Eight groups at most, a bit of each point for each.
+// An attribute that stores up to eight groups, one bit per point for each.
 Attribute attribute_of_groups(const VdbOrder& order, const std::vector<std::pair<int, Strided<std::uint8_t>>>& bits)
 {
     const auto value = [bits](std::size_t place) {
@@ -168,7 +168,7 @@ Attribute attribute_of_groups(const VdbOrder& order, const std::vector<std::pair
     return result;
 }
 
-// By their places in the leaf that defines them.
+// Returns the attributes in the order of the leaf that defines them.
 std::vector<Attribute> attributes_of(const VdbOrder& order, double voxel, const AttributeSet& model,
                                      const TextNumbers& numbers)
 {
@@ -178,7 +178,7 @@ std::vector<Attribute> attributes_of(const VdbOrder& order, double voxel, const 
         attributes[model.find(name)] =
             name == "P" ? attribute_of_positions(order, voxel)
                         : std::visit([&](const auto& c) { return attribute_of(order, c, numbers); }, column);
-    std::map<std::size_t, std::vector<std::pair<int, Strided<std::uint8_t>>>> groups;  // by attribute
+    std::map<std::size_t, std::vector<std::pair<int, Strided<std::uint8_t>>>> groups;  // per attribute
     for (const auto& [name, members] : points.groups()) {
         const AttributeSet::Descriptor::GroupIndex index = model.groupIndex(name);
         groups[index.first].emplace_back(index.second, members.read());
@@ -195,7 +195,7 @@ void put(std::ostream& os, const T& value)
 }
 
 struct Packed {
-    std::unique_ptr<char[]> bytes;  // null: not worth it
+    std::unique_ptr<char[]> bytes;  // null: packing does not pay
     std::size_t size = 0;
 };
 
@@ -206,14 +206,14 @@ Packed pack(const char* bytes, std::size_t size)
     return packed;
 }
 
-// Whole arrays of leaves that follow each other, which are packed together.
+// Complete arrays of consecutive leaves, packed together.
 struct Page {
     std::size_t attribute = 0, first_leaf = 0, end_leaf = 0, bytes = 0;
-    std::int32_t packed = 0;  // bytes in the file, where it is packed
-    bool is_packed = true;    // else it is no smaller so, and written as it is
+    std::int32_t packed = 0;  // bytes in the file, if packed
+    bool is_packed = true;    // false: packing would not shrink it, so it is written as it is
 };
 
-// The leaves' values, in the passes in which OpenVDB writes them.
+// Writes the leaves' values in OpenVDB's passes.
 class LeafBuffers {
 public:
     LeafBuffers(const VdbOrder& order, const std::vector<Attribute>& attributes, const AttributeSet& model)
@@ -227,7 +227,7 @@ public:
         for (std::size_t a = 0; a < attributes_.size(); ++a) add_pages(a);
     }
 
-    // Bytes of the values, unpacked, but one of each array.
+    // Returns the bytes of all values, unpacked, except for one value per array.
     std::size_t memory() const
     {
         std::size_t bytes = 0;
@@ -238,12 +238,12 @@ public:
 
     void write(std::ostream& os)
     {
-        put(os, static_cast<std::uint16_t>(4 + 2 * attributes_.size()));  // passes
+        put(os, static_cast<std::uint16_t>(4 + 2 * attributes_.size()));  // number of passes
         const std::vector<Packed> voxels = pack_voxels();
         for (const Packed& one : voxels) put(os, size_of(one));
         write_arrays(os);
-        // The sizes of pages, which are known when these have been made. They take less space where a page is not
-        // packed: then all of it is written once more.
+        // The sizes of pages are known only after packing. They take less space for an unpacked page, in which case
+        // everything is written again.
         const std::streampos sizes = os.tellp();
         do {
             os.seekp(sizes);
@@ -257,7 +257,7 @@ public:
     }
 
 private:
-    using Ends = std::array<std::uint32_t, Leaf::SIZE>;  // of the points of each voxel
+    using Ends = std::array<std::uint32_t, Leaf::SIZE>;  // end of the points of each voxel
 
     static Ends ends_of(const VdbLeaf& leaf)
     {
@@ -309,7 +309,7 @@ private:
         return values_of(leaf, attribute) * attributes_[attribute].bytes;
     }
 
-    // TypedAttributeArray::writeMetadata().
+    // Writes the same as TypedAttributeArray::writeMetadata().
     void write_arrays(std::ostream& os) const
     {
         constexpr std::uint8_t shared_descriptor = 1, uniform = 2, paged = 8;
@@ -324,7 +324,7 @@ private:
             }
     }
 
-    // As PagedOutputStream fills them.
+    // Fills pages like PagedOutputStream.
     void add_pages(std::size_t attribute)
     {
         constexpr std::size_t most = vdb::compression::PageSize;
@@ -363,7 +363,7 @@ private:
         return values;
     }
 
-    // False: a page was taken for one that is packed, or the other way round, so that all of them are in a wrong place.
+    // Returns false if a page is packed contrary to expectation, so that all pages are at the wrong position.
     bool write_pages(std::ostream& os)
     {
         struct Made {
@@ -404,11 +404,11 @@ private:
     const std::vector<VdbLeaf>& leaves_;
     const std::vector<Attribute>& attributes_;
     const AttributeSet& model_;
-    std::vector<std::uint8_t> uniform_;  // by leaf and attribute
+    std::vector<std::uint8_t> uniform_;  // per leaf and attribute
     std::vector<Page> pages_;
 };
 
-// A grid whose leaves have voxels and no points; the buffers are those of its points.
+// A grid whose leaves have voxels but no points. `buffers` writes the points.
 class PointGrid : public PointDataGrid {
 public:
     PointGrid(PointDataTree::Ptr tree, LeafBuffers& buffers, vdb::Index64 memory)
@@ -428,7 +428,7 @@ public:
 
 private:
     LeafBuffers& buffers_;
-    vdb::Index64 memory_;  // of the grid as OpenVDB would have it
+    vdb::Index64 memory_;  // memory that the grid would take in OpenVDB
 };
 
 PointDataTree::Ptr tree_of(const std::vector<VdbLeaf>& leaves)
@@ -442,7 +442,7 @@ PointDataTree::Ptr tree_of(const std::vector<VdbLeaf>& leaves)
     return tree;
 }
 
-// Of a grid of these leaves, all in memory.
+// Returns the memory of a grid of these leaves, fully loaded.
 vdb::Index64 memory_of(const PointDataTree& tree, const LeafBuffers& buffers, const AttributeSet& model)
 {
     const std::size_t of_leaf = Leaf::SIZE * sizeof(vdb::Index32) + model.memUsage() - AttributeSet().memUsage();
@@ -462,7 +462,7 @@ public:
     }
 };
 
-// OpenVDB gives each file a random UUID, with which equal points would give different bytes. This one is a hash of the
+// OpenVDB gives each file a random UUID, so that equal points would give different bytes. This one is a hash of the
 // frame and a sample of its positions.
 std::string file_uuid(const PointSet& points, const FrameInfo& frame)
 {
@@ -495,7 +495,7 @@ void write_grid(OutputFile& file, PointDataGrid& grid, double voxel, const Frame
     Archive().write_to(stream, {not_owned});
     const auto end = static_cast<off_t>(stream.tellp());
     stream.flush();
-    // Of pages that were written twice.
+    // Removes the rest of pages that were written twice.
     if (::ftruncate(file.descriptor(), end) != 0) throw file_error("can't be written", errno);
 }
 

@@ -41,10 +41,10 @@ std::string_view without_space(std::string_view text)
     return text;
 }
 
-// Numbers as text, in memory as the machine has them.
+// Parses numbers to the machine's binary format.
 std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type, std::size_t count)
 {
-    if (count > (text.size() + 1) / 2) throw ends_early();  // a digit each, and a space between them
+    if (count > (text.size() + 1) / 2) throw ends_early();  // a digit each, separated by spaces
     std::vector<unsigned char> bytes(count * scalar_bytes(type));
     with_scalar(type, [&](auto like) {
         using Number = std::conditional_t<std::is_same_v<decltype(like), Half>, float, decltype(like)>;
@@ -74,7 +74,7 @@ std::optional<std::size_t> whole_number(std::string_view text)
 
 VtkFile::VtkFile(std::string_view text, std::string_view type)
 {
-    // What is appended is no XML where it is raw.
+    // The appended section is not XML if it is raw.
     const std::size_t appended = text.find("<AppendedData");
     std::string xml(text.substr(0, appended));
     if (appended != std::string_view::npos) {
@@ -121,7 +121,7 @@ std::span<const unsigned char> VtkFile::raw(std::string_view text, std::size_t w
 std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, std::size_t wanted) const
 {
     const std::size_t number = wide_header_ ? 8 : 4;
-    // The next bytes; in base64 the header and the data are encoded apart, the header as one.
+    // Returns the next bytes. In Base64 the header and the data are encoded separately, and the header as a whole.
     const auto bytes_at = [&](std::size_t count, std::size_t& length) {
         if (base64) return from_base64(text, count, length);
         if (count > text.size()) throw ends_early();
@@ -131,13 +131,14 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
     };
     std::size_t length = 0;
     if (!compressed_) {
-        // A count of bytes, then these; encoded as one.
+        // A byte count, then the data, encoded together.
         if (header_number(bytes_at(number, length), 0) < wanted || wanted > text.size()) throw ends_early();
         std::vector<unsigned char> bytes = bytes_at(number + wanted, length);
         bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(number));
         return bytes;
     }
-    // The number of blocks, bytes of each and of the last one (0: as the others), then the compressed bytes of each.
+    // The number of blocks, the size of each and of the last one (0: like the others), then the compressed size of
+    // each.
     const std::size_t blocks = header_number(bytes_at(3 * number, length), 0);
     if (blocks > text.size() / number) throw ends_early();
     const std::vector<unsigned char> header = bytes_at((3 + blocks) * number, length);
@@ -205,7 +206,7 @@ std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
         const std::string_view text = without_space(node.text().get());
         std::vector<unsigned char> bytes;
         if (node.attribute("format").value() == std::string_view("ascii")) {
-            // The bytes as numbers.
+            // The bytes are stored as numbers.
             std::size_t count = 0;
             for (std::size_t i = 0; i < text.size(); ++i)
                 count += xml_space.find(text[i]) == std::string_view::npos &&

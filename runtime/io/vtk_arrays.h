@@ -1,7 +1,7 @@
-// The arrays of VTK's XML files: in the XML as text ("ascii") or base64 ("binary"), or appended to it, raw or as
-// base64; compressed by zlib or not; of either order of bytes.
+// The arrays of VTK's XML files: inside the XML as text ("ascii") or Base64 ("binary"), or appended to it, raw or as
+// Base64; optionally compressed by zlib; in either byte order.
 //
-// Nothing in a file is trusted. Errors say what is wrong; who calls adds the file's name.
+// Nothing in a file is trusted. Errors do not contain the file's name; the caller adds it.
 #pragma once
 
 #include <optional>
@@ -16,39 +16,39 @@
 
 namespace rapid {
 
-// The whole text as a number; nothing where it is none.
+// Parses the whole text as an unsigned integer. Returns nothing if it is not one.
 std::optional<std::size_t> whole_number(std::string_view text);
 
 struct VtkArray {
     ScalarType type;
-    std::size_t numbers;  // of each row
+    std::size_t numbers;  // per row
     ByteOrder order;
     std::span<const unsigned char> bytes;
-    std::vector<unsigned char> decoded;  // what they are, where they are not in the file
+    std::vector<unsigned char> decoded;  // storage for bytes that had to be decoded
 };
 
 class VtkFile {
 public:
-    // `text` must outlive it. Error: no XML of VTK; another type; a compressor that is not known.
+    // `text` must outlive it. Throws Error if the text is not VTK XML of this type, or uses an unknown compressor.
     VtkFile(std::string_view text, std::string_view type);
 
     const pugi::xml_document& document() const { return document_; }
 
-    // An array of so many texts, each ended by a 0. Error: it is not there, or holds fewer.
+    // Reads an array of `rows` strings, each terminated by a zero byte. Throws Error if it is missing or too short.
     std::vector<Token> texts(pugi::xml_node node, std::size_t rows) const;
 
-    // An array of so many rows; nothing for those that are no attribute: of text, of bits, of more than 16 numbers a
-    // row. Error: an array that is not there, or holds less.
+    // Reads an array with `rows` rows. Returns nothing for arrays that can't be attributes: strings, bits, more than 16
+    // numbers per row. Throws Error if the array is missing or too short.
     std::optional<VtkArray> array(pugi::xml_node node, std::size_t rows) const;
 
 private:
-    // How many bytes the array holds whose data begin here.
+    // Returns the number of bytes in the array whose data begin here.
     std::size_t bytes_of(std::string_view text, bool base64) const;
-    // The data of an array that is in the XML or appended to it, and whether they are base64.
+    // Returns the data of an array, from the XML or the appended section, and whether they are Base64.
     std::pair<std::string_view, bool> data_of(pugi::xml_node node, std::string_view text) const;
-    // The bytes that `text` holds behind their count, as they are.
+    // Returns the raw bytes in `text`, which follow their count.
     std::span<const unsigned char> raw(std::string_view text, std::size_t wanted) const;
-    // The same where they are encoded or compressed.
+    // Returns the same bytes if they are encoded or compressed.
     std::vector<unsigned char> decode(std::string_view text, bool base64, std::size_t wanted) const;
     std::size_t header_number(std::span<const unsigned char> bytes, std::size_t index) const;
 

@@ -1,12 +1,12 @@
-// .vtp: VTK's PolyData in XML ("VTK File Formats"), as ParaView and VTK read it. The arrays are appended to the XML as
-// they are in memory, after a count of bytes each:
+// .vtp: VTK's PolyData in XML ("VTK File Formats"), as ParaView and VTK read it. The arrays are appended to the XML in
+// binary, each after a byte count:
 //
-//   <VTKFile type="PolyData" ...> ... <DataArray type="Float32" Name="v" ... offset="0"/> ... <AppendedData
-//   encoding="raw">_ | for each array: uint64 bytes, its numbers | </AppendedData></VTKFile>
+//   <VTKFile type="PolyData" ...> ... <DataArray type="Float32" Name="v" ... offset="0"/> ...
+//   <AppendedData encoding="raw">_ | for each array: uint64 bytes, its numbers | </AppendedData></VTKFile>
 //
-// P is the Points, an attribute of texts an Array of the type String (its bytes: each text and a 0), any other
-// attribute is an array of the PointData, a group UInt8 group_NAME. One cell of all points makes them visible; the
-// field TimeValue is the time of the frame, s. vtk_arrays.h has what is read.
+// P is the Points, a string attribute is an Array of type String (its bytes: each string and a zero byte), any other
+// attribute is an array of the PointData, and a group is UInt8 group_NAME. One cell with all points makes them visible.
+// The field TimeValue is the time of the frame, s. For reading see vtk_arrays.h.
 #include <fmt/format.h>
 
 #include <numeric>
@@ -30,7 +30,7 @@ std::string_view vtk_type(AttributeType type)
     return type == AttributeType::Int64 ? "Int64" : "Float32";
 }
 
-// XML can't hold them.
+// Returns the characters that XML cannot represent.
 std::string control_characters()
 {
     std::string text(' ', '\0');
@@ -38,7 +38,7 @@ std::string control_characters()
     return text;
 }
 
-// The XML, with a place for the data, and the arrays that belong there.
+// The XML with a position for the data, and the arrays that belong there.
 class VtpWriter {
 public:
     explicit VtpWriter(const PointSet& points)
@@ -80,7 +80,7 @@ private:
         std::uint64_t bytes() const
         {
             if (!texts) return records.record_bytes() * size;
-            std::uint64_t sum = size;  // a 0 behind each
+            std::uint64_t sum = size;  // a zero byte after each
             for (std::size_t i = 0; i < size; ++i) sum += (*texts)[i].text().size();
             return sum;
         }
@@ -172,7 +172,7 @@ private:
     AnyColumn connectivity_, offsets_;  // of the cell
     pugi::xml_document document_;
     std::vector<Array> arrays_;
-    std::uint64_t offset_ = 0;  // of the last array, from the first one
+    std::uint64_t offset_ = 0;  // of the last array, relative to the first one
 };
 
 void write_vtp(OutputFile& file, const PointSet& points, const FrameInfo& frame)

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t longest_name = 0xffff;
 
-// Minizip moves to a place relative to one of these.
+// Computes a position for Minizip, which seeks relative to one of these origins.
 std::uint64_t place_of(std::uint64_t offset, int origin, std::uint64_t position, std::uint64_t end)
 {
     if (origin == ZLIB_FILEFUNC_SEEK_CUR) return position + offset;
@@ -28,7 +28,8 @@ std::uint64_t place_of(std::uint64_t offset, int origin, std::uint64_t position,
 
 }  // namespace
 
-// The file as Minizip sees it. Its callbacks are C's: an error is kept, and thrown by who called Minizip.
+// The file as seen by Minizip. Its callbacks are C functions, so an error is stored and thrown by the caller of
+// Minizip.
 struct ZipWriter::Archive {
     OutputFile& file;
     std::uint64_t position = 0, end = 0;
@@ -86,7 +87,7 @@ ZipWriter::~ZipWriter()
 void ZipWriter::begin(const std::string& name, std::uint64_t bytes)
 {
     zip_fileinfo info = {};
-    info.dosDate = 1 << 21 | 1 << 16;  // 1980-01-01, so that the same points are the same file
+    info.dosDate = 1 << 21 | 1 << 16;  // 1980-01-01, so that the same points give the same file
     const bool large = bytes >= 0xffffffff;
     constexpr uLong utf8 = 1 << 11;
     archive_->check(::zipOpenNewFileInZip4_64(archive_->zip, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr,
@@ -141,8 +142,8 @@ namespace {
 
 Error damaged() { return Error("not a whole zip file: its directory is missing or damaged"); }
 
-// Whether the file has all of the record that ends it, "PK\5\6", and of the comment after the record. minizip does not
-// read the record's last bytes if there is one for 64 bits.
+// Returns true if the file has the complete end record, "PK\5\6", and the comment after it. Minizip does not read the
+// record's last bytes if there is a 64-bit one.
 bool has_whole_end(std::span<const unsigned char> bytes)
 {
     constexpr std::size_t record = 22;
@@ -169,7 +170,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
     archive_->zip = ::unzOpen2_64("", &functions);
     if (!archive_->zip || !has_whole_end(bytes)) throw damaged();
 
-    // What members say that they hold is no more than the file can, all together: they do not share bytes.
+    // The claimed sizes of all members together must be possible for this file: members do not share bytes.
     std::uint64_t held = 0;
     std::vector<char> name(longest_name + 1);
     unz_global_info64 all = {};

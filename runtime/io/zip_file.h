@@ -1,6 +1,6 @@
-// Zip files, by Minizip: written to an OutputFile as they grow, read from memory.
+// Zip files through Minizip: written to an OutputFile as they grow, read from memory.
 //
-// Errors say what is wrong; who calls adds the file's name.
+// Errors do not contain the file's name; the caller adds it.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ public:
     ZipWriter& operator=(const ZipWriter&) = delete;
     ~ZipWriter();
 
-    // Begins a member of so many bytes, which is stored as it is. Its time is the first that a zip file knows.
+    // Begins an uncompressed member of this size. Its time is the earliest that a zip file can store.
     void begin(const std::string& name, std::uint64_t bytes);
     void write(const void* data, std::size_t bytes);
     void end();
@@ -41,14 +41,15 @@ public:
         std::size_t bytes;
     };
 
-    // `bytes` must outlive it. Error: no zip file; members that are encrypted, or hold more than the file can.
+    // `bytes` must outlive it. Throws Error if this is not a zip file, or if members are encrypted or claim more than
+    // the file can contain.
     explicit ZipReader(std::span<const unsigned char> bytes);
     ZipReader(const ZipReader&) = delete;
     ZipReader& operator=(const ZipReader&) = delete;
     ~ZipReader();
 
     const std::vector<Member>& members() const { return members_; }
-    // Error: damage, which the checksum shows.
+    // Throws Error if the checksum shows damage.
     std::vector<unsigned char> read(const Member& member);
 
 private:

@@ -53,10 +53,7 @@ public:
             }
             const std::int64_t first = scene.first_frame();
             RunFrames frames{first + 1, first + 2};
-            if (!frames_text_.empty()) {
-                const FrameSelection asked = read_frames(frames_text_);
-                frames = {asked.first, asked.last, asked.step};
-            }
+            if (!frames_text_.empty()) frames = read_frames(frames_text_);
             if (frames.last < first)
                 throw Error(fmt::format("-f {} ends before the scene begins, at frame {}", frames_text_, first));
             if (!is_free_of_races(scene, frames, common.verbose)) return status_failed;

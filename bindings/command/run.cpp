@@ -87,7 +87,7 @@ public:
         if (untrusted_.asked() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
         check_farm();
-        if (frames_) options_.frames = RunFrames{frames_->first, frames_->last, frames_->step};
+        options_.frames = frames_;
         options_.cache.folder = cache_.folder();
         options_.cache.every = cache_.every().value_or(options_.cache.every);
         options_.cache.again = cache_.again();
@@ -225,7 +225,7 @@ private:
     FileOptions files_;
     PartOptions part_;
     CacheOptions cache_;
-    std::optional<FrameSelection> frames_;
+    std::optional<RunFrames> frames_;
     RunOptions options_;
     double grace_ = 20;  // s
     FarmOptions farm_;

@@ -450,7 +450,7 @@ private:
     SceneArguments graph_;
     UntrustedOptions untrusted_;
     std::vector<std::string> sweep_, reference_, lines_;
-    std::optional<FrameSelection> frames_;
+    std::optional<RunFrames> frames_;
     std::optional<std::string> error_, error_frames_;
     std::optional<int> repeat_;
     std::string folder_ = ".";

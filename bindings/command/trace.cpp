@@ -51,7 +51,7 @@ public:
         return threads.run([&] {
             Scene scene = graph_.open(common);
             const std::int64_t start = scene.first_frame();
-            const FrameSelection frames = frames_.value_or(FrameSelection{start, start + default_frames - 1});
+            const RunFrames frames = frames_.value_or(RunFrames{start, start + default_frames - 1});
             if (frames.last < start)
                 throw Error(fmt::format("-f: frame {} is before the scene's first, {}", frames.last, start));
             const SceneTrace trace = or_throw(scene.trace({ids_, create_, frames.first, frames.last, frames.step}));
@@ -67,7 +67,7 @@ private:
     SceneArguments graph_;
     std::vector<std::int64_t> ids_;
     std::string create_;
-    std::optional<FrameSelection> frames_;
+    std::optional<RunFrames> frames_;
     UntrustedOptions untrusted_;
     bool json_ = false;
 };

@@ -519,7 +519,7 @@ private:
     FileOptions files_;
     UntrustedOptions untrusted_;
     std::vector<SweptSetting> settings_;
-    std::optional<FrameSelection> frames_;
+    std::optional<RunFrames> frames_;
     std::int64_t jobs_ = 1;
     CacheOptions cache_;
     bool zip_ = false, quiet_ = false;

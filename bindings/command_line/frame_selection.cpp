@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-FrameSelection read_frames(const std::string& text)
+RunFrames read_frames(const std::string& text)
 {
     const auto wrong = [&](const char* what) {
         return Error(fmt::format("-f {}: {}; it must be a frame (12), a range (1-48), or a range and a step (1-48x2)",
@@ -25,7 +25,7 @@ FrameSelection read_frames(const std::string& text)
         return std::int64_t{value};
     };
 
-    FrameSelection range{number(), 0};
+    RunFrames range{number(), 0};
     range.last = range.first;
     if (at == end) return range;
     if (*at++ != '-') throw wrong("a - is missing");
@@ -48,7 +48,7 @@ std::int64_t read_frame(const std::string& option, const std::string& text)
     return frame;
 }
 
-void declare_frames(Options& options, std::optional<FrameSelection>& frames, const std::string& doc)
+void declare_frames(Options& options, std::optional<RunFrames>& frames, const std::string& doc)
 {
     options
         .add_option(

@@ -32,8 +32,8 @@ std::string key_of(const OutputTarget& to)
 
 }  // namespace
 
-FrameFiles::FrameFiles(const std::vector<std::string>& outputs, PictureOptions picture)
-    : picture_(std::make_shared<const PictureOptions>(std::move(picture)))
+FrameFiles::FrameFiles(const std::vector<std::string>& outputs, std::shared_ptr<const PictureOptions> picture)
+    : picture_(std::move(picture))
 {
     for (const std::string& text : outputs) targets_.push_back({parse_output_target(text), text, {}});
 }
@@ -205,7 +205,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
     }
 }
 
-void FrameFiles::claim(WrittenNames& names, const FrameSelection& frames) const
+void FrameFiles::claim(WrittenNames& names, const RunFrames& frames) const
 {
     for (const auto& [pattern, node, location] : of_nodes_) try {
             names.add(FramePattern(pattern), "main", frames, fmt::format("node \"{}\"", node));
@@ -262,7 +262,7 @@ FrameInfo FrameFiles::info_of(std::int64_t number, double time, double fps, cons
     return info;
 }
 
-std::string FrameFiles::how_of(const OutputTarget& to, const FrameSelection& frames) const
+std::string FrameFiles::how_of(const OutputTarget& to, const RunFrames& frames) const
 {
     std::string how = to.attributes ? fmt::format("of {}", fmt::join(*to.attributes, ",")) : "";
     const Format& format = format_of(to.pattern);
@@ -277,7 +277,7 @@ std::string FrameFiles::how_of(const OutputTarget& to, const FrameSelection& fra
     return how;
 }
 
-std::vector<FrameFiles::FrameFile> FrameFiles::files_of(std::int64_t frame, const FrameSelection& frames) const
+std::vector<FrameFiles::FrameFile> FrameFiles::files_of(std::int64_t frame, const RunFrames& frames) const
 {
     std::vector<FrameFile> files;
     for (const Target& target : targets_)
@@ -287,7 +287,7 @@ std::vector<FrameFiles::FrameFile> FrameFiles::files_of(std::int64_t frame, cons
     return files;
 }
 
-void FrameFiles::go_on_behind(WholeFiles whole, const FrameSelection& frames)
+void FrameFiles::go_on_behind(WholeFiles whole, const RunFrames& frames)
 {
     whole_ = std::move(whole);
     selection_ = frames;

@@ -14,7 +14,7 @@
 #include "bindings/host/picture_scene.h"
 #include "bindings/run/part_record.h"
 #include "bindings/run/written_names.h"
-#include "runtime/files/frame_selection.h"
+#include "include/rapid/run.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
 
@@ -29,7 +29,7 @@ std::vector<std::filesystem::path> folders_of(const std::vector<std::string>& ou
 class FrameFiles {
 public:
     // outputs: texts of -o. Error: one is none.
-    FrameFiles(const std::vector<std::string>& outputs, PictureOptions picture);
+    FrameFiles(const std::vector<std::string>& outputs, std::shared_ptr<const PictureOptions> picture);
 
     // The files are those of a part. Before all below. record: what is known of it before the run; its
     // identity may grow until finish().
@@ -47,7 +47,7 @@ public:
     void resolve(const Plan& plan, bool several_frames);
 
     // Adds the names of all files. After resolve(). Error: one that another has, or that is read.
-    void claim(WrittenNames& names, const FrameSelection& frames) const;
+    void claim(WrittenNames& names, const RunFrames& frames) const;
     // The same of the files of nodes, among processes (claim_among_processes).
     void claim(const std::filesystem::path& folder, const std::string& who) const;
 
@@ -57,7 +57,7 @@ public:
         std::string path, how;
         bool film = false;  // one of all frames
     };
-    std::vector<FrameFile> files_of(std::int64_t frame, const FrameSelection& frames) const;
+    std::vector<FrameFile> files_of(std::int64_t frame, const RunFrames& frames) const;
 
     // What an earlier run has left whole: it is not written again. By frame and absolute path; films by absolute path.
     struct WholeFiles {
@@ -68,7 +68,7 @@ public:
         std::map<std::int64_t, std::map<std::string, File>> frames;
         std::map<std::string, std::string> films;  // and how they are made
     };
-    void go_on_behind(WholeFiles whole, const FrameSelection& frames);
+    void go_on_behind(WholeFiles whole, const RunFrames& frames);
 
     // Queues the files of a frame. Error: one of an earlier frame that could not be written.
     void write(const FrameResult& result);
@@ -108,7 +108,7 @@ private:
     void write_part_records() const;
     void check_film(const Format& format, const std::string& pattern) const;
     FrameInfo info_of(std::int64_t number, double time, double fps, const OutputTarget& to);
-    std::string how_of(const OutputTarget& to, const FrameSelection& frames) const;
+    std::string how_of(const OutputTarget& to, const RunFrames& frames) const;
     const WholeFiles::File* whole_file(std::int64_t frame, const std::string& path, const std::string& how) const;
     FrameWriter::Write write_of(const std::string& pattern) const;
     void submit(const OutputTarget& to, PointSet points, FrameInfo info, const std::string& output, bool of_node);
@@ -158,7 +158,7 @@ private:
     std::map<std::string, std::unique_ptr<Writer>> writers_;
 
     WholeFiles whole_;
-    FrameSelection selection_{};  // where files are whole, or are to be known as such
+    RunFrames selection_{0, 0};  // where files are whole, or are to be known as such
 };
 
 }  // namespace rapid

@@ -86,7 +86,7 @@ std::string difference(const PartRecord& there, const PartRecord& here)
         const auto known = record.identity.find(name);
         return known == record.identity.end() ? std::string("not given") : known->second;
     };
-    const auto frames = [](const FrameSelection& f) { return fmt::format("{}-{}x{}", f.first, f.last, f.step); };
+    const auto frames = [](const RunFrames& f) { return fmt::format("{}-{}x{}", f.first, f.last, f.step); };
     const auto sample = [](const PartRecord& record) {
         return record.sample ? fmt::format("{}", *record.sample) : "all";
     };

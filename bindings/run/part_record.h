@@ -12,15 +12,14 @@
 #include <optional>
 #include <string>
 
-#include "runtime/files/frame_selection.h"
-#include "runtime/points/subset.h"
+#include "include/rapid/run.h"
 
 namespace rapid {
 
 struct PartRecord {
-    Part part;
+    RunPart part;
     std::optional<double> sample;
-    FrameSelection frames;
+    RunFrames frames;
     double fps = 24;         // of the output's simulation
     std::int64_t start = 1;  // likewise: its first frame
     // A file that the part has written: the number of its points, and the hash of its bytes.

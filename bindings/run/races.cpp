@@ -109,12 +109,12 @@ std::optional<Difference> compare(const PointSet& a, const PointSet& b)
     return compare_details(a, b);
 }
 
-void advance_all(Evaluator& evaluator, const Plan& plan, const FrameSelection& frames)
+void advance_all(Evaluator& evaluator, const Plan& plan, const RunFrames& frames)
 {
     for (std::int64_t frame = plan.first_frame(); frame <= frames.last; ++frame) evaluator.advance();
 }
 
-std::vector<NodePoints> results_in_order(const Plan& plan, const FrameSelection& frames)
+std::vector<NodePoints> results_in_order(const Plan& plan, const RunFrames& frames)
 {
     std::vector<NodePoints> results;
     Evaluator evaluator(plan, {}, [&](const Node& node, std::int64_t frame, const PointSet& points) {
@@ -127,7 +127,7 @@ std::vector<NodePoints> results_in_order(const Plan& plan, const FrameSelection&
 struct Trials {
     const LoadInOrder& load;
     const PlanOptions& options;
-    const FrameSelection& frames;
+    const RunFrames& frames;
     const std::vector<NodePoints>& expected;
 
     // Computes the frames in another order, and compares the result of each node.
@@ -176,7 +176,7 @@ std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan
 
 }  // namespace
 
-Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames)
+Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const RunFrames& frames)
 {
     const std::vector<NodePoints> expected = results_in_order(plan, frames);
     Races races;

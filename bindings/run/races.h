@@ -12,7 +12,7 @@
 #include <string>
 
 #include "bindings/host/session.h"
-#include "runtime/files/frame_selection.h"
+#include "include/rapid/run.h"
 #include "runtime/graph/plan.h"
 
 namespace rapid {
@@ -25,6 +25,6 @@ struct Races {
 // plan: of a session in the order of the points, on one thread; load: gives another one of the same scene, in another
 // order. frames: those that are compared; all before them are computed. Error: one that a frame raises.
 using LoadInOrder = std::function<std::unique_ptr<Session>(const KernelOrder& order)>;
-Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const FrameSelection& frames);
+Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& options, const RunFrames& frames);
 
 }  // namespace rapid

@@ -197,7 +197,7 @@ void RunCache::go_on_as_before()
                         folder().string()));
 }
 
-void RunCache::begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
+void RunCache::begin(const Session& session, const Plan& plan, const RunFrames& frames, const Fingerprint& options,
                      FrameFiles& files, EventFile& events)
 {
     frames_ = frames;

@@ -12,27 +12,21 @@
 #include "bindings/run/event_file.h"
 #include "bindings/run/frame_files.h"
 #include "bindings/run/frame_record.h"
+#include "include/rapid/run.h"
 #include "runtime/files/frame_archive.h"
-#include "runtime/files/frame_selection.h"
 #include "runtime/graph/evaluate.h"
 
 namespace rapid {
 
 class RunCache {
 public:
-    struct Options {
-        std::filesystem::path folder;  // empty: there is no cache
-        std::int64_t every = 10;       // frames; 0: no snapshots
-        bool again = false;            // computes all, whatever the folder has
-        bool replaces = false;         // another run's cache is no error
-        bool estimates_errors = true;  // if the cache begins with this run
-    };
-    explicit RunCache(Options options)
-        : archive_(std::move(options.folder)),
+    // estimates_errors: if the cache begins with this run.
+    RunCache(const RunCacheOptions& options, bool estimates_errors)
+        : archive_(options.folder),
           every_(options.every),
           again_(options.again),
-          replaces_(options.replaces),
-          estimates_errors_(options.estimates_errors)
+          replaces_(options.replace),
+          estimates_errors_(estimates_errors)
     {
     }
 
@@ -46,7 +40,7 @@ public:
 
     // What is asked for, and what the folder has of it. options: of the fingerprint. Error: another run has the folder,
     // or it is of a run of another fingerprint.
-    void begin(const Session& session, const Plan& plan, const FrameSelection& frames, const Fingerprint& options,
+    void begin(const Session& session, const Plan& plan, const RunFrames& frames, const Fingerprint& options,
                FrameFiles& files, EventFile& events);
 
     // After begin(): whether this run estimates errors. All runs of a cache do, or none, as its first one has decided:
@@ -114,7 +108,7 @@ private:
     std::unique_ptr<InputContents> read_;
     Fingerprint fingerprint_, contents_;  // contents_: of the files read in frames
     Known known_;
-    FrameSelection frames_{};
+    RunFrames frames_{0, 0};
     std::int64_t first_frame_ = 0, last_due_ = 0;
     std::optional<std::int64_t> first_due_, last_kept_;
     std::map<std::int64_t, FrameRecord> open_;  // frames whose files are to come

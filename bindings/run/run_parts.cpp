@@ -156,7 +156,7 @@ void RunParts::find_missing(const std::map<int, PartFiles>& parts, int count, st
 
 void RunParts::find_frames(PartFiles& part, std::vector<std::string>& problems)
 {
-    const FrameSelection& wanted = part.record.frames;
+    const RunFrames& wanted = part.record.frames;
     const FramePattern pattern(part.text);
     std::vector<int> missing;
     std::error_code none;

@@ -63,8 +63,7 @@ void WrittenNames::add(const fs::path& file, std::string who)
     writers_.push_back(std::move(writer));
 }
 
-void WrittenNames::add(const FramePattern& pattern, std::string_view output, const FrameSelection& frames,
-                       std::string who)
+void WrittenNames::add(const FramePattern& pattern, std::string_view output, const RunFrames& frames, std::string who)
 {
     const fs::path place = true_path(pattern.of_output(output));
     Writer writer{place.parent_path(), place.filename(), FramePattern(place.filename()), frames, std::move(who)};

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "include/rapid/run.h"
 #include "runtime/files/frame_pattern.h"
-#include "runtime/files/frame_selection.h"
 
 namespace rapid {
 
@@ -22,14 +22,14 @@ public:
     // One file. who: "--stats". Error: it is read, or another's.
     void add(const std::filesystem::path& file, std::string who);
     // One file for each frame, or of all where the pattern has no frame number. who: "-o x.####.csv".
-    void add(const FramePattern& pattern, std::string_view output, const FrameSelection& frames, std::string who);
+    void add(const FramePattern& pattern, std::string_view output, const RunFrames& frames, std::string who);
 
 private:
     struct Writer {
         std::filesystem::path folder;
         std::string name;
         std::optional<FramePattern> pattern;  // of the name
-        FrameSelection frames;
+        RunFrames frames;
         std::string who;
     };
     std::optional<std::string> common_name(const Writer& a, const Writer& b) const;

@@ -85,8 +85,6 @@ void check_frames(const RunFrames& frames)
                            frames.last, frames.step));
 }
 
-FrameSelection selection_of(const RunFrames& range) { return {range.first, range.last, range.step}; }
-
 FrameFiles frame_files(const FileOutputs& files)
 {
     constexpr int most_pixels = 16384;
@@ -95,7 +93,7 @@ FrameFiles frame_files(const FileOutputs& files)
         std::max(asked.size.width, asked.size.height) > most_pixels)
         refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", asked.size.width, asked.size.height,
                            most_pixels));
-    return FrameFiles(files.outputs, *picture_options(asked.camera, asked.size));
+    return FrameFiles(files.outputs, picture_options(asked.camera, asked.size));
 }
 
 Result<OutputFormat> output_format(const std::string& output)
@@ -259,7 +257,7 @@ Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames 
             frame_files(files).resolve(plan, true);
             if (frames.last < plan.first_frame())
                 refuse(fmt::format("frame {} is before the scene's first, {}", frames.last, plan.first_frame()));
-            races = races_in(load, plan, options, selection_of(frames));
+            races = races_in(load, plan, options, frames);
         });
         SceneRaces result;
         result.compared = races.compared;

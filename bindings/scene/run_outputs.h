@@ -11,6 +11,5 @@ FrameFiles frame_files(const FileOutputs& files);
 
 // Throws a Refusal: frames that do not go up, or that no file's name or format holds.
 void check_frames(const RunFrames& frames);
-FrameSelection selection_of(const RunFrames& range);
 
 }  // namespace rapid

@@ -21,12 +21,6 @@ namespace {
 
 constexpr std::int64_t default_frames = 48;
 
-std::optional<Part> part_of(const RunOptions& options)
-{
-    if (!options.part) return std::nullopt;
-    return Part{options.part->number, options.part->count};
-}
-
 std::string name_of(const RunPart& part) { return part_name(part.number, part.count); }
 
 std::string name_in_part(const std::string& file, const std::optional<RunPart>& part)
@@ -81,7 +75,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     std::shared_ptr<PartRecord> record;  // null where all points are simulated
     std::optional<InputContents> read;   // of a part
     RunReport report;
-    FrameSelection frames{};
+    RunFrames frames{0, 0};
     std::int64_t first = 1;  // of the scene
     bool has_opened = false, is_ready = false, has_begun = false;
     std::atomic<bool> computes = false;  // frames: what they read is not noted
@@ -92,8 +86,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
           listener(std::move(told)),
           files(frame_files(options.files)),
           events(name_in_part(options.events, options.part)),
-          cache({options.cache.folder, options.cache.every, options.cache.again, options.cache.replace,
-                 scene_options.estimate_errors}),
+          cache(options.cache, scene_options.estimate_errors),
           report({file, scene_options.threads > 0 ? scene_options.threads : tbb::this_task_arena::max_concurrency(),
                   name_in_part(options.statistics, options.part), name_in_part(options.profile, options.part)},
                  {[this](const FrameStatistics& frame, double seconds, bool is_known) {
@@ -127,7 +120,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     {
         read.emplace(folder_of(file), InputContents::Code::Included);
         record = std::make_shared<PartRecord>();
-        record->part = *part_of(options);
+        record->part = *options.part;
         record->sample = options.sample;
         files.take_part(record);
     }
@@ -172,7 +165,9 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         scene.load(std::move(set));
         const Plan& plan = *scene.plan;
         first = plan.first_frame();
-        if (const Subset subset(part_of(options), options.sample); !subset.is_all()) take_subset(plan, subset);
+        const RunPart part = options.part.value_or(RunPart());
+        if (const Subset subset(part.number, part.count, options.sample.value_or(1)); !subset.is_all())
+            take_subset(plan, subset);
         frames = range_of(plan);
         if (record) {
             record->frames = frames;
@@ -203,13 +198,13 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         claim(events.path(), "--events");
     }
 
-    FrameSelection range_of(const Plan& plan) const
+    RunFrames range_of(const Plan& plan) const
     {
         const std::int64_t start = plan.first_frame();
         if (!options.frames) return {start, start + default_frames - 1};
         if (options.frames->first < start)
             throw Error(fmt::format("-f: frame {} is before the scene's first, {}", options.frames->first, start));
-        return selection_of(*options.frames);
+        return *options.frames;
     }
 
     // What else changes what a run keeps.
@@ -354,7 +349,7 @@ Result<Done> SceneRun::prepare()
 }
 
 std::int64_t SceneRun::first_frame() const { return impl_->first; }
-RunFrames SceneRun::frames() const { return {impl_->frames.first, impl_->frames.last, impl_->frames.step}; }
+RunFrames SceneRun::frames() const { return impl_->frames; }
 
 Result<std::vector<std::pair<std::string, std::string>>> SceneRun::merges(int parts)
 {

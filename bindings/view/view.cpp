@@ -143,7 +143,7 @@ private:
 
     SceneArguments graph_;
     UntrustedOptions untrusted_;
-    std::optional<FrameSelection> frames_;
+    std::optional<RunFrames> frames_;
     std::string cache_;
     int port_ = 0;
     bool no_open_ = false;

@@ -28,6 +28,9 @@ namespace rapid {
 // Frames from the first one to the last, each step-th.
 struct RunFrames {
     std::int64_t first = 1, last = 48, step = 1;  // numbers of frames, and a distance of them
+
+    bool contains(std::int64_t frame) const { return frame >= first && frame <= last && (frame - first) % step == 0; }
+    bool single() const { return first + step > last; }
 };
 
 // How pictures are drawn. What is not given is fitted to the points and shapes.

@@ -8,27 +8,20 @@
 
 #include <cmath>
 #include <cstdint>
-#include <optional>
 
 namespace rapid {
-
-// Part `number` of `count`, counted from 1.
-struct Part {
-    int number = 1, count = 1;
-
-    bool operator==(const Part&) const = default;
-};
 
 class Subset {
 public:
     Subset() = default;
-    // sample: fraction of the points, above 0 and at most 1.
-    Subset(std::optional<Part> part, std::optional<double> sample)
-        : is_all_((!part || part->count == 1) && (!sample || *sample == 1))
+    // Part `number` of `count`, counted from 1. sample: fraction of the points, above 0 and at most 1.
+    Subset(int number, int count, double sample = 1)
+        : is_all_(count == 1 && sample == 1),
+          samples_(sample < 1),
+          number_(static_cast<std::uint64_t>(number - 1)),
+          count_(static_cast<std::uint64_t>(count)),
+          limit_(samples_ ? static_cast<std::uint64_t>(std::ldexp(sample, 64)) : 0)
     {
-        if (part)
-            number_ = static_cast<std::uint64_t>(part->number - 1), count_ = static_cast<std::uint64_t>(part->count);
-        if (sample && *sample < 1) limit_ = static_cast<std::uint64_t>(std::ldexp(*sample, 64)), samples_ = true;
     }
 
     bool is_all() const { return is_all_; }

@@ -15,7 +15,7 @@ namespace {
 
 PointSet part_of(const PointSet& whole, int number, int count)
 {
-    const Subset subset(Part{number, count}, std::nullopt);
+    const Subset subset(number, count);
     std::vector<std::uint8_t> kept(whole.size());
     for (std::size_t i = 0; i < whole.size(); ++i) kept[i] = subset.has(whole.id()[i]);
     PointSet part = whole;

@@ -159,7 +159,7 @@ TEST_CASE("a program's face knows the scripts below it, and not the command", "[
 {
     for (const auto& [folder, above] : std::map<std::string, std::set<std::string>>{
              {"bindings/host", {"bindings/scene/", "bindings/c/", "bindings/run/", "include/"}},
-             {"bindings/run", {"bindings/scene/", "bindings/c/", "bindings/command", "bindings/view/", "include/"}},
+             {"bindings/run", {"bindings/scene/", "bindings/c/", "bindings/command", "bindings/view/"}},
              {"bindings/scene", {"bindings/command", "bindings/c/", "bindings/view/"}},
              {"bindings/c", {"bindings/command", "bindings/host/", "bindings/run/", "runtime/"}}}) {
         const auto includes = includes_below(folder);
@@ -169,6 +169,14 @@ TEST_CASE("a program's face knows the scripts below it, and not the command", "[
                 CAPTURE(include.file, include.included);
                 CHECK(include.included.rfind(other, 0) != 0);
             }
+    }
+}
+
+TEST_CASE("a run knows of a program's face what a program asks of a run", "[layers]")
+{
+    for (const Include& include : includes_below("bindings/run")) {
+        CAPTURE(include.file, include.included);
+        CHECK((include.included.rfind("include/", 0) != 0 || include.included == "include/rapid/run.h"));
     }
 }
 

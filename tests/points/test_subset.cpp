@@ -15,10 +15,10 @@ TEST_CASE("each point is in exactly one of the parts", "[subset]")
         const int count = *rc::gen::inRange(1, 100);
         const auto id = *rc::gen::arbitrary<std::int64_t>();
         int in = 0;
-        for (int k = 1; k <= count; ++k) in += Subset(Part{k, count}, std::nullopt).has(id);
+        for (int k = 1; k <= count; ++k) in += Subset(k, count).has(id);
         RC_ASSERT(in == 1);
         const auto own = static_cast<int>(Subset::part_of(id, static_cast<std::uint64_t>(count)));
-        RC_ASSERT(Subset(Part{own + 1, count}, std::nullopt).has(id));
+        RC_ASSERT(Subset(own + 1, count).has(id));
     }));
 }
 
@@ -28,7 +28,7 @@ TEST_CASE("a smaller sample is a part of a larger one", "[subset]")
         const double larger = *rc::gen::inRange(1, 1000) / 1000.0,
                      smaller = larger * *rc::gen::inRange(1, 1000) / 1000.0;
         const auto id = *rc::gen::arbitrary<std::int64_t>();
-        RC_ASSERT(!Subset(std::nullopt, smaller).has(id) || Subset(std::nullopt, larger).has(id));
+        RC_ASSERT(!Subset(1, 1, smaller).has(id) || Subset(1, 1, larger).has(id));
     }));
 }
 
@@ -39,7 +39,7 @@ TEST_CASE("parts and samples are as large as they should be, also parts of sampl
     const int n = 1'000'000;
     const double share = fraction / count, width = 5 * std::sqrt(n * share * (1 - share));
     for (int k = 1; k <= count; ++k) {
-        const Subset subset(Part{k, count}, fraction);
+        const Subset subset(k, count, fraction);
         int in = 0;
         for (int id = 0; id < n; ++id) in += subset.has(id);
         CHECK(std::abs(in - n * share) < width);
@@ -50,7 +50,7 @@ TEST_CASE("parts and samples are as large as they should be, also parts of sampl
 TEST_CASE("neighbours in id are in parts independently", "[subset]")
 {
     const int n = 1'000'000;
-    const Subset subset(std::nullopt, 0.1);
+    const Subset subset(1, 1, 0.1);
     int both = 0;
     for (int id = 0; id < n; ++id) both += subset.has(id) && subset.has(id + 1);
     CHECK(std::abs(both - n * 0.01) < 5 * std::sqrt(n * 0.01));
@@ -59,9 +59,9 @@ TEST_CASE("neighbours in id are in parts independently", "[subset]")
 TEST_CASE("all points are in the only part, and in a sample of all", "[subset]")
 {
     CHECK(Subset().is_all());
-    CHECK(Subset(Part{1, 1}, 1.0).is_all());
-    CHECK(!Subset(Part{1, 2}, std::nullopt).is_all());
-    CHECK(!Subset(std::nullopt, 0.999).is_all());
+    CHECK(Subset(1, 1, 1.0).is_all());
+    CHECK(!Subset(1, 2).is_all());
+    CHECK(!Subset(1, 1, 0.999).is_all());
     for (const std::int64_t id : {INT64_MIN, std::int64_t{-1}, std::int64_t{0}, INT64_MAX}) CHECK(Subset().has(id));
 }
 

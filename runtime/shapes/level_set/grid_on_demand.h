@@ -21,13 +21,11 @@ struct VoxelFrame;
 using LevelSetGridPtr = std::shared_ptr<const LevelSetGrid>;
 
 RAPID_DEFERRED(grid_of_blocks, LevelSetGridPtr(const VoxelBlocks& blocks));
-// Builds the grid of a mesh with faces inside. blocks: as returned by measure().
-RAPID_DEFERRED(grid_without_faces_inside, LevelSetGridPtr(const MeshBlocks& blocks));
-// Builds the grid of any mesh with a band of any width. half_width: m. A mesh that is not balanced
-// (Openness::unbalanced_edges) has no winding number. Its inside is then everything that is not connected to infinity
-// by steps of one voxel that cross no face.
-RAPID_DEFERRED(grid_of_mesh,
-               LevelSetGridPtr(const Mesh& mesh, bool balanced, const VoxelFrame& frame, double half_width));
+// Builds the grid of any mesh with a band of any width. half_width: m. measured: the blocks of this mesh and band if
+// measure() has made them, else null. A mesh that is not balanced (Openness::unbalanced_edges) has no winding number.
+// Its inside is then everything that is not connected to infinity by steps of one voxel that cross no face.
+RAPID_DEFERRED(grid_of_mesh, LevelSetGridPtr(const Mesh& mesh, bool balanced, const VoxelFrame& frame,
+                                             double half_width, const MeshBlocks* measured));
 
 // Creates a level set from a grid. rebuild: creates the same surface with another half width, m.
 RAPID_DEFERRED(level_set_of_grid,

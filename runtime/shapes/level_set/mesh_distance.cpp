@@ -281,29 +281,21 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
             if (*it <= -half_width) it.setValueOff();
 }
 
-LevelSetGridPtr without_faces_inside(const MeshBlocks& blocks)
+LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& frame, double half_width,
+                        const MeshBlocks* measured)
 {
     initialize_openvdb();
-    Band band = measured_band(blocks);
-    ignore_faces_inside(band, InVoxels{blocks.mesh}, RayCrossings(blocks.mesh));
-    return level_set_grid(band.distance);
-}
-
-LevelSetGridPtr of_mesh(const Mesh& world, bool balanced, const VoxelFrame& frame, double half_width)
-{
-    initialize_openvdb();
-    const InVoxels mesh{in_voxels(world, frame)};
+    const InVoxels mesh{measured ? measured->mesh : in_voxels(world, frame)};
     const auto transform = transform_of(frame);
     if (!balanced)
         return level_set_grid(
             by_openvdb(*mesh.mesh, *transform, half_width, openvdb::tools::DISABLE_RENORMALIZATION, nullptr));
-    Band band = corrected_band(mesh, *transform, half_width);
+    Band band = measured ? measured_band(*measured) : corrected_band(mesh, *transform, half_width);
     const RayCrossings faces(mesh.mesh);
-    if (sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
+    if (measured ? measured->overlap : sign_by_windings(band, faces)) ignore_faces_inside(band, mesh, faces);
     return level_set_grid(band.distance);
 }
 
-RAPID_DEFINE(grid_without_faces_inside, without_faces_inside);
 RAPID_DEFINE(grid_of_mesh, of_mesh);
 
 }  // namespace

@@ -29,6 +29,14 @@ std::vector<double> read_numbers(const std::string& text)
     }
 }
 
+std::string extensions(bool of_films)
+{
+    std::vector<std::string> known;
+    for (const OutputFormat& format : output_formats())
+        if (format.is_film == of_films) known.push_back(format.extension);
+    return fmt::format("{}", fmt::join(known, " "));
+}
+
 void read_camera(const std::string& text, PictureSettings& pictures)
 {
     const std::vector<double> n = read_numbers(text);
@@ -68,9 +76,9 @@ void FileOptions::declare(Options& options)
                 for (const std::string& text : texts) parse_output_target(text);
                 files_.outputs = texts;
             },
-            "writes each frame: #### is its number, the extension chooses the format (.vdb .bgeo .prt .ply .vtp "
-            ".usda .npz .obj .csv .png, films: .mp4 .webm .gif); "
-            "attributes behind a colon are written besides P, v and id, without them all are")
+            fmt::format("writes each frame: #### is its number, the extension chooses the format ({}, films: {}); "
+                        "attributes behind a colon are written besides P, v and id, without them all are",
+                        extensions(/*of_films=*/false), extensions(/*of_films=*/true)))
         .type_name("PATTERN[:ATTR,ATTR]")
         .one_value();
     options

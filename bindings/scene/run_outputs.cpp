@@ -106,6 +106,13 @@ Result<OutputFormat> output_format(const std::string& output)
     }
 }
 
+std::vector<OutputFormat> output_formats()
+{
+    std::vector<OutputFormat> all;
+    for (const Format& format : formats()) all.push_back({format.extension, format.film});
+    return all;
+}
+
 Result<std::vector<std::string>> output_folders(const FileOutputs& files)
 {
     try {

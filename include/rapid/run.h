@@ -54,6 +54,7 @@ struct OutputFormat {
 };
 // Error: an extension that no format has, with the known ones; no pattern; no attributes behind a colon.
 Result<OutputFormat> output_format(const std::string& output);
+std::vector<OutputFormat> output_formats();  // all there are, in order of extension
 
 // Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended. Of scenes that
 // take nothing of the program's own (SceneOptions::objects and nodes), as that may change unseen. The run that begins a

@@ -426,6 +426,9 @@ TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
     CHECK_FALSE(good(output_format("a.####.vdb")).is_film);
     CHECK(good(output_format("a.mp4")).is_film);
     CHECK_FALSE(output_format("a.####.xyz"));
+    CHECK(output_formats().size() >= 13);
+    for (const OutputFormat& format : output_formats())
+        CHECK(good(output_format("a.####" + format.extension)).is_film == format.is_film);
 
     RunOptions asked = options(folder);
     asked.files.outputs = {folder / "points/{output}/a.####.csv", folder / "b.####.csv"};

@@ -381,7 +381,11 @@ PointSet read_csv(const std::filesystem::path& path)
     return points;
 }
 
-RAPID_FORMAT(Format{".csv", "a table of text, a point a line in order of id", write_csv, read_csv});
+RAPID_FORMAT(Format{.extension = ".csv",
+                    .doc = "a table of text, a point a line in order of id",
+                    .write = write_csv,
+                    .read = read_csv,
+                    .lines_stand_alone = true});
 RAPID_POINT_STREAM(".csv", stream_csv);
 
 }  // namespace

@@ -28,6 +28,9 @@ struct Format {
     bool places_alone = false;
     // Whether it holds attributes that are texts; write_as() leaves them out where it does not.
     bool holds_texts = true;
+    // Whether it is text of lines that stand alone, without a count: a file that is cut after one is another whole
+    // file.
+    bool lines_stand_alone = false;
 };
 
 // All formats, in order of extension.

@@ -152,9 +152,12 @@ PointSet read_obj(const std::filesystem::path& path)
     return points;
 }
 
-RAPID_FORMAT(Format{".obj", "Wavefront lines: places alone, with trails as polylines", write_obj, read_obj,
-                    /*film=*/false,
-                    /*places_alone=*/true});
+RAPID_FORMAT(Format{.extension = ".obj",
+                    .doc = "Wavefront lines: places alone, with trails as polylines",
+                    .write = write_obj,
+                    .read = read_obj,
+                    .places_alone = true,
+                    .lines_stand_alone = true});
 
 }  // namespace
 }  // namespace rapid

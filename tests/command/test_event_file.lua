@@ -101,7 +101,6 @@ return rapid.create { fps = 24 } :emit { source = rapid.mesh.sphere {}, rate = 5
   it("refuses a file that holds no points", function()
     local result = scene.command("run", "return rapid.create {} :solve {}", "-f 1-2 --events events.json")
     assert.equal(2, result.status)
-    assert.truthy(result.stderr:find("give a file of .bgeo, .csv, .npz, .ply, .prt, .usda, .vdb, .vtp", 1, true),
-      result.stderr)
+    assert.match("give a file of [%.%w, ]*%.csv, [%.%w, ]*%.vtp", result.stderr)
   end)
 end)

@@ -207,8 +207,8 @@ return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
     local folder = new_folder()
     local result = folder:run "-f 1-4 -o a.####.xyz"
     assert.equal(2, result.status)
-    assert.equal('-o a.####.xyz: unknown extension ".xyz"; it must be one of .bgeo, .csv, .gif, .mp4, .npz, .obj, ' ..
-      '.ply, .png, .prt, .usda, .vdb, .vtp, .webm\n', result.stderr)
+    assert.match('^%-o a%.####%.xyz: unknown extension "%.xyz"; it must be one of [%.%w, ]*%.csv, ' ..
+      "[%.%w, ]*%.vtp[%.%w, ]*\n$", result.stderr)
     assert.equal("", result.stdout)
   end)
 

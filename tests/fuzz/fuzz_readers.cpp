@@ -1,5 +1,5 @@
-// A target of libFuzzer for each of Rapid's own readers: RAPID_FUZZ_READER names one; without it the first byte of an
-// input chooses. tests/fuzz/run builds and runs it.
+// A target of libFuzzer for each of Rapid's own readers: those of the registered formats of points, and those below.
+// RAPID_FUZZ_READER names one; without it their names are printed. tests/fuzz/run builds and runs it.
 //
 // Lengths and checksums that would be wrong after every change are put in here.
 #include <sys/mman.h>
@@ -7,11 +7,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -85,21 +87,6 @@ std::string binary_gltf(std::string_view input)
     return "glTF" + word(2) + word(12 + chunks.size()) + chunks;
 }
 
-// The points of a format, by the name of a file.
-template <std::size_t size>
-struct Name {
-    constexpr Name(const char (&text)[size])
-    {
-        for (std::size_t k = 0; k < size; ++k) name[k] = text[k];
-    }
-    char name[size];
-};
-template <Name file>
-void read_points(std::string_view input)
-{
-    rapid::format_of(file.name).read(path_of(input));
-}
-
 void read_state(std::string_view input)
 {
     rapid::PointSet points;
@@ -118,48 +105,64 @@ void read_log(std::string_view input)
     }
 }
 
-struct Reader {
-    std::string_view name;
-    void (*read)(std::string_view input);
-};
+using Reader = std::function<void(std::string_view input)>;
 
-// The files of the corpus begin with their places here: new ones come last.
-constexpr Reader readers[] = {
-    {"csv", read_points<"a.csv">},
-    {"bgeo", read_points<"a.bgeo">},
-    {"ply", read_points<"a.ply">},
-    {"ply_mesh", [](std::string_view input) { rapid::read_ply_mesh(path_of(input)); }},
-    {"npz", read_points<"a.npz">},
-    {"prt", read_points<"a.prt">},
-    {"usda", read_points<"a.usda">},
-    {"vtp", read_points<"a.vtp">},
-    {"obj", read_points<"a.obj">},
-    {"state", read_state},
-    {"log", read_log},
-    {"part", [](std::string_view input) { rapid::PartRecord::read(path_of(input)); }},
-    {"farm", [](std::string_view input) { rapid::SubmittedJob::read(path_of(input)); }},
-    {"gltf", [](std::string_view input) { rapid::read_gltf_attributes(path_of(input)); }},
-    {"glb", [](std::string_view input) { rapid::read_gltf_attributes(path_of(binary_gltf(input))); }},
-};
-
-const Reader* chosen()
+std::map<std::string, Reader> readers()
 {
-    const char* const name = std::getenv("RAPID_FUZZ_READER");
-    for (const Reader& reader : readers)
-        if (name && reader.name == name) return &reader;
-    if (name) std::abort();
-    return nullptr;
+    std::map<std::string, Reader> all = {
+        {"farm", [](std::string_view input) { rapid::SubmittedJob::read(path_of(input)); }},
+        {"glb", [](std::string_view input) { rapid::read_gltf_attributes(path_of(binary_gltf(input))); }},
+        {"gltf", [](std::string_view input) { rapid::read_gltf_attributes(path_of(input)); }},
+        {"log", read_log},
+        {"part", [](std::string_view input) { rapid::PartRecord::read(path_of(input)); }},
+        {"ply_mesh", [](std::string_view input) { rapid::read_ply_mesh(path_of(input)); }},
+        {"state", read_state},
+    };
+    for (const rapid::Format& format : rapid::formats())
+        if (format.read)
+            all[format.extension.substr(1)] = [read = format.read](std::string_view input) { read(path_of(input)); };
+    return all;
 }
+
+// Files that a format writes, of two points and of none, for its fuzzer to begin with.
+void write_seeds(const std::string& extension)
+{
+    rapid::PointSet points;
+    rapid::write_points("corpus/none." + extension, points);
+    points.append(2);
+    points.id().write()[1] = 7;
+    points.add({"heat", 0.5f});
+    points.add({"kind", std::int32_t{3}});
+    points.add({"orient", rapid::Quatf::Identity()});
+    points.add({"name", rapid::token_of("a \"b\", c")});
+    points.group("hot").write()[1] = 1;
+    points.P().write()[1] = {1, 2.5f, 3e-7f};
+    rapid::write_points("corpus/two." + extension, points);
+}
+
+Reader reader;
 
 }  // namespace
 
+extern "C" int LLVMFuzzerInitialize(int*, char***)
+{
+    const char* const name = std::getenv("RAPID_FUZZ_READER");
+    for (const auto& [known, read] : readers())
+        if (!name)
+            std::puts(known.c_str());
+        else if (name == known)
+            reader = read;
+    if (!name) std::exit(0);
+    if (!reader) std::abort();
+    for (const rapid::Format& format : rapid::formats())
+        if (format.extension.substr(1) == name) write_seeds(name);
+    return 0;
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
 {
-    static const Reader* const only = chosen();
-    if (size == 0) return 0;
-    const Reader& reader = only ? *only : readers[data[0] % std::size(readers)];
     try {
-        reader.read({reinterpret_cast<const char*>(data) + 1, size - 1});
+        reader({reinterpret_cast<const char*>(data), size});
     } catch (const rapid::Error&) {
     }
     return 0;

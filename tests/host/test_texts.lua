@@ -194,9 +194,9 @@ describe("texts", function()
     local result = scene.command("run", text, "-f 1-4 -o c.####.ply -o c.####.prt -o c.####.bgeo")
     assert.equal(0, result.status, result.stderr)
     for _, extension in ipairs { "ply", "prt" } do
-      local warning = ('c.####.%s: .%s holds no texts, and leaves out "name"; these do: .bgeo, .csv, .npz, .usda, ' ..
-        ".vdb, .vtp"):format(extension, extension)
-      local _, count = result.stderr:gsub(warning:gsub("%W", "%%%0"), "")
+      local warning = 'c%.####%.NAME: %.NAME holds no texts, and leaves out "name"; these do: ' ..
+        "[%.%w, ]*%.csv, [%.%w, ]*%.vtp"
+      local _, count = result.stderr:gsub(warning:gsub("NAME", extension), "")
       assert.equal(1, count, result.stderr)
     end
     assert.is_nil(result.stderr:find("c.####.bgeo", 1, true))

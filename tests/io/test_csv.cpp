@@ -84,15 +84,6 @@ TEST_CASE("a .csv with infinities, NaN, CRLF and no ids is read", "[io][csv]")
     CHECK(points.id()[1] == 1);
 }
 
-TEST_CASE("a .csv that begins with a byte-order mark keeps its ids", "[io][csv]")
-{
-    const TemporaryFolder folder;
-    std::ofstream(folder / "a.csv", std::ios::binary) << "\xef\xbb\xbfid,Px,Py,Pz\n7,1,2,3\n";
-    const PointSet points = read_points(folder / "a.csv");
-    CHECK(points.id()[0] == 7);
-    CHECK(points.column_names() == std::vector<std::string>{"P", "id", "v"});
-}
-
 TEST_CASE("a .csv that can't be understood is an error that names the line", "[io][csv]")
 {
     const TemporaryFolder folder;
@@ -111,8 +102,6 @@ TEST_CASE("a .csv that can't be understood is an error that names the line", "[i
                         "file is whole, append a newline (echo >> FILE)"));
     CHECK(error("Px,Py,Pz\n1,2,3\n4,5,6\n") == "");
     CHECK_THAT(error("idx,idy,idz,Px,Py,Pz\n1,2,3,1,2,3\n"), Catch::EndsWith("is vec3; it must be int64"));
-    CHECK_THAT(error("id,Px,Py,Pz\nnan,1,2,3\n"), Catch::EndsWith("the column id holds numbers that are not whole"));
-    CHECK_THAT(error("id,Px,Py,Pz\n1.5,1,2,3\n"), Catch::EndsWith("the column id holds numbers that are not whole"));
 }
 
 TEST_CASE("a .csv of another program has texts with quotes or without, told by the first line", "[io][csv]")

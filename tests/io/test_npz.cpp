@@ -132,16 +132,4 @@ TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")
     CHECK_THAT(saved("x=np.zeros((3, 3))"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
     CHECK_THAT(saved("P=np.zeros((3, 2))"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
     CHECK_THAT(saved("P=np.zeros((3, 3), int)"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
-    CHECK_THAT(saved("P=np.zeros((2, 3)), id=np.array([1, 0.5])"),
-               Catch::EndsWith("point 1 has the id 0.5; ids are whole numbers"));
-
-    REQUIRE(python(folder, R"(
-import io, zipfile
-with zipfile.ZipFile("c.npz", "w") as z:
-    b = io.BytesIO()
-    np.lib.format.write_array_header_1_0(b, {"descr": "<f4", "fortran_order": False, "shape": (1000000000000, 3)})
-    z.writestr("P.npy", b.getvalue() + bytes(30))
-)"));
-    CHECK_THAT(error_of([&] { read_points(folder / "c.npz"); }),
-               Catch::EndsWith("\"P.npy\": the array ends early: its header promises 1000000000000 rows, it holds 2"));
 }

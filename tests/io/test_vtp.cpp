@@ -180,8 +180,4 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
     CHECK_THAT(error(file_of("compressor=\"vtkZLibDataCompressor\"",
                              three + base64(raw_bytes<std::uint32_t>({0xffffffff, 1, 1})))),
                Catch::EndsWith("the array ends early"));
-    // One byte that promises a gigabyte.
-    std::string promising = file_of("", ascii_points);
-    promising.replace(promising.find("NumberOfPoints=\"2\"") + 16, 1, "9999999999");
-    CHECK_THAT(error(promising), Catch::EndsWith("of 9999999999 rows: the array ends early"));
 }

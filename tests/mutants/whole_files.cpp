@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstring>
 #include <functional>
-#include <set>
 
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
@@ -104,7 +103,7 @@ constexpr const char* ply =
     "red\n"
     "property uchar green\nproperty uchar blue\nelement face 3\nproperty list uchar int vertex_indices\nelement edge "
     "1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
-    "0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n0 0 1 1 1 1\n3 0 2 1\n4 0 1 2 3\n3 1 2 3\n0 1\n";
+    "0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n0 0 1 1 1 1\n3 0 2 1\n4 0 1 2 3\n3 1 2 3\n0 001\n";
 constexpr const char* vtp =
     "<VTKFile type=\"PolyData\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece NumberOfPoints=\"3\"><Point"
     "s><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">AQAAACQAAAAAAAAAHwAAAA==eJxjYACBBns"
@@ -167,7 +166,6 @@ std::string glb()
 // Files that Rapid writes, of every format of points that it reads.
 std::vector<WholeFile> registered_formats()
 {
-    const std::set<std::string> without_count = {".csv", ".obj"};
     std::vector<WholeFile> files;
     for (const Format& format : formats()) {
         if (!format.read) continue;
@@ -175,7 +173,7 @@ std::vector<WholeFile> registered_formats()
         const auto add = [&](const std::string& what, const PointSet& points) {
             files.push_back({"points " + format.extension + what, name,
                              written(name, [&](const Path& path) { write_points(path, points); }), content_of_points});
-            files.back().may_end_at_any_line = without_count.contains(format.extension);
+            files.back().may_end_at_any_line = format.lines_stand_alone;
             files.back().has_points = !points.empty();
         };
         add("", random_points({.size = 40, .wide = false}));

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -114,19 +113,6 @@ TEST_CASE("level sets that share their values, and files without offsets, are re
         CHECK(distances(*read_level_set(folder / file, "first")) == expected);
         CHECK(distances(*read_level_set(folder / file, "second")) == expected);
     }
-}
-
-TEST_CASE("a level set that is cut is an error that says so", "[level set][file]")
-{
-    const LevelSetFolder folder;
-    folder.write_grids("whole.vdb", {sphere_grid("surface")});
-    const std::string whole = test::file_text(folder / "whole.vdb");
-    folder.write("cut.vdb", whole.substr(0, whole.size() - 100));
-    CHECK_THAT(folder.message_of([&] { read_level_set(folder / "cut.vdb", ""); }),
-               Equals(fmt::format(
-                   "cannot read \"cut.vdb\": can't be read: it is cut: its grid \"surface\" ends at byte {}, the file "
-                   "at byte {}",
-                   whole.size(), whole.size() - 100)));
 }
 
 TEST_CASE("files without a level set are refused by name", "[level set][file]")

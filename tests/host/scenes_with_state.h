@@ -1,4 +1,5 @@
-// Scenes whose nodes keep something from frame to frame, by what they are about. Small, and together of all node types.
+// Scenes whose nodes keep something from frame to frame, by what they are about. Small, and together of nearly all node
+// types: test_snapshots.cpp tries the others with their defaults.
 #pragma once
 
 #include <string>

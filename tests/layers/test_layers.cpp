@@ -111,20 +111,29 @@ struct Include {
     bool ours;                 // in quotes
 };
 
+// Of all sources below a folder, and of the examples in docs/extending.md that are to become one.
 std::vector<Include> includes_below(const std::string& folder)
 {
     const fs::path root = RAPID_SOURCE_DIR;
     const std::regex directive(R"re(^\s*#\s*include\s*(["<])([^">]+)[">].*)re");
     std::vector<Include> result;
+    const auto add = [&](const fs::path& file, const std::string& line) {
+        if (std::smatch match; std::regex_match(line, match, directive))
+            result.push_back({file.string(), file.parent_path().string(), match[2], match[1] == "\""});
+    };
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
         if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
-        const fs::path file = fs::relative(entry.path(), root);
         std::ifstream text(entry.path());
-        std::smatch match;
-        for (std::string line; std::getline(text, line);)
-            if (std::regex_match(line, match, directive))
-                result.push_back({file.string(), file.parent_path().string(), match[2], match[1] == "\""});
+        for (std::string line; std::getline(text, line);) add(fs::relative(entry.path(), root), line);
     }
+    const std::string fence = "```cpp ";
+    std::ifstream page(root / "docs/extending.md");
+    std::string example;
+    for (std::string line; std::getline(page, line);)
+        if (line.starts_with("```"))
+            example = line.starts_with(fence) ? line.substr(fence.size()) : "";
+        else if (example.starts_with(folder + "/"))
+            add(example, line);
     return result;
 }
 

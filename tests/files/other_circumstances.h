@@ -1,4 +1,4 @@
-// A small disk, and a user whom permissions bind.
+// Special environments for tests: a small disk, and a user to whom permissions apply.
 #pragma once
 
 #include <sys/mount.h>
@@ -10,7 +10,7 @@
 
 namespace rapid::test {
 
-// A memory file system of a megabyte, where the test may mount one.
+// A memory file system of one megabyte, if the test is allowed to mount one.
 class SmallDisk {
 public:
     SmallDisk() { mounted_ = ::mount("tmpfs", folder_.path().c_str(), "tmpfs", 0, "size=1m") == 0; }
@@ -26,7 +26,7 @@ private:
     bool mounted_;
 };
 
-// Becomes another user, whom permissions bind, for as long as it lives.
+// Runs as another user, to whom permissions apply, during its lifetime.
 class Unprivileged {
 public:
     Unprivileged() { changed_ = ::geteuid() == 0 && ::seteuid(65534) == 0; }

@@ -1,4 +1,4 @@
-// A folder for the files of a test, and what tests ask about files.
+// A temporary folder for tests, and helpers for files.
 #pragma once
 
 #include <stdlib.h>
@@ -15,7 +15,7 @@
 
 namespace rapid::test {
 
-// A folder of the test's own, gone with it.
+// A folder that belongs to the test and is removed with it.
 class TemporaryFolder {
 public:
     TemporaryFolder()
@@ -51,7 +51,7 @@ inline std::string file_text(const std::filesystem::path& path)
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The names in a folder, hidden ones too, in order.
+// Returns the names in a folder, including hidden ones, sorted.
 inline std::vector<std::string> file_names(const std::filesystem::path& folder)
 {
     std::vector<std::string> names;
@@ -61,7 +61,7 @@ inline std::vector<std::string> file_names(const std::filesystem::path& folder)
     return names;
 }
 
-// What f throws, as text; empty when it does not.
+// Returns the message of the error that f throws, or an empty string.
 template <class F>
 std::string error_of(const F& f)
 {

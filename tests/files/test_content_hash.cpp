@@ -1,4 +1,4 @@
-// Hashes of contents: of what is in memory and of files alike.
+// Hashes of contents are the same in memory and in files.
 #include "runtime/files/content_hash.h"
 
 #include "tests/files/temporary_folder.h"
@@ -9,7 +9,7 @@ namespace rapid {
 TEST_CASE("a file has the hash of its bytes", "[hash]")
 {
     const test::TemporaryFolder folder;
-    std::string bytes(3'000'001, 'x');  // of some of the pieces in which it is read
+    std::string bytes(3'000'001, 'x');  // spans several of the pieces in which it is read
     for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{1} << 20, bytes.size()})
         CHECK(file_hash(folder.write("file", bytes.substr(0, size))) == content_hash(bytes.substr(0, size)));
     bytes.back() = 'y';
@@ -18,7 +18,7 @@ TEST_CASE("a file has the hash of its bytes", "[hash]")
 
 TEST_CASE("the hash of a text is XXH3's, with 16 digits", "[hash]")
 {
-    CHECK(hash_text(content_hash("")) == "2d06800538d394c2");  // of the reference implementation
+    CHECK(hash_text(content_hash("")) == "2d06800538d394c2");  // from the reference implementation
     CHECK(hash_text(7) == "0000000000000007");
 }
 

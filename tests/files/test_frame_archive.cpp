@@ -1,4 +1,4 @@
-// Records and files of an archive, whatever happens to the folder or the process.
+// Records and files of an archive survive interference with the folder and the process.
 #include "runtime/files/frame_archive.h"
 
 #include <sys/resource.h>
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> words = {"one", "", "a record of some length", std::string(3, '\0'), "last"};
 
-// Where each of these words ends in the journal: 8 bytes for what the file is, and 16 before each word.
+// Returns the end of each of these words in the journal: 8 bytes of magic, and 16 before each word.
 std::vector<std::size_t> ends_of_words()
 {
     std::vector<std::size_t> ends;

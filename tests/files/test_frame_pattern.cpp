@@ -14,7 +14,7 @@ TEST_CASE("every way to write a frame number in a name is expanded and padded", 
     CHECK(name("a.####.vdb", 7) == "a.0007.vdb");
     CHECK(name("a.##.vdb", 7) == "a.07.vdb");
     CHECK(name("a.##.vdb", 12345) == "a.12345.vdb");
-    CHECK(name("a.#.vdb", 7) == "a.0007.vdb");  // a lone # means four digits
+    CHECK(name("a.#.vdb", 7) == "a.0007.vdb");  // a single # means four digits
     CHECK(name("a.$F4.vdb", 7) == "a.0007.vdb");
     CHECK(name("a.$F.vdb", 7) == "a.7.vdb");
     CHECK(name("a.$F3x.vdb", 7) == "a.007x.vdb");

@@ -30,8 +30,8 @@ void write(const std::filesystem::path& path, const std::string& text, Unfinishe
 std::string long_text(char letter) { return std::string(300000, letter); }
 bool is_whole(const std::string& text) { return text == long_text(text.empty() ? ' ' : text[0]); }
 
-// Runs f in a process of its own, which is the next run for the files that another has left; its exit status is 0
-// unless f throws.
+// Runs f in a separate process, which acts as the next run for files that another has left. Its exit status is 0 unless
+// f throws.
 pid_t begin(const std::function<void()>& f)
 {
     const pid_t child = ::fork();
@@ -53,7 +53,7 @@ int status_of(pid_t child)
 
 int status_of_process(const std::function<void()>& f) { return status_of(begin(f)); }
 
-// A pipe that tells how far a process is.
+// A pipe through which a process reports its progress.
 class Progress {
 public:
     Progress() { REQUIRE(::pipe(ends_) == 0); }
@@ -138,7 +138,7 @@ TEST_CASE("a signal handler's call removes unfinished files, and no file is begu
 {
     const Unfinished unfinished = GENERATE(Unfinished::Unnamed, Unfinished::Hidden);
     const TemporaryFolder folder;
-    // In a process of its own: the call is for one that ends.
+    // Runs in a separate process, because the call is for a process that ends.
     CHECK(status_of_process([&] {
               OutputFile file(folder / "a.ply", unfinished);
               file.append("half", 4);
@@ -245,7 +245,7 @@ TEST_CASE("what a file can't be made of is an error: a folder, a device, a folde
     CHECK(error_of([&] { file.finish(); }) == "can't be named when complete: No such file or directory");
 }
 
-// What a process has written it reads without a sandbox (read_apart.h).
+// A process reads its own files without a sandbox (read_apart.h).
 TEST_CASE("a file that another has changed in place is not its writer's, with all the times that can be set as before",
           "[files]")
 {
@@ -256,7 +256,7 @@ TEST_CASE("a file that another has changed in place is not its writer's, with al
     struct stat before = {}, after = {};
     REQUIRE(::stat(path.c_str(), &before) == 0);
     const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
-    do {  // the clock of files ticks some hundred times a second
+    do {  // the file system's clock ticks some hundred times per second
         CHECK(::pwrite(file, "bad", 3, 0) == 3);
         const timespec times[] = {before.st_atim, before.st_mtim};
         CHECK(::futimens(file, times) == 0);

@@ -15,7 +15,7 @@ std::string ascii(const std::string& body)
     return "ply\nformat ascii 1.0\nelement vertex 2\n" + three_numbers + "end_header\n" + body;
 }
 
-// The error of reading the first element.
+// Returns the error of reading the first element.
 std::string error_in(const std::string& text)
 {
     return error_of([&] {

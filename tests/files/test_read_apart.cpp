@@ -118,7 +118,7 @@ TEST_CASE("a reader that takes too long is told from others that end by a signal
         ::getrlimit(RLIMIT_CPU, &limit);
         return Numbers{static_cast<std::int32_t>(limit.rlim_cur), static_cast<std::int32_t>(limit.rlim_max)};
     });
-    // At the second one comes SIGKILL, which may come from elsewhere.
+    // The hard limit would send SIGKILL, which might also come from elsewhere.
     CHECK(seconds == Numbers{5, 6});
     CHECK(error_in([]() -> Numbers {
               ::raise(SIGXCPU);
@@ -128,14 +128,14 @@ TEST_CASE("a reader that takes too long is told from others that end by a signal
 
 TEST_CASE("a reader that waits ends, one that was stopped or works slowly does not", "[files]")
 {
-    // Of the alarms of a reader those here come at once: between two nothing is done.
+    // The two alarms of the reader come immediately, with no work in between.
     CHECK(error_in([]() -> Numbers {
               for (int k = 0; k < 2; ++k) ::raise(SIGALRM);
               return {};
           }) == "can't be read: its reader waited for 30 s");
 
     const auto work = [] {
-        const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 20;  // of the processor
+        const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 20;  // processor time
         while (std::clock() < end) {
         }
     };
@@ -143,7 +143,7 @@ TEST_CASE("a reader that waits ends, one that was stopped or works slowly does n
     std::ofstream(folder / "file") << "bytes";
     const Numbers read_in_the_end = read(folder / "file", [&] {
         for (int k = 0; k < 3; ++k) {
-            ::raise(SIGALRM);  // in vain, as while it was stopped
+            ::raise(SIGALRM);  // ignored, because it also fires while the process is stopped
             work();
             ::raise(SIGALRM);
         }

@@ -34,7 +34,7 @@ TEST_CASE("a program that is started has the descriptors that it is given, and i
 
 TEST_CASE("a program that is started has signals as it expects them", "[files]")
 {
-    // One that this process ignores, and one that this thread has blocked.
+    // One signal that this process ignores, and one that this thread has blocked.
     const auto before = std::signal(SIGPIPE, SIG_IGN);
     sigset_t blocked, old;
     sigemptyset(&blocked);

@@ -1,4 +1,4 @@
-// sin, cos and exp against long double, and eight at a time against one.
+// Compares sin, cos and exp with long double, and eight numbers at a time with one.
 #include <cmath>
 #include <limits>
 #include <random>
@@ -10,7 +10,7 @@ using namespace rapid;
 
 namespace {
 
-// In units in the last place of the value.
+// Returns the error in units in the last place of the value.
 double error_of(double value, long double truth)
 {
     const double size = std::abs(static_cast<double>(truth));
@@ -20,7 +20,7 @@ double error_of(double value, long double truth)
 
 bool same_bits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
-// Each of the lanes, in which other numbers stand beside x.
+// Checks x in each lane, with other numbers in the other lanes.
 bool is_alike_in_lanes(double (*one)(double), Doubles (*eight)(const Doubles&), double x)
 {
     for (std::uint32_t l = 0; l < lanes; ++l) {
@@ -73,11 +73,11 @@ TEST_CASE("sine, cosine and the exponential function are within 0.9 units in the
 
 TEST_CASE("near quarter turns, where all digits of an angle cancel, a sine is as exact", "[elementary]")
 {
-    // Of what long double makes of the rest below the last digit is wrong by n 2^-98.
+    // Reduces the angle by hand, because long double's own rest has an error of n 2^-98.
     constexpr long double quarter = 1.57079632679489661923132169163975144L;
     for (int n = 1; n < 600000; n += n / 7 + 1) {
         const double x = static_cast<double>(static_cast<long double>(n) * quarter);
-        // x - n quarters, by a quarter in two parts: the first of 32 bits, exact in the product.
+        // x - n quarter turns, with a quarter turn in two parts. The first has 32 bits, so its product is exact.
         constexpr long double high = 0x1.921fb544p+0L, low = 0x1.0b4611a62633145c06e0e69p-34L;
         const long double rest = (static_cast<long double>(x) - n * high) - n * low;
         const long double truth = n % 4 == 0 ? rest : n % 4 == 1 ? -rest : n % 4 == 2 ? -rest : rest;

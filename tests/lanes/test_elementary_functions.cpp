@@ -20,7 +20,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity(),
 
 const int values = amount("MATH_VALUES", 10000);
 
-// In units in the last place of the value.
+// Returns the error in units in the last place of the value.
 double error_of(double value, long double truth)
 {
     const double size = std::abs(static_cast<double>(truth));

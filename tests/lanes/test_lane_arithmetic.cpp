@@ -1,5 +1,5 @@
 // Compares operators and functions of lanes with C++, at special values and at random ones. MATH_VALUES sets the number
-// of the latter.
+// of random values.
 #include <cmath>
 #include <limits>
 #include <random>
@@ -17,7 +17,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity(),
                  no_number = std::numeric_limits<double>::quiet_NaN();
 
-// The results of an operation for all pairs of x and y.
+// Returns the results of an operation for all pairs of x and y.
 std::vector<double> results_of(const std::string& name, std::vector<double> x, std::vector<double> y)
 {
     LaneProgram program;
@@ -41,7 +41,7 @@ std::vector<double> results_of(const std::string& name, std::vector<double> x, s
 
 double flag(bool is_set) { return std::bit_cast<double>(-std::int64_t{is_set}); }
 
-// NaN if one is, and +0 of zeros.
+// Returns NaN if either number is NaN, and +0 for zeros.
 double extreme(double a, double b, double chosen) { return std::isnan(a) || std::isnan(b) ? no_number : chosen + 0.0; }
 
 using Function = double (*)(double, double);

@@ -1,4 +1,4 @@
-// Programs of lanes by hand: masks, what fails, and points that are not visited.
+// Tests handwritten lane programs: masks, failures, and points that are not visited.
 #include <cmath>
 #include <numeric>
 
@@ -10,7 +10,7 @@ using namespace rapid;
 
 namespace {
 
-// x = 2 x where x > 1, with slot 6 for the constant behind those of the chunk.
+// Returns the program x = 2 x if x > 1. Slot 6 is the constant after those of the chunk.
 LaneProgram doubling()
 {
     LaneProgram program;
@@ -72,7 +72,7 @@ TEST_CASE("points that are not visited stay as they are", "[lanes]")
 TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
 {
     std::vector<float> x(400, 5.0f);
-    x[200] = std::numeric_limits<float>::max();  // twice it is none
+    x[200] = std::numeric_limits<float>::max();  // twice this overflows
     CHECK(run(doubling(), x) == Failed{{128, 256}});
     for (std::size_t i = 0; i < x.size(); ++i)
         if (i != 200) CHECK(x[i] == (i >= 128 && i < 256 ? 5.0f : 10.0f));
@@ -80,16 +80,16 @@ TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
 
 TEST_CASE("what is steady is computed anew where its column, or the chunk, has other values", "[lanes]")
 {
-    // into = column 0 times dt, the latter by slot 3
+    // Computes into = column 0 times dt, which is in slot 3.
     LaneProgram program;
     program.steady = {{lane_operation("LoadFloat"), 5, 0, 0, 0, 0}, {lane_operation("Multiply"), 6, 5, 3, 0, 0}};
     program.steady_column = 0;
     program.code = {{lane_operation("StoreFloat"), 0, 6, 0, 0, 1}};
     program.slots = 7;
     std::vector<float> from(900, 3.0f), into(900);
-    from[300] = 4.0f;                                         // within a tile
-    std::fill(from.begin() + 512, from.begin() + 640, 5.0f);  // a tile
-    std::iota(from.end() - 10, from.end(), 7.0f);             // in the last one, which is short
+    from[300] = 4.0f;                                         // inside a tile
+    std::fill(from.begin() + 512, from.begin() + 640, 5.0f);  // a whole tile
+    std::iota(from.end() - 10, from.end(), 7.0f);             // in the last tile, which is short
     LaneRunner runner;
     for (const double dt : {2.0, 3.0, 0.5}) {
         const LaneChunk::Memory memory[] = {{from.data(), sizeof(float)}, {into.data(), sizeof(float)}};
@@ -131,7 +131,7 @@ TEST_CASE("random numbers of lanes are those of a kernel, one by one", "[lanes]"
         }
 }
 
-// Vectors in another order of their components, from one column into another.
+// Copies vectors from one column to another with permuted components.
 template <class T>
 static void check_vectors(const char* load, const char* store)
 {

@@ -23,7 +23,7 @@ Colour at(const Picture& picture, int x, int y)
     return {pixel[0], pixel[1], pixel[2]};
 }
 
-// Pixels of the rectangle that differ from its left upper one.
+// Counts the pixels of the rectangle that differ from its upper left one.
 int marks(const Picture& picture, int left, int top, int width, int height)
 {
     int count = 0;
@@ -58,7 +58,7 @@ TEST_CASE("a picture of another shape is fitted into its tile")
     const int left = 12 + 412, top = 12;
     CHECK(at(sheet, left + 200, top + 1) == blue_pixel);
     CHECK(at(sheet, left + 200, top + 198) == blue_pixel);
-    CHECK(at(sheet, left + 200 - 60, top + 100) != blue_pixel);  // 50 pixels to each side of the middle
+    CHECK(at(sheet, left + 200 - 60, top + 100) != blue_pixel);  // it covers 50 pixels to each side of the middle
     CHECK(at(sheet, left + 200 - 40, top + 100) == blue_pixel);
 }
 
@@ -89,8 +89,8 @@ TEST_CASE("series of tiles begin with a row, or lie in one")
     CHECK(columns(20, 1) == 5);
     CHECK(columns(20, 4) == 4);
     CHECK(columns(20, 5) == 5);
-    CHECK(columns(20, 10) == 5);  // each in two rows
-    CHECK(columns(21, 3) == 6);   // two in a row
+    CHECK(columns(20, 10) == 5);  // each series in two rows
+    CHECK(columns(21, 3) == 6);   // two series per row
     CHECK(columns(14, 7) == 4);   // 7 and 1 are too far from a square
     CHECK(columns(12, 6) == 3);
 }

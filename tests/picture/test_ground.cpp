@@ -35,7 +35,7 @@ TEST_CASE("under a given camera the ground stays as it is, wherever points go", 
     (is_of_scene ? scene.camera.position : options.position) = Vec3d(0, 1.8, 6.5);
     (is_of_scene ? scene.camera.target : options.target) = Vec3d(0, 1.5, 0);
     const FrameInfo frame = frame_of(options, scene);
-    // Without points: what is left is the ground, and the backdrop.
+    // Without points, the picture shows only the ground and the backdrop.
     const auto ground = [&](const PictureView& view) { return render({}, options, scene, view).rgb; };
 
     PictureFit fit;

@@ -15,7 +15,7 @@ using namespace rapid::test;
 
 namespace {
 
-// From 10 m in front of the origin, 90° high: a metre at the origin is height / 20 pixels.
+// From 10 m in front of the origin, 90° high, so that a metre at the origin is height / 20 pixels.
 PictureView front_view()
 {
     PictureView view;
@@ -65,13 +65,13 @@ TEST_CASE("the camera projects a point to the pixel that trigonometry gives", "[
     CHECK_THAT(camera.project({1, 0, 5}, 320, 200), close_to(Vec3d(180, 100, 5), 1e-4));
     CHECK(camera.project({0, 0, 11}, 320, 200).z() < 0);
 
-    const Camera above{Vec3d(0, 4, 0), Vec3d::Zero(), 1.0};  // straight down, where up is not up
+    const Camera above{Vec3d(0, 4, 0), Vec3d::Zero(), 1.0};  // straight down, along the usual up vector
     CHECK_THAT(above.project({0, 0, 0}, 320, 200), close_to(Vec3d(160, 100, 4), 1e-4));
 }
 
 TEST_CASE("a point is drawn as a disc of its radius, where the camera projects it", "[io][picture]")
 {
-    const PointSet points = balls({{1, 2, 0}}, {red}, 0.5f);  // 5 pixels about 170, 80
+    const PointSet points = balls({{1, 2, 0}}, {red}, 0.5f);  // a radius of 5 pixels around (170, 80)
 
     const Picture picture = render(points, small, {}, front_view());
 
@@ -81,7 +81,7 @@ TEST_CASE("a point is drawn as a disc of its radius, where the camera projects i
     CHECK(is_background(picture.pixel(164, 80)));
     CHECK(is_background(picture.pixel(175, 80)));
     CHECK(is_background(picture.pixel(150, 120)));
-    // Its edge is smooth: the light over all of it is that of its area, to a few per cent.
+    // Its edge is smooth: the sum of its light matches that of its area to a few per cent.
     double covered = 0;
     for (int y = 70; y < 90; ++y)
         for (int x = 160; x < 180; ++x) covered += picture.pixel(x, y)[0] > 40;
@@ -111,7 +111,7 @@ TEST_CASE("a collider hides the points behind it and not those before it", "[io]
     const Picture hidden = render(points, small, scene, front_view());
     CHECK(is_red(pixel(hidden, {-1, 0, 1})));
     CHECK_FALSE(is_green(pixel(hidden, {1, 0, -1})));
-    CHECK_FALSE(is_background(pixel(hidden, {1.5, 1.5, 0})));  // the collider itself is seen
+    CHECK_FALSE(is_background(pixel(hidden, {1.5, 1.5, 0})));  // the collider itself is visible
 
     scene.bodies[0].role = PictureScene::Body::Emitter;
     CHECK(is_green(pixel(render(points, small, scene, front_view()), {1, 0, -1})));
@@ -154,13 +154,13 @@ TEST_CASE("a wall between the camera and the scene is transparent, and one behin
         return render(points, small, scene, front_view());
     };
     const Picture open = seen({});
-    CHECK(seen({{Vec3d(0, 0, -1), -3}}).rgb == open.rgb);  // free below z = 3; the camera is above
-    const Picture behind = seen({{Vec3d(0, 0, 1), -3}});   // free above z = -3
+    CHECK(seen({{Vec3d(0, 0, -1), -3}}).rgb == open.rgb);  // free space is z < 3; the camera is outside it
+    const Picture behind = seen({{Vec3d(0, 0, 1), -3}});   // free space is z > -3
     CHECK(is_red(behind.pixel(160, 100)));
     CHECK(behind.rgb != open.rgb);
 }
 
-// The linear light that points add to the background, summed over a picture: of each channel.
+// Returns the linear light that points add to the background, summed over a picture, per channel.
 double light_of(const PointSet& points, const PictureScene& scene)
 {
     const auto sum = [](const Picture& picture) {
@@ -190,9 +190,9 @@ TEST_CASE("a streak has the light of its disc, spread along the way during the e
     points.v().write()[0] = way;
     const PictureScene scene = styled({.additive = true, .shutter = 1});
 
-    // The sum over all pixels is off by the rounding of their bytes alone.
+    // The sum over all pixels only has the error of rounding to bytes.
     CHECK(light_of(points, scene) == Approx(still).epsilon(0.04));
-    // Half-way back it is as bright as at its end, one length on there is none.
+    // Halfway back it is as bright as at its end, and one length further there is nothing.
     const Picture picture = render(points, small, scene, front_view());
     const Picture empty = render(PointSet(), small, scene, front_view());
     const auto added = [&](const Vec3f& P) {
@@ -238,7 +238,7 @@ TEST_CASE("additive points add up, in any order, and hide nothing", "[io][pictur
     const double both = light_of(balls({{0, 0, 1}, {0, 0, -1}}, {dim, dim}, 0.5f), adds);
     CHECK(both == Approx(one + other).epsilon(0.03));
     CHECK(light_of(balls({{0, 0, -1}, {0, 0, 1}}, {dim, dim}, 0.5f), adds) == both);
-    // Over each other the nearer one hides what is behind it.
+    // Where they overlap, the nearer one hides the one in the background.
     CHECK(light_of(balls({{0, 0, 1}, {0, 0, -1}}, {dim, dim}, 0.5f), {}) < 0.8 * both);
 }
 
@@ -284,7 +284,7 @@ TEST_CASE("a ball casts no shadow on itself, wherever it is", "[io][picture]")
     view.bounds = Box3d(Vec3d(-2, -1, -2), Vec3d(2, 3, 2));
     for (const float radius : {0.06f, 0.1f, 0.2f, 0.5f}) {
         int darkest = 255, lightest = 0;
-        for (int k = 0; k < 24; ++k) {  // through some slices of the light's region, at any place in its cells
+        for (int k = 0; k < 24; ++k) {  // through several slices of the lit region, at arbitrary positions in its cells
             const auto x = static_cast<float>(k % 3) * 0.3f, y = static_cast<float>(k) * 0.037f;
             const Picture picture = render(balls({{x, y, 0}}, {{0.4f, 0.4f, 0.4f}}, radius), small, {}, view);
             const int at = *std::max_element(picture.rgb.begin(), picture.rgb.end());
@@ -292,7 +292,7 @@ TEST_CASE("a ball casts no shadow on itself, wherever it is", "[io][picture]")
             lightest = std::max(lightest, at);
         }
         CAPTURE(radius, darkest, lightest);
-        CHECK(lightest - darkest <= 12);  // where its middle is in a pixel makes some of that
+        CHECK(lightest - darkest <= 12);  // part of it comes from the position of the centre within a pixel
     }
 }
 
@@ -304,7 +304,7 @@ TEST_CASE("the shadow of a ball is as large as the ball", "[io][picture]")
     PictureScene scene;
     scene.planes.push_back({Vec3d::UnitY(), -1});
     for (const float radius : {0.25f, 0.4f, 0.6f}) {
-        // The lamp is from above and the left: the shadow falls to the right of what hides the ground.
+        // The lamp is above and to the left, so the shadow falls to the right of the ball.
         const Picture with = render(balls({{-1, 2.5f, 0}}, {{0.1f, 0.1f, 0.1f}}, radius), small, scene, view);
         const Picture without = render(PointSet(), small, scene, view);
         int most = 0;
@@ -312,7 +312,7 @@ TEST_CASE("the shadow of a ball is as large as the ball", "[io][picture]")
         const int left = static_cast<int>(160 + 100 * (-1 + radius) / (12 - 2.5)) + 3;
         for (int y = 0; y < 200; ++y)
             for (int x = left; x < 320; ++x) most = std::max(most, darker(x, y));
-        int area = 0;  // pixels in which the shadow is at least half as deep as anywhere
+        int area = 0;  // pixels in which the shadow is at least half as deep as its deepest
         for (int y = 0; y < 200; ++y)
             for (int x = left; x < 320; ++x) area += 2 * darker(x, y) > most;
         const double pixel = (12 + 1) / 100.0, slope = std::hypot(0.45, 0.85 + 0.35) / (0.85 + 0.35);
@@ -333,7 +333,7 @@ TEST_CASE("a style is that of a group, and the later one counts", "[io][picture]
     };
     CHECK_FALSE(streaks(140));
     CHECK(streaks(180));
-    scene.styles.push_back({.additive = true});  // says nothing of the shutter
+    scene.styles.push_back({.additive = true});  // does not set the shutter
     CHECK(streaks(180));
     scene.styles.push_back({.shutter = 0});
     CHECK_FALSE(streaks(180));
@@ -458,11 +458,11 @@ TEST_CASE("over a sequence the camera holds still, and glides back a few times w
     PointSet points = random_points({.size = 500, .extent = 1});
     points.v().fill(Vec3f::Zero());
     double distance = 0;
-    int rests = 0;  // frames among those in which points spread
+    int rests = 0;  // frames in which the camera rests while points spread
     for (int frame = 0; frame < 240; ++frame) {
         const bool spreads = frame >= 24;
         if (spreads)
-            for (Vec3f& P : points.P().write()) P *= 1.005f;  // in 9 s to three times their width
+            for (Vec3f& P : points.P().write()) P *= 1.005f;  // after 9 s three times as wide
         const PictureView view = fit.next(points, {.number = frame + 1, .time = frame / 24.0});
         const double now = (view.camera.position - view.camera.target).norm();
         CAPTURE(frame, distance, now);

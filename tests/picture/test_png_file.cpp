@@ -28,7 +28,7 @@ TEST_CASE("a picture is read from a .png as it was written")
     CHECK_THROWS_WITH(read_png(folder.write("q.png", "no picture")), Catch::Matchers::Contains("can't be read"));
 }
 
-// By libpng, which warns of a chunk that is damaged or in the wrong place.
+// Reads with libpng, which warns about a chunk that is damaged or in the wrong position.
 TEST_CASE("a .png says that its colours are sRGB, and by which primaries")
 {
     const test::TemporaryFolder folder;

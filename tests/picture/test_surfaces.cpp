@@ -1,4 +1,4 @@
-// What the still part of a picture takes.
+// Checks the memory of the static part of a picture.
 #include "runtime/picture/surfaces.h"
 
 #include "tests/test.h"
@@ -6,7 +6,7 @@
 namespace rapid {
 namespace {
 
-// From 10 m in front of the origin, a little above.
+// From 10 m in front of the origin, slightly above.
 PictureView view_from_above()
 {
     PictureView view;
@@ -45,9 +45,9 @@ PictureScene with_block()
 
 TEST_CASE("the surfaces of a picture take no more than is reckoned with", "[picture][surfaces]")
 {
-    CHECK(bytes_a_pixel({}) == Approx(surface_bytes_a_pixel(false)));  // the grid takes no light from points
+    CHECK(bytes_a_pixel({}) == Approx(surface_bytes_a_pixel(false)));  // the ground grid takes no shadows of points
 
-    PictureScene walls;  // all over the picture
+    PictureScene walls;  // fill the whole picture
     walls.planes.push_back({Vec3d(0, 1, 0), 0});
     walls.planes.push_back({Vec3d(0, 0, 1), -20});
     CHECK(bytes_a_pixel(walls) == Approx(surface_bytes_a_pixel(true)));

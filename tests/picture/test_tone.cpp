@@ -1,4 +1,4 @@
-// The bytes of a pixel against sRGB's formula.
+// Compares the bytes of a pixel with sRGB's formula.
 #include "runtime/picture/tone.h"
 
 #include <rapidcheck.h>
@@ -13,9 +13,9 @@
 namespace rapid {
 namespace {
 
-constexpr int across = 8;  // pixels of the dither, along both edges
+constexpr int across = 8;  // pixels of the dither along both edges
 
-// The mean over the dither of one light, in steps of a byte.
+// Returns the mean over the dither for a constant light, in byte steps.
 double mean_of(float light)
 {
     const std::vector<Vec3f> row(across, Vec3f::Constant(light));

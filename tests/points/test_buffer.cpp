@@ -25,7 +25,7 @@ TEST_CASE("values survive growth, from the heap to pages and from pages to more 
 {
     Buffer buffer;
     std::size_t written = 0;
-    // 64 B to 64 MiB: blocks are from the heap below 256 KiB, and pages of their own from there on.
+    // 64 B to 64 MiB: blocks come from the heap below 256 KiB, and are separate pages from there on.
     for (std::size_t bytes = 64; bytes <= std::size_t{1} << 26; bytes *= 4) {
         buffer.reserve(bytes);
         REQUIRE(buffer.capacity() >= bytes);
@@ -49,7 +49,7 @@ TEST_CASE("room that is there already is kept where it is", "[buffer]")
 
 TEST_CASE("bytes that are given up can be taken back, and what is behind them stays as the block grows", "[buffer]")
 {
-    const std::size_t bytes = GENERATE(std::size_t{1} << 12, std::size_t{1} << 20);  // from the heap, and pages
+    const std::size_t bytes = GENERATE(std::size_t{1} << 12, std::size_t{1} << 20);  // from the heap; from pages
     Buffer buffer(bytes);
     const auto values = words(buffer, bytes);
     std::iota(values.begin(), values.end(), std::uint64_t{0});
@@ -123,7 +123,7 @@ TEST_CASE("buffers that are each a little larger than the one before mostly take
         before = address(buffer) / 4096;
     }
     CHECK(count > 60);
-    CHECK(others <= 9);  // two doublings in steps of an eighth to a quarter, and the first
+    CHECK(others <= 9);  // two doublings in steps of an eighth to a quarter, plus the first block
 }
 
 TEST_CASE("growing bit by bit moves the values a few times, not every time", "[buffer]")
@@ -134,7 +134,7 @@ TEST_CASE("growing bit by bit moves the values a few times, not every time", "[b
         buffer.reserve(bytes);
         capacities.insert(buffer.capacity());
     }
-    CHECK(capacities.size() < 40);  // log(1e6) / log(1.5) = 34 and the change from heap to pages
+    CHECK(capacities.size() < 40);  // log(1e6) / log(1.5) = 34, plus the change from heap to pages
 }
 
 TEST_CASE("every block starts on a cache line", "[buffer]")
@@ -171,7 +171,7 @@ TEST_CASE("moving a buffer moves the block, and the values of neither are lost",
     CHECK(to.data() == block);
     CHECK(words(to, bytes)[7] == 42);
 
-    from.reserve(bytes);  // the moved-from buffer is an empty one
+    from.reserve(bytes);  // a moved-from buffer is empty and usable
     CHECK(from.data() != block);
 }
 

@@ -19,7 +19,7 @@ std::vector<T> values_of(const Column<T>& column)
 
 Column<float> column_of(const std::vector<float>& values) { return Column<float>(std::span(values)); }
 
-// A value of each type that differs from every other i's.
+// Returns a value of each type that is different for every i.
 template <class T>
 T value_of(int i)
 {
@@ -50,7 +50,7 @@ TEST_CASE("a value that all points share is held once", "[column]")
 
 TEST_CASE("a shared column that all points have left is written, and takes others", "[column]")
 {
-    // Under the sanitizer of undefined behaviour this fails when no values are copied from nowhere.
+    // The undefined behaviour sanitizer reports a copy of zero values from a null pointer.
     Column<float> column = column_of({1, 2, 3});
     const Column<float> before = column;
     column.keep(Compaction::from_mask(std::vector<std::uint8_t>(3, 0)));
@@ -93,7 +93,7 @@ TEST_CASE("a column that is alone is written in place", "[column]")
     CHECK(column.read().data == before);
     {
         const Column<float> copy = column;
-    }  // NOLINT: shared, and alone again
+    }  // NOLINT: the column was shared and is now the only owner
     column.write();
     CHECK(column.read().data == before);
 }
@@ -139,7 +139,7 @@ TEST_CASE("a uniform column stays uniform while its own value is appended", "[co
 TEST_CASE("a column without points becomes uniform with its first", "[column]")
 {
     Column<float> column;
-    column.write();  // a node that writes all points of a frame that has none
+    column.write();  // like a node that writes all points of an empty frame
     column.append(1000, 0.5f);
     CHECK(column.is_uniform());
     CHECK(column[999] == 0.5f);
@@ -158,7 +158,7 @@ TEST_CASE("zero and minus zero are two values, and NaN is one", "[column]")
 
 TEST_CASE("a value of the column itself can be appended, though its memory moves", "[column]")
 {
-    Column<float> column = column_of(std::vector<float>(65536, 6.0f));  // from here on growth moves from heap to pages
+    Column<float> column = column_of(std::vector<float>(65536, 6.0f));  // beyond this, growth moves from heap to pages
     column.append(100000, column[17]);
     CHECK(column.size() == 165536);
     CHECK(column[165535] == 6.0f);
@@ -177,7 +177,7 @@ TEST_CASE("more values than memory can number are refused", "[column]")
 {
     Column<Vec3f> column(std::size_t{1} << 60, Vec3f::Zero());
     CHECK_THROWS_AS(column.write(), std::bad_alloc);
-    Column<Vec3f> huge(~std::size_t{0} / 4, Vec3f::Zero());  // its bytes, modulo 2^64, are few
+    Column<Vec3f> huge(~std::size_t{0} / 4, Vec3f::Zero());  // its size in bytes is small modulo 2^64
     CHECK_THROWS_AS(huge.write(), std::bad_alloc);
 }
 
@@ -193,7 +193,7 @@ TEST_CASE("a mask gives the runs of points that stay", "[column]")
     CHECK(runs_of({0, 0}) == Runs{});
     CHECK(runs_of({1, 1, 1}) == Runs{{0, 3}});
     CHECK(runs_of({0, 1, 1, 0, 0, 1}) == Runs{{1, 2}, {5, 1}});
-    CHECK(runs_of({0, 2, 255, 0}) == Runs{{1, 2}});  // all but 0 stays
+    CHECK(runs_of({0, 2, 255, 0}) == Runs{{1, 2}});  // any value but 0 keeps a point
 }
 
 TEST_CASE("of several runs the first of the longest is told, with what stays before it", "[column]")
@@ -224,8 +224,8 @@ TEST_CASE("the longest run of the points that stay is not moved", "[column]")
 
 TEST_CASE("a column whose oldest points die while others are born stays where it is, within a quarter", "[column]")
 {
-    // A 64th each time: where nothing took the room before them back, they would leave it behind 64 times.
-    const std::size_t size = GENERATE(std::size_t{1} << 12, std::size_t{1} << 17), dead = size / 64;  // heap, and pages
+    // Removes 1/64 per round. If the room before the values were never reused, it would grow to 64 times the size.
+    const std::size_t size = GENERATE(std::size_t{1} << 12, std::size_t{1} << 17), dead = size / 64;  // from heap; from pages
     Column<std::int64_t> column;
     std::int64_t next = 0;
     const auto bear = [&](std::size_t n) {
@@ -234,7 +234,7 @@ TEST_CASE("a column whose oldest points die while others are born stays where it
     bear(size + dead);
     std::vector<std::uint8_t> mask(size + dead, 1);
     std::fill_n(mask.begin(), dead, std::uint8_t{0});
-    std::size_t moved = 0;  // blocks of memory
+    std::size_t moved = 0;  // number of times that the block of memory changed
     const std::int64_t *begin = nullptr, *end = nullptr;
     for (std::int64_t round = 0; round < 1000; ++round) {
         column.keep(Compaction::from_mask(mask));
@@ -251,7 +251,8 @@ TEMPLATE_TEST_CASE("a column of any type does what a vector does", "[column]", f
                    Quatf, std::uint8_t)
 {
     using T = TestType;
-    // Any sequence of edits, on a column and on a model; every second copies first, and the copy must not change.
+    // Applies random edits to a column and to a model. Every second edit copies the column first, and the copy must not
+    // change.
     rc::prop("appending, writing, filling and removing", [] {
         Column<T> column(0, value_of<T>(3));
         std::vector<T> model;
@@ -278,7 +279,7 @@ TEMPLATE_TEST_CASE("a column of any type does what a vector does", "[column]", f
                 column.fill(value_of<T>(n));
                 model.assign(model.size(), value_of<T>(n));
             } else if (edit >= 5) {
-                // Many of all; or a few, mostly of the first.
+                // Removes many of all points, or a few that are mostly among the first.
                 std::vector<std::uint8_t> mask(model.size());
                 for (std::size_t i = 0; i < mask.size(); ++i)
                     mask[i] = edit == 5 ? (i * 7 + count) % 3 != 0 : i % 5 != 0 || (i > count / 2 && i % 64 != 0);
@@ -299,7 +300,7 @@ TEMPLATE_TEST_CASE("a column of any type does what a vector does", "[column]", f
 
 TEST_CASE("a column is written in place only after a reader in another thread has let go of it", "[column][threads]")
 {
-    // Under the thread sanitizer this fails when letting go does not order the reads before the writes.
+    // The thread sanitizer reports an error if releasing the copy does not order its reads before the writes.
     Column<float> column = column_of(std::vector<float>(1000, 1.0f));
     std::atomic<bool> wrong = false;
     for (int round = 0; round < 50; ++round) {

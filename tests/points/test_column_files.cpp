@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t large = 32 << 20;  // values
 
-// kB
+// Returns the resident memory in kB.
 long resident_memory()
 {
     std::ifstream status("/proc/self/status");
@@ -33,7 +33,7 @@ TEST_CASE("columns in files have their values, and little of them is in memory",
         const ColumnFiles files(folder.path(), 16 << 20);
         Column<std::int64_t> column;
         long most = 0;
-        for (std::size_t part = 0; part < 16; ++part) {  // growing moves them
+        for (std::size_t part = 0; part < 16; ++part) {  // growing moves the values
             const std::span<std::int64_t> added = column.append_for_writing(large / 16);
             std::iota(added.begin(), added.end(), static_cast<std::int64_t>(part * large / 16));
             most = std::max(most, resident_memory());
@@ -63,7 +63,7 @@ TEST_CASE("columns made before and after are in memory as ever", "[column_files]
     CHECK(before[1] == 1);
 }
 
-// Blocks that lie in unnamed files of this folder.
+// Counts the blocks mapped from unnamed files in this folder.
 std::size_t blocks_in(const std::filesystem::path& folder)
 {
     std::size_t count = 0;
@@ -99,7 +99,7 @@ TEST_CASE("a pause keeps columns in memory, and points are moved into files with
 TEST_CASE("values that are written are those of the column, in files and in memory, and no others", "[column_files]")
 {
     const test::TemporaryFolder folder;
-    const std::size_t size = GENERATE(std::size_t{100}, std::size_t{1} << 20);  // of the heap, and of pages
+    const std::size_t size = GENERATE(std::size_t{100}, std::size_t{1} << 20);  // from the heap; from pages
     const bool in_files = GENERATE(false, true);
     CAPTURE(size, in_files);
     std::optional<ColumnFiles> files;
@@ -115,7 +115,7 @@ TEST_CASE("values that are written are those of the column, in files and in memo
     for (const std::size_t at : {std::size_t{0}, size / 2 + 1, size - other.size()}) {
         write_values(&values[at], other.data(), other.size() * sizeof(std::int32_t));
         std::copy(other.begin(), other.end(), expected.begin() + static_cast<std::ptrdiff_t>(at));
-        const auto grown = column.append_for_writing(size / 4);  // it may be elsewhere now
+        const auto grown = column.append_for_writing(size / 4);  // may move the values
         std::iota(grown.begin(), grown.end(), 3);
         for (std::size_t i = 0; i < size / 4; ++i) expected.push_back(3 + static_cast<std::int32_t>(i));
         values = column.write();

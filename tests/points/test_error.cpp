@@ -23,7 +23,7 @@ TEST_CASE("an error is not longer for names, files and messages without end", "[
     const std::string text = Error(endless).in_node(endless).at({endless, 14}).what();
     CHECK(text.size() < 9000);
     CHECK(text.find("bytes ...] ") != std::string::npos);
-    const std::string path(4000, 'x');  // which may be one
+    const std::string path(4000, 'x');  // a long text that may be a path
     CHECK(std::string(Error("it is empty").at({path}).what()) == path + ": it is empty");
 }
 
@@ -58,10 +58,10 @@ TEST_CASE("the nearest name is the one with the fewest slips of the finger", "[e
 {
     const std::vector<std::string> names = {"age", "bounce", "drag", "gravity", "linear", "life", "P", "quadratic"};
 
-    CHECK(nearest_name("linaer", names) == "linear");  // neighbours swapped
-    CHECK(nearest_name("liner", names) == "linear");   // a letter left out
+    CHECK(nearest_name("linaer", names) == "linear");  // neighbouring letters swapped
+    CHECK(nearest_name("liner", names) == "linear");   // a missing letter
     CHECK(nearest_name("bounnce", names) == "bounce");
-    CHECK(nearest_name("gravitas", names) == "gravity");  // two of eight
+    CHECK(nearest_name("gravitas", names) == "gravity");  // two of eight letters differ
     CHECK(nearest_name("Drag", names) == "drag");
     CHECK(nearest_name("p", names) == "P");
 }
@@ -71,7 +71,7 @@ TEST_CASE("a name that is like none has no nearest name", "[error]")
     const std::vector<std::string> names = {"drag", "P", "v"};
 
     CHECK(nearest_name("turbulence", names).empty());
-    CHECK(nearest_name("x", names).empty());  // every name of one letter is one slip away
+    CHECK(nearest_name("x", names).empty());  // every single letter is one edit away
     CHECK(nearest_name("", names).empty());
     CHECK(nearest_name("drag", {}).empty());
 }

@@ -28,10 +28,10 @@ struct Told {
     }
 };
 
-// Takes so many MiB while it is watched; with `leave`, no longer than until it is asked to end.
+// Allocates this many MiB while the memory is watched. With `leave`, stops when it is asked to end.
 void take(Told& told, std::size_t mebibytes, bool leave)
 {
-    malloc_trim(0);  // what other tests have freed, which the watch would have the process give back
+    malloc_trim(0);  // releases memory that other tests freed, which the watch would do otherwise
     const MemoryWatch watch(
         MemoryWatch::now(),
         [&](const std::string& message) {

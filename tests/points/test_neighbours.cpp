@@ -1,4 +1,4 @@
-// Neighbours against all pairs.
+// Compares Neighbours with a search over all pairs.
 #include "runtime/points/neighbours.h"
 
 #include <tbb/global_control.h>
@@ -24,21 +24,21 @@ std::vector<std::vector<std::uint32_t>> by_all_pairs(const std::vector<Vec3f>& P
 TEST_CASE("neighbours are those that all pairs give, of a set and of any place, on any number of threads",
           "[neighbours][threads]")
 {
-    // Evenly; far from the origin; in clumps so far apart that most cells are empty; on a lattice, at the very radius;
-    // and in coordinates whose squares single precision does not hold.
+    // Evenly distributed; far from the origin; in clumps so distant that most cells are empty; on a lattice, exactly at
+    // the radius; and with coordinates whose squares underflow in single precision.
     const int shape = GENERATE(0, 1, 2, 3, 4);
     CAPTURE(shape);
     std::mt19937 random(5);
     std::uniform_real_distribution<float> in(-1, 1);
     std::vector<Vec3f> P;
     double radius = 0.2;
-    for (int i = 0; i < 5000; ++i) {  // more than a chunk
+    for (int i = 0; i < 5000; ++i) {  // more than one chunk
         Vec3f at(in(random), in(random), in(random));
         if (shape == 1) at += Vec3f(1e4f, -1e4f, 3e3f);
         if (shape == 2) at = 0.1f * at + Vec3f(static_cast<float>(i % 7) * 1e5f, 0, 0);
         if (shape == 3)
             at = 0.25f * Vec3f(static_cast<float>(i % 10), static_cast<float>(i / 10 % 10),
-                               static_cast<float>(i / 100 % 10));  // each place five times
+                               static_cast<float>(i / 100 % 10));  // each position five times
         if (shape == 4) at *= 1e-30f;
         P.push_back(at);
     }

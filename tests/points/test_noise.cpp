@@ -32,7 +32,7 @@ TEST_CASE("noise has the gradient that central differences find", "[noise]")
 {
     const NoiseOptions options{GENERATE(0.0, 0.3, -7.6), GENERATE(1, 3), 5};
     CAPTURE(options.time, options.octaves);
-    const double h = 1e-5;  // differences: h²/6 of the third derivative, and 1e-16/h of rounding
+    const double h = 1e-5;  // error of the differences: h²/6 of the third derivative, and 1e-16/h from rounding
     for (const Vec3d& P : random_places(200, 20)) {
         Vec3d gradient;
         noise(P, options, &gradient);
@@ -58,7 +58,7 @@ TEST_CASE("curl noise neither gathers nor spreads: its divergence is 0", "[noise
             largest = std::max(largest, std::abs(slope));
         }
         CHECK(std::abs(divergence) < 1e-6);
-        REQUIRE(largest > 1e-4);  // or 0 would be no wonder
+        REQUIRE(largest > 1e-4);  // otherwise 0 would be no achievement
     }
 }
 
@@ -75,7 +75,7 @@ TEST_CASE("noise is 0 at the corners of its lattice, its gradient one of 20 ther
                 ++found[{std::round(gradient.x()), std::round(gradient.y()), std::round(gradient.z())}];
                 CHECK((gradient - gradient.array().round().matrix()).norm() < 1e-12);
             }
-    // Twelve middles of edges, each once in 16 on average, and eight corners, each once in 32.
+    // There are twelve edge midpoints, each with probability 1/16, and eight corners, each with probability 1/32.
     CHECK(found.size() == 20);
     for (const auto& [direction, count] : found) {
         const bool corner = direction[0] != 0 && direction[1] != 0 && direction[2] != 0;
@@ -174,7 +174,7 @@ TEST_CASE("noise is defined everywhere, and known to the bit", "[noise]")
         CHECK(std::abs(noise(Vec3d(x, 0.3, x), {0.1, 2})) <= 1);
         CHECK(curl_noise(Vec3d(0.3, x, x), {0.1, 2}).allFinite());
     }
-    // The same numbers stand in tests/host/test_math.lua.
+    // tests/host/test_math.lua has the same numbers.
     CHECK(noise(Vec3d(0.25, 1.5, -2.75), {}) == -0x1.a2a589f959c42p-2);
     CHECK(noise(Vec3d(100.1, -200.2, 300.3), {0.7, 3, 42}) == -0x1.1c09a79019806p-3);
     CHECK(curl_noise(Vec3d(0.25, 1.5, -2.75), {0.7, 3, 42}) ==

@@ -1,4 +1,4 @@
-// Values of threads, against what each thread has put into them, and the order of their destruction.
+// Checks that each thread gets its own values, and the order of their destruction.
 #include "runtime/of_thread.h"
 
 #include <new>

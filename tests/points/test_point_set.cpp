@@ -163,7 +163,7 @@ TEST_CASE("every known attribute is listed once, by name, with a type that Houdi
 TEST_CASE("a set's bytes are those of its columns and groups", "[point_set]")
 {
     PointSet set = points(std::vector<Vec3f>(1000, Vec3f(1, 2, 3)));
-    // P 12 and id 8 bytes a point; v is the same for all.
+    // P takes 12 and id 8 bytes per point; v is uniform.
     CHECK(set.bytes() == 20 * 1000 + 12);
     set.group("hot").write();
     CHECK(set.bytes() == 21 * 1000 + 12);

@@ -18,7 +18,7 @@ TEST_CASE("an endless text is shortened in its middle, between characters", "[pr
     CHECK(shortened("short", 5) == "short");
     CHECK(shortened(std::string(50, 'a') + std::string(50, 'b'), 40) ==
           std::string(30, 'a').append(" [... 60 bytes ...] ").append(10, 'b'));
-    // 12 bytes, of which the characters in the middle are two each.
+    // 12 bytes; each character in the middle takes two.
     CHECK(shortened("a\xc3\xa9\xc3\xa9\xc3\xa9\xc3\xa9\xc3\xa9"
                     "b",
                     8) == "a\xc3\xa9\xc3\xa9 [... 6 bytes ...] b");

@@ -21,7 +21,7 @@ TEST_CASE("the numbers are Philox4x32-10, as its authors publish them", "[random
         std::uint64_t item, use, key;
         std::array<std::uint32_t, 4> bits;
     };
-    // kat_vectors of Random123; a counter's and a key's words are given low word first.
+    // From kat_vectors of Random123. Counters and keys are given low word first.
     const auto known = GENERATE(Known{0, 0, 0, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}},
                                 Known{~0ull, ~0ull, ~0ull, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}},
                                 Known{0x85a308d3243f6a88,
@@ -56,8 +56,8 @@ TEST_CASE("the numbers of many items are spread evenly, and the four of an item 
         product += (numbers[0] - 0.5) * (numbers[1] - 0.5);
     }
 
-    // Five standard deviations of the mean of 40,000: of a uniform number 0.29, of its square 0.30, of a product of two
-    // centred ones 1/12.
+    // Five standard deviations of the mean of 40,000 values: 0.29 for a uniform number, 0.30 for its square, 1/12 for a
+    // product of two centred ones.
     for (std::size_t i = 0; i < 4; ++i) {
         CHECK(sum[i] / items == Approx(1.0 / 2).margin(5 * 0.29 / 200));
         CHECK(squares[i] / items == Approx(1.0 / 3).margin(5 * 0.30 / 200));
@@ -79,7 +79,7 @@ TEST_CASE("seed, node, item and use each give other numbers, and the same give t
 
 TEST_CASE("a scene drawn today is drawn the same by the next version", "[random]")
 {
-    // Philox of {0, 0, 0, 0} with the 64-bit FNV-1a hash of "" as key, computed with Random123 alone.
+    // Philox of {0, 0, 0, 0} with the 64-bit FNV-1a hash of "" as key, computed with Random123 only.
     r123::Philox4x32 philox;
     const auto mixed = philox({{0, 0, 0, 0}}, {{0x84222325, 0xcbf29ce4}});
     CHECK(RandomKey(0, "").value == (mixed[0] | std::uint64_t{mixed[1]} << 32));
@@ -99,7 +99,7 @@ TEST_CASE("numbers of some items are those of each, however many there are", "[r
     const RandomKey key(7, "emit1");
     std::vector<std::uint32_t> offsets;
     for (std::uint32_t i = 0; offsets.size() < 100; i += 1 + i % 7) offsets.push_back(i);
-    const std::uint64_t first = 0xFFFFFFF0;  // across the low half of the counter
+    const std::uint64_t first = 0xFFFFFFF0;  // the items cross a carry into the high half of the counter
     for (const std::size_t n : {0, 1, 15, 16, 17, 100}) {
         std::vector<std::array<double, 4>> numbers(n);
         uniform4(key, Items(first, offsets.data()), 3, numbers);

@@ -1,4 +1,4 @@
-// What is kept from frame to frame, written and read back: the same bits, shared columns, no trust in what is read.
+// Writes states and reads them back: bit-identical, with shared columns, and without trust in the data.
 #include "runtime/points/saved_state.h"
 
 #include "runtime/points/state_archive.h"
@@ -7,7 +7,7 @@
 namespace rapid {
 namespace {
 
-// A clock with all that states are made of.
+// A clock with one member of each kind that a state can have.
 struct Clock {
     struct Tick {
         std::int64_t id = 0;

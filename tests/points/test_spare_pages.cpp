@@ -16,7 +16,7 @@ SparePages::Block mapped(std::size_t bytes)
     return {mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes};
 }
 
-// Takes blocks of these bytes until there are none.
+// Takes blocks of this size until there are none left, and returns their number.
 std::size_t take_all(SparePages& pages, std::size_t bytes)
 {
     std::size_t count = 0;
@@ -63,7 +63,7 @@ TEST_CASE("of more pages than are kept those that came first go back to the syst
 {
     SparePages few(3);
     for (std::size_t k = 1; k <= 5; ++k) few.give(mapped(k * 3 * mib));
-    CHECK(take_all(few, 6 * mib) + take_all(few, 3 * mib) == 2);  // 9 and 12; a block of 15 fits neither
+    CHECK(take_all(few, 6 * mib) + take_all(few, 3 * mib) == 2);  // 9 and 12 MiB; 15 MiB is too large for either
     CHECK(take_all(few, 15 * mib) == 1);
 
     SparePages many(100);

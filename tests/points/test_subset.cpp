@@ -32,7 +32,7 @@ TEST_CASE("a smaller sample is a part of a larger one", "[subset]")
     }));
 }
 
-// Of n independent draws with probability f, n f ± 5 √(n f (1 - f)).
+// The size of a sample of n independent draws with probability f: n f ± 5 √(n f (1 - f)).
 TEST_CASE("parts and samples are as large as they should be, also parts of samples", "[subset]")
 {
     const auto [count, fraction] = GENERATE(table<int, double>({{2, 1}, {16, 1}, {1, 0.01}, {16, 0.1}, {3, 0.5}}));
@@ -46,7 +46,7 @@ TEST_CASE("parts and samples are as large as they should be, also parts of sampl
     }
 }
 
-// Births that follow each other are not in the same part more often than any two: a preview has no clumps.
+// Consecutive births are in the same part no more often than any other two, so a preview has no clumps.
 TEST_CASE("neighbours in id are in parts independently", "[subset]")
 {
     const int n = 1'000'000;

@@ -40,7 +40,7 @@ private:
     std::mt19937_64 engine_;
 };
 
-// From around a shape of this size, roughly towards it, curved by an acceleration.
+// Returns a path that starts around a shape of this size, heads roughly towards it, and is curved by an acceleration.
 Path path_to(const Vec3d& center, Random& random, double radius)
 {
     const Vec3d P = center + random.in(1, 3) * random.direction();
@@ -68,10 +68,10 @@ TEST_CASE("a path that turns before it reaches a plane does not meet it", "[firs
 {
     const ShapePtr plane = make_plane({0, 1, 0}, 0);
     const Vec3d lift(0, 10, 0);
-    // It turns at the height 1 - v²/20: at v = √20 it grazes.
+    // The path turns at height 1 - v²/20, so it grazes the plane at v = √20.
     CHECK(meet(plane, {{0, 1, 0}, {0, -4.47, 0}, lift, 10, 0}).time == Contact::none);
     CHECK(meet(plane, {{0, 1, 0}, {0, -4.48, 0}, lift, 10, 0}).time == Approx(0.448 - std::sqrt(0.448 * 0.448 - 0.2)));
-    CHECK(meet(plane, {{0, 1, 0}, {0, -4.48, 0}, lift, 0.3, 0}).time == Contact::none);  // not yet
+    CHECK(meet(plane, {{0, 1, 0}, {0, -4.48, 0}, lift, 0.3, 0}).time == Contact::none);  // it ends too early
 }
 
 TEST_CASE("a straight path meets a sphere at the root of its quadratic", "[first_contact]")
@@ -90,7 +90,7 @@ TEST_CASE("a straight path meets a sphere at the root of its quadratic", "[first
         const double b = d.dot(v), c = d.squaredNorm() - (R + r) * (R + r), a = v.squaredNorm();
         const double discriminant = b * b - a * c;
         CAPTURE(i, discriminant);
-        if (std::abs(discriminant) < 1e-9 * b * b) continue;  // a graze, which rounding decides
+        if (std::abs(discriminant) < 1e-9 * b * b) continue;  // a graze, which depends on rounding
         if (discriminant < 0) {
             CHECK(contact.time == Contact::none);
             continue;
@@ -99,13 +99,13 @@ TEST_CASE("a straight path meets a sphere at the root of its quadratic", "[first
         const double root = c / (-b + std::sqrt(discriminant));
         CHECK(contact.time == Approx(root).epsilon(1e-9));
         CHECK_THAT(contact.n, close_to(Vec3d((P + root * v - center).normalized()), 1e-7));
-        // Of the offset surface by this radius; by a difference over a millionth of the sphere.
+        // The curvature of the offset surface at this radius, from a difference over a millionth of the sphere's size.
         CHECK(contact.curvature == Approx(1 / (R + r)).epsilon(1e-4));
     }
     CHECK(met > 500);
 }
 
-// The contact is on the surface, and the path was outside until then: in small steps.
+// Checks in small steps that the contact is on the surface and that the path was outside until then.
 void require_first(const ShapePtr& shape, const Path& path, const Contact& contact, double tolerance)
 {
     const double until = std::min(contact.time, path.duration);
@@ -145,17 +145,17 @@ TEST_CASE("a point flush with a surface is outside it", "[first_contact]")
     const double off = GENERATE(-1e-7, 0.0, 1e-7);  // the rounding of a position to single precision
     CAPTURE(shape->kind(), off);
     Vec3d P(0, 1, 0);
-    P.y() += off - distance_to(shape, P);  // on the field's own surface, where that is not exactly at 1
+    P.y() += off - distance_to(shape, P);  // on the field's own surface, which may not be exactly at 1
     const Vec3d pull(0, -9.81, 0), none(0, 0, 0);
 
     CHECK(meet(shape, {P, {0, 1, 0}, none, 1, 0}).time == Contact::none);    // leaves
-    CHECK(meet(shape, {P, {0, 1, 0}, pull, 0.1, 0}).time == Contact::none);  // leaves, for longer than this
-    CHECK(meet(shape, {P, {0, 3, 0}, pull, 1, 0}).time == Approx(6 / 9.81).epsilon(1e-5));  // and comes back
+    CHECK(meet(shape, {P, {0, 1, 0}, pull, 0.1, 0}).time == Contact::none);  // leaves, and does not return in this time
+    CHECK(meet(shape, {P, {0, 3, 0}, pull, 1, 0}).time == Approx(6 / 9.81).epsilon(1e-5));  // leaves and returns
     CHECK(meet(shape, {P, {0, -1, 0}, none, 1, 0}).time == 0);                              // moves in
     CHECK(meet(shape, {P, none, pull, 1, 0}).time == 0);                                    // is pressed in
     CHECK(meet(shape, {P, {0, 1e-6, 0}, pull, 1, 0}).time == 0);              // hops by less than rounding
     CHECK(meet(shape, {P, none, none, 1, 0}).time == Contact::none);          // stays
-    CHECK(meet(shape, {P, none, {0, 9.81, 0}, 1, 0}).time == Contact::none);  // is drawn off
+    CHECK(meet(shape, {P, none, {0, 9.81, 0}, 1, 0}).time == Contact::none);  // is pulled off
     CHECK(meet(shape, {P, {0, -1, 0}, none, 1, 0}).depth == 0);
 }
 
@@ -186,7 +186,7 @@ TEST_CASE("deep in a level set a path goes back the way it came", "[first_contac
     CHECK(contact.time == 0);
     CHECK(contact.depth > 0);
     CHECK(contact.n == Vec3d(0, 0, 0));
-    const double z = 0.2 + 4 * contact.back;  // there the field has a gradient, or it is outside
+    const double z = 0.2 + 4 * contact.back;  // there the field has a gradient, or the point is outside
     CHECK(z > 0.8);
     CHECK(z < 1.3);
     CHECK(meet(ball, {{0, 0, 0.2}, {0, 0, 0}, {0, 0, 0}, 1, 0}).back == Contact::none);
@@ -206,8 +206,8 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
         CAPTURE(i);
         const Contact contact = meet(shape, path);
         met += contact.time != Contact::none;
-        // A graze of a quarter voxel's chord may be stepped over: it is 0.0125²/(8 · 0.25) deep on the torus' tube, and
-        // half as deep as it is long at an edge.
+        // A graze with a chord of a quarter voxel may be stepped over. Its depth is 0.0125²/(8 · 0.25) on the torus'
+        // tube, and half its length at an edge.
         require_first(shape, path, contact, 7e-3);
         if (contact.time != Contact::none)
             REQUIRE(distance_to(shape, on_path(path, contact.time)) == Approx(radius).margin(1e-6));
@@ -218,7 +218,7 @@ TEST_CASE("paths meet a level set where they first touch its field", "[first_con
 TEST_CASE("a path that leaves a surface meets the next one where it reaches it, even within the same voxel",
           "[first_contact]")
 {
-    // Around the inside of the tube the surface turns towards what leaves it, and from cell to cell in kinks.
+    // On the inside of the tube the surface curves towards a departing path, with kinks between cells.
     const ShapePtr shape = level_set_torus(0.8, 0.25, {0, 0, 0}, {0.05, 5});
     Random random(5);
     int again = 0;
@@ -232,8 +232,8 @@ TEST_CASE("a path that leaves a surface meets the next one where it reaches it, 
                        0};
         const Contact second = meet(shape, out);
         CAPTURE(i, second.time, out.v.dot(first.n));
-        REQUIRE(second.time < out.duration);  // it is in the hole
-        // Slower than this it comes back before it has left by more than rounding.
+        REQUIRE(second.time < out.duration);  // the path is in the hole
+        // A slower path returns before it has left by more than rounding.
         REQUIRE(second.n.dot(out.v) < 1e-3);
         again += second.time < 0.05;
     }
@@ -252,9 +252,9 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
             to(3, random.in(-1, 1), random.in(-1, 1));
         const Vec3d v = speed * (to - from).normalized();
         const Vec3d a =
-            random.in(0, 0.1) * speed * speed * random.direction();  // it bends, by up to 0.05 of its length²
+            random.in(0, 0.1) * speed * speed * random.direction();  // curved, with a deviation of up to 0.05 length²
         const Path path{from, v, a, (to - from).norm() / speed, 0};
-        if (on_path(path, path.duration).x() < 0.3) continue;  // bent back, or not through yet
+        if (on_path(path, path.duration).x() < 0.3) continue;  // curved back, or not through yet
         const Contact contact = meet(wall, path);
         CAPTURE(i);
         REQUIRE(contact.time < path.duration);
@@ -266,14 +266,14 @@ TEST_CASE("a path that starts at rest meets what it falls to, or ends, at any ac
 {
     const ShapePtr ball = level_set_sphere(0.7, {0, 0, 0}, {0.05, 5});
     const double a = std::pow(10.0, GENERATE(range(-1, 35)));
-    const double duration = 1e3;  // s: of up to 1e40 m
+    const double duration = 1e3;  // s; the path is up to 1e40 m long
     CAPTURE(a);
     const Path there{{3, 0, 0}, {0, 0, 0}, {-a, 0, 0}, duration, 0},
         away{{3, 0, 0}, {0, 0, 0}, {a, 0.1 * a, 0}, duration, 0};
 
     const Contact contact = meet(ball, there);
 
-    CHECK(contact.time == Approx(std::sqrt(2 * 2.3 / a)).epsilon(1e-3));  // the field's error, a tenth of a voxel
+    CHECK(contact.time == Approx(std::sqrt(2 * 2.3 / a)).epsilon(1e-3));  // the field's error is a tenth of a voxel
     CHECK(meet(ball, away).time == Contact::none);
 }
 

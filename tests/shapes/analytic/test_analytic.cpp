@@ -64,7 +64,7 @@ TEST_CASE("the distance of a sphere is that of its centre minus its radius", "[a
     CHECK(ask(sphere, {4, 0, 4}).gradient == Vec3d(0.6, 0, 0.8));
     CHECK(ask(sphere, {1, 0, -0.5}).phi == -1.5);
     CHECK(ask(sphere, {1, 0, 0}).phi == -2);
-    CHECK(ask(sphere, {1, 0, 0}).gradient == Vec3d(0, 0, 0));  // the centre has no way out that is nearest
+    CHECK(ask(sphere, {1, 0, 0}).gradient == Vec3d(0, 0, 0));  // at the centre no way out is the nearest
 }
 
 TEST_CASE("the distance of a box is that of its nearest face, edge or corner", "[analytic]")
@@ -115,7 +115,7 @@ TEST_CASE("births on a shape are on it and uniform, and those in it are in it", 
         sum_in += in[i].P.cast<double>();
         normals += on[i].N.cast<double>();
     }
-    // Their means differ from the centre by at most 5 standard errors of a coordinate that is within 1 of it.
+    // The means differ from the centre by at most 5 standard errors of a coordinate that is within 1 of it.
     const double tolerance = 5 / std::sqrt(double(n));
     CHECK_THAT(Vec3d(sum_on / n), close_to(Vec3d(1, 2, 3), tolerance));
     CHECK_THAT(Vec3d(sum_in / n), close_to(Vec3d(1, 2, 3), tolerance));
@@ -139,7 +139,7 @@ TEST_CASE("births fall on the faces of a box in proportion to their areas", "[an
     scatter_on_surface(make_box_shape({1, 2, 3}, {0, 0, 0}))->place(RandomKey(3, "emit1"), 0, on);
     Vec3d counts = Vec3d::Zero();
     for (const Birthplace& birth : on) counts += birth.N.cwiseAbs().cast<double>();
-    // 2·3, 3·1 and 1·2 of 11, within 5 standard errors.
+    // The fractions are 2·3, 3·1 and 1·2 of 11, within 5 standard errors.
     CHECK_THAT(Vec3d(counts / n), close_to(Vec3d(Vec3d(6, 3, 2) / 11), 5 * 0.5 / std::sqrt(double(n))));
 }
 

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// A type as a new file would declare it.
+// A type as a new source file would declare it.
 struct HalfBallType {
     double radius;
     Vec3d center;

@@ -11,7 +11,7 @@ using namespace rapid;
 
 namespace {
 
-// A field that is not a distance: random values in a block of voxels, and constants around it.
+// Returns a field that is not a distance: random values in a block of voxels, and a constant around it.
 openvdb::FloatGrid::Ptr noise(float background)
 {
     openvdb::initialize();
@@ -41,7 +41,7 @@ TEST_CASE("a baked grid agrees with OpenVDB's own sampler, across blocks and at 
         const Vec3d x(place(random), place(random) - 10, place(random));  // in voxels
         const double expected = theirs.isSample(openvdb::Vec3d(x.x(), x.y(), x.z()));
         if (expected == 1.0) {
-            REQUIRE(sampler.distance(x * 0.25) >= 1.0);  // beyond the values: at least the background
+            REQUIRE(sampler.distance(x * 0.25) >= 1.0);  // outside the values: at least the background
             continue;
         }
         Vec3d gradient = Vec3d::Zero();
@@ -67,7 +67,7 @@ TEST_CASE("a baked grid's gradient is the derivative of its distance within a ce
         Vec3d gradient = Vec3d::Zero();
         sampler.distance(P, gradient);
         for (int axis = 0; axis < 3; ++axis) {
-            const Vec3d step = 0.02 * Vec3d::Unit(axis);  // along an axis the interpolant is affine: any step is exact
+            const Vec3d step = 0.02 * Vec3d::Unit(axis);  // the interpolant is affine along an axis: exact
             const double difference = (sampler.distance(P + step) - sampler.distance(P - step)) / 0.04;
             REQUIRE(gradient[axis] == Approx(difference).margin(2e-5));
         }
@@ -81,7 +81,7 @@ TEST_CASE("the slope bound of a cell with one voxel raised is that of its steepe
     grid->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
     grid->getAccessor().setValue({3, 3, 3}, -1.0f);
     const BakedGrid baked = bake(*grid);
-    CHECK(baked.slope == Approx(std::sqrt(3.0) * 3 / 0.5));  // at the voxel all three differences are 3 in 0.5 m
+    CHECK(baked.slope == Approx(std::sqrt(3.0) * 3 / 0.5));  // at the voxel all three differences are 3 per 0.5 m
     CHECK(baked.crossings == 8);
     CHECK_THAT(baked.surface.min(), rapid::test::close_to(Vec3d{1, 1, 1}, 0));
     CHECK_THAT(baked.surface.max(), rapid::test::close_to(Vec3d{2, 2, 2}, 0));
@@ -137,7 +137,7 @@ TEST_CASE("beyond the band the distance is a bound of the right sign, larger tha
         const double exact = d.norm() - radius, bound = sampler.distance(center + d);
         if (std::abs(exact) <= half_width) continue;
         REQUIRE(bound * exact > 0);
-        REQUIRE(std::abs(bound) <= std::abs(exact) + 1e-3);  // the field is within 1e-3 of the sphere
+        REQUIRE(std::abs(bound) <= std::abs(exact) + 1e-3);  // the field differs from the sphere by at most 1e-3
         largest = std::max(largest, -bound);
     }
     CHECK(largest > radius / 3);

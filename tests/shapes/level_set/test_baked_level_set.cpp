@@ -1,4 +1,4 @@
-// Level sets baked as they are measured, against OpenVDB's grid of them and against winding numbers.
+// Compares baked level sets with their OpenVDB grids and with winding numbers.
 #include "runtime/shapes/level_set/baked_level_set.h"
 
 #include <rapidcheck.h>
@@ -41,7 +41,7 @@ double between(double low, double high) { return low + (high - low) * 1e-4 * *rc
 
 Vec3d any_place(double reach) { return {between(-reach, reach), between(-reach, reach), between(-reach, reach)}; }
 
-// Balls, boxes and rings, some within others and some turned inwards; they may overlap.
+// Returns balls, boxes and tori, some nested, some turned inwards, and possibly overlapping.
 MeshPtr any_mesh(const Vec3d& around)
 {
     auto mesh = std::make_shared<Mesh>();
@@ -65,7 +65,7 @@ MeshPtr any_mesh(const Vec3d& around)
     return mesh;
 }
 
-// By the solid angles of the faces (van Oosterom and Strackee 1983).
+// Computed from the solid angles of the faces (van Oosterom and Strackee 1983).
 int winding_number(const Mesh& mesh, const Vec3d& P)
 {
     double sum = 0;
@@ -82,9 +82,9 @@ int winding_number(const Mesh& mesh, const Vec3d& P)
 
 TEST_CASE("a level set of a mesh is to the bit what is baked from its OpenVDB grid", "[level set][baked]")
 {
-    int measured = 0;  // the others are baked from the grid in any case
+    int measured = 0;  // the others are baked from the grid anyway
     rc::prop("", [&] {
-        // Far away its voxels are counted from there.
+        // A distant mesh has its voxel frame near the mesh.
         const MeshPtr mesh = any_mesh(*rc::gen::inRange(0, 3) == 0 ? Vec3d(2000, -3000, 2500) : Vec3d::Zero());
         const LevelSetOptions options{between(0.04, 0.12), between(2, MeshBlocks::widest)};
         const double wider = between(2, 8);  // voxels
@@ -123,7 +123,7 @@ TEST_CASE("a level set of a mesh is negative where the winding number is not 0",
             const Vec3d P(place(random), place(random), place(random));
             double phi;
             level_set->distance({&P, 1}, {&phi, 1}, {});
-            // Nearer, the surface is that of the voxels.
+            // Nearer, the surface is limited by the voxels.
             if (std::abs(phi) > 2 * voxel) RC_ASSERT((phi < 0) == (winding_number(*mesh, P) != 0));
         }
     });

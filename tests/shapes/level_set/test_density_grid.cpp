@@ -22,7 +22,7 @@ struct DensityFolder : TemporaryFolder {
         openvdb::io::File((*this / "fog.vdb").string()).write(grids);
         return read_density_grid(*this / "fog.vdb", name);
     }
-    // Without the text that names the file.
+    // Returns the error without the file's name.
     std::string error(const openvdb::GridPtrVec& grids, const std::string& name = "") const
     {
         return error_of([&] { read(grids, name); });
@@ -71,7 +71,7 @@ TEST_CASE("births in a fog are as many at each voxel as its density says, spread
         squares += away.cwiseProduct(away);
     }
     CHECK(std::abs(double(dense) - 0.75 * n) < 5 * std::sqrt(n * 0.75 * 0.25));
-    // A hat of the half width h has the mean 0 and the variance h²/6, and of that the variance 7 h⁴/180.
+    // A hat function of half width h has mean 0, variance h²/6, and variance 7 h⁴/180 of the squared offset.
     const double h = 0.5, variance = h * h / 6;
     for (int axis = 0; axis < 3; ++axis) {
         CHECK(std::abs(sum[axis] / n) < 5 * std::sqrt(variance / n));
@@ -83,8 +83,8 @@ TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
 {
     const DensityFolder folder;
     const auto grid = fog();
-    grid->tree().addTile(1, {0, 0, 0}, 2.0f, true);  // 8 voxels an edge
-    grid->tree().setValue({100, 0, 0}, 1024.0f);     // as dense as all of them
+    grid->tree().addTile(1, {0, 0, 0}, 2.0f, true);  // 8 voxels per edge
+    grid->tree().setValue({100, 0, 0}, 1024.0f);     // as dense as the whole tile
     constexpr std::size_t n = 40'000;
     std::size_t in_tile = 0;
     Vec3d sum = Vec3d::Zero();
@@ -94,7 +94,7 @@ TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
         sum += P.cast<double>();
     }
     CHECK(std::abs(double(in_tile) - 0.5 * n) < 5 * std::sqrt(n * 0.25));
-    // Voxels 0 to 7: the mean is 3.5, the variance (8² - 1)/12 and the hat's.
+    // For voxels 0 to 7 the mean is 3.5, and the variance is (8² - 1)/12 plus that of the hat.
     const double deviation = std::sqrt((63.0 / 12 + 1.0 / 6) / double(in_tile));
     for (int axis = 0; axis < 3; ++axis) CHECK(std::abs(sum[axis] / double(in_tile) - 3.5) < 5 * deviation);
 }

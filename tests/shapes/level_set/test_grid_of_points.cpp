@@ -49,7 +49,7 @@ const openvdb::Vec3SGrid& tree_of(const VectorGridPtr& grid)
     return *dynamic_cast<const OpenVectorGrid&>(*grid).grid();
 }
 
-// The sums of the formula for one voxel, over all points.
+// Evaluates the sums of the formula for one voxel over all points.
 double by_hand(const Cloud& cloud, double voxel, const Vec3d& at, Vec3d* mean)
 {
     double sum = 0;

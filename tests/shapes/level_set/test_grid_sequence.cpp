@@ -15,7 +15,7 @@ SequenceFiles files(std::initializer_list<int> frames, Beyond before = Beyond::H
     return sequence;
 }
 
-// The frame that would be read, as a file of frame f holds the number f: by interpolation, at a part of an interval.
+// Returns the interpolated value at a fraction of an interval, if the file of frame f holds the number f.
 double value(const SequenceFiles& sequence, std::int64_t frame, double part)
 {
     const SequenceFiles::Interval found = sequence.interval(frame);
@@ -62,6 +62,6 @@ TEST_CASE("a sequence goes on where one end meets the other", "[grid_sequence]")
     CHECK(value(mirrored, 2, 0.25) == Approx(3.75));  // 4 at frame 2
     const SequenceFiles held = files({3, 4}, Beyond::None, Beyond::Hold);
     CHECK(value(held, 1, 1) == 0);
-    CHECK(value(held, 2, 0.5) == Approx(1.5));  // from nothing to 3
+    CHECK(value(held, 2, 0.5) == Approx(1.5));  // from no grid to 3
     CHECK(value(held, 8, 0.5) == 4);
 }

@@ -43,7 +43,7 @@ Sample sample_at(const Shape& shape, const Vec3d& P)
     return sample;
 }
 
-// A mesh whose parts are those of `a` and of `b`.
+// Returns a mesh with the parts of `a` and `b`.
 MeshPtr joined(const MeshPtr& a, const MeshPtr& b)
 {
     auto mesh = std::make_shared<Mesh>(*a);
@@ -63,7 +63,8 @@ MeshPtr turned(const MeshPtr& mesh)
 
 }  // namespace
 
-// A trilinear interpolant of f is off by at most h²/8 Σ max|∂²f/∂x²|; for the distance to a point the sum is 2/|x|.
+// The error of a trilinear interpolant of f is at most h²/8 Σ max|∂²f/∂x²|. For the distance to a point the sum is
+// 2/|x|.
 TEST_CASE("a level set sphere is off by at most voxel²/(4 radius) within its band, and converges with voxel²",
           "[level set]")
 {
@@ -97,7 +98,7 @@ TEST_CASE("a level set box is exact to rounding along its faces, and round outsi
     CHECK(sample_at(*box, {1.013, 5.2, 0.1}).phi == Approx(0.013).margin(1e-6));
     CHECK(sample_at(*box, {0.3, 5.2, -0.27}).phi == Approx(-0.03).margin(1e-6));
     CHECK_THAT(sample_at(*box, {0.3, 5.513, 0.1}).gradient, close_to(Vec3d{0, 1, 0}, 1e-5));
-    CHECK(sample_at(*box, {1.03, 5.54, 0}).phi == Approx(0.05).margin(1e-3));  // 3-4-5
+    CHECK(sample_at(*box, {1.03, 5.54, 0}).phi == Approx(0.05).margin(1e-3));  // a 3-4-5 triangle
 }
 
 TEST_CASE("a level set torus is the distance to its circle minus its tube", "[level set]")
@@ -124,7 +125,7 @@ TEST_CASE("beyond the band the distance is a bound of the right sign, without a 
         REQUIRE((exact > 0 ? phi <= exact : phi == Approx(-0.15)));
         REQUIRE(gradient.isZero());
     }
-    // Along an axis the box around the surface is as near as the surface, but for a voxel or two.
+    // Along an axis the box around the surface is as near as the surface, up to a voxel or two.
     CHECK(sample_at(*sphere, {11, 0, 0}).phi == Approx(10).margin(0.1));
     CHECK(sample_at(*sphere, Vec3d::Zero()).phi == Approx(-0.15));
     CHECK(sample_at(*sphere, {1e30, 0, 0}).phi == Approx(1e30));
@@ -172,7 +173,7 @@ TEST_CASE("a level set is built and queried with the same bits on any number of 
 TEST_CASE("a level set from a mesh has the distance to the nearest triangle at every voxel", "[level set]")
 {
     const double voxel = 0.05;
-    const MeshPtr mesh = make_torus(0.8, 0.3, 12, Vec3d::Zero());  // 12 sides: edges that a smooth formula would miss
+    const MeshPtr mesh = make_torus(0.8, 0.3, 12, Vec3d::Zero());  // 12 sides give it edges that a formula would miss
     std::vector<std::string> warnings;
     const auto torus = level_set_from_mesh(mesh, {voxel, 3}, warnings);
     CHECK(warnings.empty());
@@ -215,7 +216,7 @@ TEST_CASE("a piece turned inwards inside another is a cavity, and one inside tha
                                        turned(joined(wall, make_sphere(0.4, 64, Vec3d::Zero()))));
     std::vector<std::string> warnings;
     const auto shells = level_set_from_mesh(mesh, {0.025, 3}, warnings);
-    const double flat = 3e-3;  // how far the meshes are inside their spheres
+    const double flat = 3e-3;  // the meshes lie inside their spheres by up to this
     const auto at = [&](double x) { return sample_at(*shells, {x, 0.01, 0}).phi; };
     CHECK(at(1.03) == Approx(0.03).margin(flat));
     CHECK(at(0.97) == Approx(-0.03).margin(flat));
@@ -239,7 +240,7 @@ TEST_CASE("a piece turned inwards beside the others is solid, and pieces that ov
     const auto overlap = level_set_from_mesh(joined(make_sphere(1, 48, Vec3d::Zero()), make_sphere(1, 48, {1, 0, 0})),
                                              {0.05, 3}, warnings);
     for (const double x : {-0.9, 1.9}) CHECK(sample_at(*overlap, {x, 0, 0}).phi == Approx(-0.1).margin(0.005));
-    for (const double x : {0.0, 0.03, 0.5, 0.97, 1.0})  // on the faces inside, and near them: far from the surface
+    for (const double x : {0.0, 0.03, 0.5, 0.97, 1.0})  // on and near the inner faces: far from the surface
         CHECK(sample_at(*overlap, {x, 0, 0}).phi == Approx(-0.15));
 }
 
@@ -289,7 +290,7 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
                    level_set_from_mesh(make_mesh({{0, 0, 0}}, {}), {}, w);
                }),
                Equals("mesh \"points and faces\" has no faces; a level set needs a closed surface"));
-    // 4 π / 1e-10 in a layer, times 6 layers.
+    // 4 π / 1e-10 voxels per layer, times 6 layers.
     CHECK_THAT(
         test::error_of([&] {
             level_set_sphere(1, o, {1e-5, 3});
@@ -352,7 +353,7 @@ TEST_CASE("a level set far from the origin is as good as one at it", "[level set
     CHECK(sample_at(*sphere, far + Vec3d(1.02, 0, 0)).phi == Approx(0.02).margin(1e-3));
     CHECK(sample_at(*sphere, far).phi == Approx(-0.15));
 
-    // A mesh's own corners are 7.8 mm apart there.
+    // At this distance the mesh's coordinates have a spacing of 7.8 mm.
     std::vector<std::string> warnings;
     const auto box = level_set_from_mesh(make_box({2, 2, 2}, far), {0.05, 3}, warnings);
     CHECK(sample_at(*box, far + Vec3d(1.02, 0.3, 0)).phi == Approx(0.02).margin(1e-4));
@@ -373,7 +374,7 @@ TEST_CASE("the surface of a level set is a closed mesh of its area, looking outw
     CHECK(mesh->openness().closed());
     CHECK(mesh->signed_volume() == Approx(4.0 / 3 * pi).epsilon(0.005));
     CHECK(mesh->area() == Approx(4 * pi).epsilon(0.005));
-    CHECK(sphere->surface() == mesh);  // made once
+    CHECK(sphere->surface() == mesh);  // created once
 }
 
 TEST_CASE("a scanned mesh's level set encloses the mesh's volume", "[level set]")

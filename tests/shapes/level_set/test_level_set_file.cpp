@@ -18,7 +18,7 @@ using Catch::Matchers::Equals;
 
 namespace {
 
-// Messages are compared without its name.
+// Messages are compared without the folder's name.
 struct LevelSetFolder : test::TemporaryFolder {
     template <class F>
     std::string message_of(const F& f) const
@@ -74,7 +74,7 @@ TEST_CASE("a level set read back from its file is the same to the bit", "[level 
         CHECK(back->active_voxels() == torus->active_voxels());
         CHECK(distances(*back) == distances(*torus));
     }
-    CHECK(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}) == 1);  // nothing unfinished
+    CHECK(std::distance(std::filesystem::directory_iterator(path.parent_path()), {}) == 1);  // no unfinished file
 }
 
 TEST_CASE("a file's other grids are left alone, and a grid is found by its name", "[level set][file]")
@@ -102,7 +102,7 @@ TEST_CASE("level sets that share their values, and files without offsets, are re
 {
     const LevelSetFolder folder;
     const auto first = sphere_grid("first"), other = sphere_grid("other");
-    const auto second = first->copy();  // of the same tree
+    const auto second = first->copy();  // shares the tree
     second->setName("second");
     folder.write_grids("shared.vdb", {first, second, other});
     std::ofstream stream(folder / "stream.vdb", std::ios::binary);
@@ -186,7 +186,7 @@ TEST_CASE("a level set from a file is widened without moving its surface", "[lev
 TEST_CASE("a level set that a full disk has no room for is an error, and nothing of it stays", "[level set][file]")
 {
     const test::SmallDisk disk;
-    if (!disk.mounted()) return;  // not allowed to mount: nothing to fill
+    if (!disk.mounted()) return;  // mounting is not permitted, so there is no disk to fill
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.02, 6});
     const std::string error = test::error_of([&] { sphere->write(disk.folder() / "sphere.vdb", "surface"); });
     CHECK_THAT(error, Catch::Matchers::StartsWith("cannot write \"") &&

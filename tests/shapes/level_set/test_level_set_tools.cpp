@@ -32,7 +32,7 @@ double distance(const Shape& shape, const Vec3d& P)
     return phi;
 }
 
-// Of two balls of radius r with centres d apart.
+// Returns the volume of the lens of two balls of radius r with centres at distance d.
 double lens_volume(double r, double d) { return pi / 12 * (4 * r + d) * (2 * r - d) * (2 * r - d); }
 
 }  // namespace
@@ -43,7 +43,7 @@ TEST_CASE("the union, intersection and difference of two balls have the volumes 
     const LevelSetPtr a = ball(r, {0, 0, 0}), b = ball(r, {d, 0, 0});
     const double lens = lens_volume(r, d), one = ball_volume(r);
     std::vector<std::string> warnings;
-    // The mesh of the surface cuts off a crease by a part of a voxel, and is inside a ball by voxel² / (8 r).
+    // The surface mesh cuts creases by a fraction of a voxel, and lies inside a ball by voxel² / (8 r).
     CHECK(volume_of(combine_level_sets(a, b, Combine::Union, warnings)) == Approx(2 * one - lens).epsilon(0.003));
     CHECK(volume_of(combine_level_sets(a, b, Combine::Intersect, warnings)) == Approx(lens).epsilon(0.006));
     CHECK(volume_of(combine_level_sets(a, b, Combine::Subtract, warnings)) == Approx(one - lens).epsilon(0.006));
@@ -71,7 +71,7 @@ TEST_CASE("shifted voxels are resampled, and other sizes are with a warning", "[
     const double lens = lens_volume(1, 0.913);
     CHECK(volume_of(combine_level_sets(a, shifted, Combine::Intersect, warnings)) == Approx(lens).epsilon(0.01));
     CHECK(warnings.empty());
-    // The mesh of the coarse ball, from which it is resampled, has lost 1.2 voxel² / r² of its volume.
+    // Resampling uses the mesh of the coarse ball, which loses 1.2 voxel² / r² of its volume.
     const LevelSetPtr coarse = ball(1, {0.913, 0, 0}, 0.08);
     CHECK(volume_of(combine_level_sets(a, coarse, Combine::Intersect, warnings)) ==
           Approx(lens).epsilon(0.006 + 1.2 * 0.08 * 0.08));
@@ -92,7 +92,7 @@ TEST_CASE("an offset ball is a ball with a radius larger or smaller by the offse
     const double by = GENERATE(-0.5, -0.1, 0.02, 0.3, 1.0);
     CAPTURE(by);
     const LevelSetPtr grown = offset_level_set(ball(1, {0.3, 0, 0}), by), wanted = ball(1 + by, {0.3, 0, 0});
-    // Their meshes have the same error, and the band of the grown one is off by single precision.
+    // The two meshes have the same error, and the band of the grown one has the error of single precision.
     CHECK(volume_of(grown) == Approx(volume_of(wanted)).epsilon(1e-5));
     CHECK(area_of(grown) == Approx(area_of(wanted)).epsilon(1e-5));
     CHECK(volume_of(grown) == Approx(ball_volume(1 + by)).epsilon(1.2 * std::pow(0.04 / (1 + by), 2)));
@@ -102,15 +102,15 @@ TEST_CASE("an offset ball is a ball with a radius larger or smaller by the offse
 
 TEST_CASE("smoothing shrinks a ball as diffusion does, keeps a box's faces and rounds its corners", "[level_set]")
 {
-    // A Gaussian of the variance s² along each axis adds s²/2 times the Laplacian, which of a distance is 2/r. It is
-    // made of four means over three voxels, with a variance of 2/3 voxel² each.
+    // A Gaussian with variance s² along each axis adds s²/2 times the Laplacian, which is 2/r for the distance. It
+    // consists of four means over three voxels with a variance of 2/3 voxel² each.
     const double variance = 2 * 4 * 2.0 / 3 * 0.04 * 0.04;
     CHECK(distance(*smooth_level_set(ball(1, {0, 0, 0}), 1, 2), {0, 1, 0}) == Approx(variance).epsilon(0.05));
 
     const LevelSetPtr box = level_set_box({1, 1, 1}, {0, 0, 0}, {0.04, 3});
     const LevelSetPtr round = smooth_level_set(box, 1, 2);
     CHECK(distance(*round, {0.5, 0, 0}) == Approx(0).margin(1e-3));
-    CHECK(distance(*box, {0.48, 0.48, 0.48}) == Approx(-0.02).margin(1e-5));  // at a voxel: no interpolation
+    CHECK(distance(*box, {0.48, 0.48, 0.48}) == Approx(-0.02).margin(1e-5));  // at a voxel, not interpolated
     CHECK(distance(*round, {0.48, 0.48, 0.48}) > 0.01);
 }
 
@@ -120,7 +120,7 @@ TEST_CASE("a resampled level set is the same surface on other voxels", "[level_s
     const LevelSetPtr other = resample_level_set(ball(1, {0, 0.2, 0}), voxel);
     CHECK(other->voxel() == Approx(voxel));
     CHECK(other->band() == Approx(3 * voxel));
-    // The mesh that it is resampled from is inside the ball by a part of a voxel² / r.
+    // The mesh used for resampling lies inside the ball by a fraction of voxel² / r.
     CHECK(volume_of(other) == Approx(volume_of(ball(1, {0, 0.2, 0}, voxel))).epsilon(1.2 * 0.04 * 0.04));
 }
 
@@ -138,11 +138,11 @@ TEST_CASE("a rotated level set is queried in its own frame, and combines like an
     const Eigen::Quaterniond eighth(Eigen::AngleAxisd(pi / 4, Vec3d::UnitZ()));
     const LevelSetPtr box = level_set_box({1, 1, 1}, {0, 0, 0}, {0.02, 3});
     const LevelSetPtr turned = move_level_set(box, {{0, 0, 0}, eighth});
-    CHECK(distance(*turned, {0.46 * std::sqrt(2.0), 0, 0}) == Approx(-0.04).margin(1e-5));  // at a voxel of its own
+    CHECK(distance(*turned, {0.46 * std::sqrt(2.0), 0, 0}) == Approx(-0.04).margin(1e-5));  // at one of its own voxels
     CHECK(distance(*turned, {0, 0, 0.53}) == Approx(0.03).margin(1e-4));
     CHECK(turned->active_voxels() == box->active_voxels());
 
-    // The eight-cornered prism that both hold: a regular octagon of inner radius 1/2.
+    // Their intersection is a prism over a regular octagon of inner radius 1/2.
     const double octagon = 8 * 0.25 * std::tan(pi / 8);
     CHECK(volume_of(combine_level_sets(box, turned, Combine::Intersect, no_warnings)) == Approx(octagon).epsilon(0.01));
 }
@@ -154,7 +154,7 @@ TEST_CASE("a level set of points is the union of their balls", "[level_set]")
     const std::vector<float> radius{0.5f};
     const LevelSetPtr balls = level_set_from_points(P, radius, {0.03, 3});
     CHECK(volume_of(balls) == Approx(3 * ball_volume(r) - lens_volume(r, d)).epsilon(0.005));
-    // Between voxels the field is off by voxel²/8 times the sum of its second derivatives, 2/r, at most.
+    // Between voxels the error of the field is at most voxel²/8 times the sum of its second derivatives, 2/r.
     const double interpolated = 0.03 * 0.03 / 8 * 2 / r;
     CHECK(distance(*balls, {5, 0.55, 0}) == Approx(0.05).margin(interpolated));
     CHECK(distance(*balls->with_band(0.3), {5, 0.75, 0}) == Approx(0.25).margin(interpolated));
@@ -170,7 +170,7 @@ TEST_CASE("a moved level set is written and read at its new position", "[level_s
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.5, Vec3d(1, 1, 0).normalized()));
     move_level_set(level_set_box({1, 0.5, 0.7}, {0, 0, 0}, {0.03, 3}), {{3, 2, 1}, turn})->write(path, "turned");
     const LevelSetPtr back = read_level_set(path, "turned");
-    // Its edges, 8.8 m in all, are cut by a part of a voxel when it is resampled.
+    // Resampling cuts its edges, 8.8 m in all, by a fraction of a voxel.
     CHECK(volume_of(back) == Approx(0.35).margin(8.8 * 0.03 * 0.03));
     CHECK(distance(*back, Vec3d(3, 2, 1) + turn * Vec3d(0.55, 0, 0)) == Approx(0.05).margin(2e-3));
 }

@@ -1,4 +1,4 @@
-// The voxels near a mesh, against all triangles.
+// Compares the voxels near a mesh with a search over all triangles.
 #include "runtime/shapes/level_set/mesh_band.h"
 
 #include <rapidcheck.h>
@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// Triangles of any size up to that given: also ones that are lines, points, and all but lines.
+// Returns triangles of up to the given size, including lines, points and slivers.
 Mesh soup(std::mt19937& random, int triangles, double size, double spread)
 {
     std::uniform_real_distribution<double> in(-1, 1);
@@ -44,7 +44,7 @@ TEST_CASE("each voxel of a mesh's band has the distance to the nearest triangle,
         std::set<std::tuple<int, int, int>> near;
         std::array<float, MeshBand::voxels> distance;
         std::array<std::int32_t, MeshBand::voxels> nearest;
-        // A sample: all voxels of large triangles are many.
+        // Only a sample, because large triangles have many voxels.
         const std::size_t every = 1 + band.size() / 40;
         for (std::size_t b = 0; b < band.size(); ++b) {
             const Eigen::Vector3i origin = band.origin(b);

@@ -1,4 +1,4 @@
-// The distance to a mesh, by its edges and its planes.
+// The distance to a mesh, computed from its edges and planes.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace rapid::test {
 
-// To the nearest triangle, over all of them. Triangles may be lines and points.
+// Returns the distance to the nearest of all triangles. Triangles may be degenerate (lines and points).
 inline double distance_to_all(const Mesh& mesh, const Vec3d& P)
 {
     double least = std::numeric_limits<double>::infinity();

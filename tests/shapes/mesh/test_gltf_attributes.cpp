@@ -16,7 +16,7 @@ private:
     TemporaryFolder folder_;
 };
 
-// One primitive, whose attribute _HEAT is an accessor of so many bytes to the value, on 12 bytes.
+// Returns a primitive whose attribute _HEAT is an accessor with this count, stride and offset, on a buffer of 12 bytes.
 std::string heat(const std::string& count, const std::string& stride, const std::string& offset)
 {
     return R"({"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "_HEAT": 0}}]}],

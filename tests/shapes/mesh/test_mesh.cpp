@@ -20,13 +20,13 @@ namespace {
 
 using std::numbers::pi;
 
-// The message of the error that an expression throws.
+// Returns the path of a shared asset.
 std::filesystem::path asset(const std::string& name)
 {
     return std::filesystem::path(RAPID_SOURCE_DIR).parent_path() / "shared/assets" / name;
 }
 
-// A cube of edge 1 from the origin: eight corners, quads, and at each face a normal and texture coordinates of its own.
+// A cube with edge 1 at the origin: eight corners, quads, and separate normals and texture coordinates on each face.
 const std::string cube_obj = R"(
 v 0 0 0
 v 1 0 0
@@ -73,7 +73,7 @@ std::string base64(const std::string& bytes)
 {
     static const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string text;
-    for (std::size_t i = 0; i + 2 < bytes.size(); i += 3) {  // the bytes here are a multiple of three
+    for (std::size_t i = 0; i + 2 < bytes.size(); i += 3) {  // the number of bytes is a multiple of three
         unsigned word = 0;
         for (int k = 0; k < 3; ++k) word = word << 8 | static_cast<unsigned char>(bytes[i + k]);
         for (int k = 18; k >= 0; k -= 6) text += digits[word >> k & 63];
@@ -109,7 +109,7 @@ TEST_CASE("a sphere mesh has its vertices on the sphere and comes nearer to it w
     }
     CHECK(area_error[0] / area_error[1] == Approx(4).epsilon(0.02));
     CHECK(volume_error[0] / volume_error[1] == Approx(4).epsilon(0.02));
-    CHECK((volume_error[1] > 0 && volume_error[1] < 2e-3));  // inside the sphere, and near it
+    CHECK((volume_error[1] > 0 && volume_error[1] < 2e-3));  // inside the sphere and near it
 }
 
 TEST_CASE("a torus mesh comes to the area and volume of Pappus with the square of its divisions", "[mesh]")
@@ -171,7 +171,7 @@ TEST_CASE("a mesh keeps its sense when a map mirrors it, and its volume scales w
     CHECK(transformed(torus, Eigen::Affine3d(Eigen::Scaling(-1.0, 1.0, 1.0)))->signed_volume() == Approx(volume));
     CHECK(transformed(torus, Eigen::Affine3d(Eigen::Scaling(2.0, 2.0, 3.0)))->signed_volume() == Approx(12 * volume));
 
-    // Single precision holds 1e4 m to 1 mm; the volume is taken about the mesh, not about the world's origin.
+    // Single precision resolves 1 mm at 1e4 m. The volume is computed about the mesh instead of the world's origin.
     const MeshPtr far = transformed(torus, Eigen::Affine3d(Eigen::Translation3d(1e4, 0, 0)));
     CHECK(far->signed_volume() == Approx(volume).epsilon(1e-3));
     CHECK_THAT(far->bounds().center(), close_to(Vec3f{1e4f, 0, 0}, 1e-3));
@@ -306,7 +306,7 @@ TEST_CASE("a glTF mesh stands where its node puts it", "[mesh][read]")
 TEST_CASE("files that are not meshes are refused with their name and the fault", "[mesh][read]")
 {
     const TemporaryFolder folder;
-    // The error of reading a file of this name and content, without the folder's name.
+    // Returns the error of reading a file with this name and content, without the folder's name.
     const auto refusal = [&](const char* name, const char* content) {
         const auto path = content ? folder.write(name, content) : folder / name;
         std::string message = test::error_of([&] { read_mesh(path); });
@@ -331,7 +331,7 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
 
 TEST_CASE("a small file of parts without number is refused for its memory or its time", "[mesh][read]")
 {
-    // Each node has the next one twice: 2^40 times the mesh.
+    // Each node has the next one twice, which gives 2^40 copies of the mesh.
     std::string nodes;
     for (int k = 1; k <= 40; ++k) nodes += fmt::format("{{\"children\": [{0}, {0}]}}, ", k);
     const TemporaryFolder folder;
@@ -343,7 +343,7 @@ TEST_CASE("a small file of parts without number is refused for its memory or its
         "bufferViews": [{"buffer": 0, "byteLength": 36}],
         "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)" +
                                                        std::string(48, 'A') + "\"}]}");
-    // With the address sanitizer, which maps more than any limit, it is refused for its time.
+    // The address sanitizer maps more than any limit, so there the time limit ends the reader.
     using Catch::Matchers::Contains;
     CHECK_THAT(test::error_of([&] { read_mesh(path); }),
                Contains("it takes more than 1024 MB of memory") || Contains("it takes its reader longer than 5 s"));

@@ -15,7 +15,7 @@ using rapid::test::close_to;
 namespace {
 
 struct SequenceFolder : test::TemporaryFolder {
-    // A tetrahedron with its apex at this height.
+    // Writes a tetrahedron with its apex at this height.
     void tetrahedron(int frame, double apex) const
     {
         file(frame, fmt::format("v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0 {} 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n", apex));
@@ -55,11 +55,11 @@ TEST_CASE("the file of a frame is the one that walking there step by step ends a
     for (const Beyond how : {Beyond::Hold, Beyond::Repeat, Beyond::Mirror})
         for (const std::int64_t n : {1, 2, 5}) {
             const FrameSequence order{10, 10 + n - 1, how, how, 3};
-            // From the first file on and back, a frame at a time.
+            // Starts at the first file and steps forwards or backwards, a frame at a time.
             for (const int way : {1, -1}) {
                 std::int64_t file = 10, step = way;
                 if (how == Beyond::Hold && way < 0) step = 0;
-                if (how == Beyond::Mirror && way < 0) step = 1;  // it turns at the first file
+                if (how == Beyond::Mirror && way < 0) step = 1;  // it turns around at the first file
                 if (n == 1) step = 0;
                 for (std::int64_t frame = 13; std::abs(frame - 13) < 40; frame += way) {
                     CAPTURE(static_cast<int>(how), n, frame);

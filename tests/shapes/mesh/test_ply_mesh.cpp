@@ -18,7 +18,7 @@ public:
         std::ofstream(folder_ / "a.ply", std::ios::binary) << text;
         return read_mesh(folder_ / "a.ply");
     }
-    // Without the text that names the file.
+    // Returns the error without the file's name.
     std::string error(const std::string& text) const
     {
         std::string message = error_of([&] { read(text); });
@@ -82,7 +82,7 @@ TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[
     REQUIRE(quad->triangles.size() == 2);
     CHECK((quad->triangles[0] == Mesh::Triangle(0, 1, 2) && quad->triangles[1] == Mesh::Triangle(0, 2, 3)));
 
-    // A comb: nine corners, of which three are concave; 2 x 1 m without two teeth of 0.5 x 0.5 m.
+    // A comb with twelve corners, four of them concave: 2 x 1 m without two teeth of 0.5 x 0.5 m.
     const int start = GENERATE(range(0, 12));
     const std::vector<Vec3f> comb = {{0, 0, 0},        {2, 0, 0},        {2, 1, 0},     {1.75f, 1, 0},
                                      {1.75f, 0.5f, 0}, {1.25f, 0.5f, 0}, {1.25f, 1, 0}, {0.75f, 1, 0},
@@ -106,8 +106,8 @@ TEST_CASE("a polygon of any shape keeps its area, and a convex one is a fan", "[
 
 namespace {
 
-// A path of so many corners that winds inwards at right angles, and back beside itself, which is 0.5 m wide: its area,
-// and its outline from the corner `first` on, as a file of one face so many times.
+// A polygon with this many corners that spirals inwards at right angles and back next to itself, 0.5 m wide. Has its
+// area, and its outline starting at the corner `first`, as a file that repeats the face `times` times.
 struct Spiral {
     explicit Spiral(int corners) : half(corners / 2)
     {
@@ -152,7 +152,7 @@ private:
 
 }  // namespace
 
-// What is cubic in the corners takes ten seconds for the thousand and all day for the long one.
+// A cubic algorithm takes ten seconds for the thousand polygons and a day for the long one.
 TEST_CASE("polygons that wind are cut, whichever corner is first, many of them and long ones", "[mesh][ply]")
 {
     const PlyFolder folder;

@@ -13,7 +13,7 @@ namespace {
 constexpr double everywhere = std::numeric_limits<double>::infinity();
 const FrameClock film_clock{24, 1};
 
-// The curve of one point through four frames.
+// Returns the curve of one point through four frames.
 Cubic<Vec3d> through(const FramePath& path, const std::function<Vec3d(double)>& place, double frame)
 {
     return path.through<Vec3d>(place(frame - 2), place(frame - 1), place(frame), place(frame + 1));
@@ -24,7 +24,7 @@ FramePath curved(bool before = true, bool after = true, double alpha = 0.5)
     return {FramePath::Curved, alpha, before, after, std::nullopt};
 }
 
-// A step of 1 m each frame, but for these.
+// Finds the path of a body that travels 1 m per frame, except in the frames of `other`.
 FramePath found(std::int64_t frame, const std::map<std::int64_t, double>& other, double size,
                 const PathOptions& options = {}, FrameRange range = {-everywhere, everywhere})
 {
@@ -43,7 +43,7 @@ TEST_CASE("the spline of a uniform motion or acceleration is that motion, at one
     const auto place = [&](double f) -> Vec3d { return P + f * v + 0.5 * f * f * a; };
     const bool before = GENERATE(true, false), after = GENERATE(true, false);
     CAPTURE(before, after);
-    if (!before && !after && !a.isZero()) return;  // two places are a straight line, whatever is between
+    if (!before && !after && !a.isZero()) return;  // two positions give a straight line, whatever happens in between
     const Cubic<Vec3d> way = through(curved(before, after), place, 7);
     for (const double t : {0.0, 0.25, 0.7, 1.0}) {
         CHECK_THAT(way.at(t), close_to(place(6 + t), 1e-13));
@@ -115,8 +115,8 @@ TEST_CASE("a jump is a step of eight times those around it and of half the body'
     CHECK(found(10, {{10, 8.5}}, 2).jump->distance == 8.5);
     CHECK(found(10, {{10, 8.5}}, 2).jump->usual == 1);
     CHECK(found(10, {{10, 7.5}}, 2).kind == FramePath::Curved);             // not far enough for a jump
-    CHECK(found(10, {{10, 8.5}}, 20).kind == FramePath::Curved);            // the body hardly leaves its place
-    CHECK(found(10, {{10, 8.5}, {11, 8.5}}, 2).kind == FramePath::Curved);  // it has begun to move fast
+    CHECK(found(10, {{10, 8.5}}, 20).kind == FramePath::Curved);            // the body moves by only a part of its size
+    CHECK(found(10, {{10, 8.5}, {11, 8.5}}, 2).kind == FramePath::Curved);  // it starts to move fast and continues
     CHECK(found(10, {{9, 0}, {10, 0.1}, {11, 0.3}}, 0).kind == FramePath::Curved);
 
     const FramePath before = found(9, {{10, 8.5}}, 2), after = found(11, {{10, 8.5}}, 2);
@@ -160,7 +160,7 @@ TEST_CASE("a turning body carries births along arcs, and their normals turn with
     const auto turned = [](double angle) {
         return Pose{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d::UnitZ())), 2};
     };
-    const double angle = 0.1;  // a frame
+    const double angle = 0.1;  // rad per frame
     const MotionPtr motion = keyed_motion({{1, turned(0)}, {11, turned(10 * angle)}});
     const AnimatedShape shape(make_sphere_shape(1, {3, 0, 0}), motion);
     const FramePath path = path_of(shape, film_clock, 5, {});

@@ -20,7 +20,7 @@ namespace {
 const FrameClock sequence_clock{24, 1};
 constexpr double h = 1.0 / 24;
 
-// A mesh whose files are written for it: each vertex of `rest` is where `place` has it at the frame.
+// A mesh sequence with its own files: `place` gives the position of each vertex of `rest` at a frame.
 struct Body {
     test::TemporaryFolder folder;
     std::shared_ptr<const AnimatedMesh> mesh;
@@ -52,7 +52,7 @@ struct Body {
     }
 };
 
-// A ball that moves 3 m a frame: six times its radius.
+// A ball that moves 3 m per frame, six times its radius.
 constexpr double ball_radius = 0.5, ball_step = 3, voxel = 0.05;
 Body fast_ball()
 {
@@ -83,15 +83,15 @@ TEST_CASE("a ball that moves by more than its size between files meets points wh
     const double speed = ball_step / h, r = GENERATE(0.0, 0.1);
     const double x = GENERATE(9.6, 10.3, 11.4), y = GENERATE(0.0, -0.35);
     const Path path{{x, y, 0.1}, {-20, 0, 0}, {0, 0, 0}, h, r};
-    // (x - 20 s - 9 - speed s)² + y² + z² = (R + r)²
+    // Solves (x - 20 s - 9 - speed s)² + y² + z² = (R + r)².
     const double half = std::sqrt(std::pow(ball_radius + r, 2) - y * y - 0.01), s = (x - 9 - half) / (speed + 20);
     const Contact contact = contact_with_deforming(shape, path);
-    // A level set rounds a sphere by about voxel² / (8 R): 0.6 mm.
+    // A level set flattens a sphere by about voxel² / (8 R): 0.6 mm.
     CHECK(contact.time == Approx(s).margin(0.002 / speed));
     CHECK_THAT(contact.vc, close_to(Vec3d(speed, 0, 0), 1e-4));
     const Vec3d n = (path.P + s * path.v - Vec3d(9 + speed * s, 0, 0)).normalized();
-    // Within a cell the gradient's components do not follow their own axes, half a voxel's turn of the sphere; and a
-    // facet of the mesh is turned from it by half of its own angle.
+    // Within a cell the gradient's components only vary along the other axes, which amounts to half a voxel's turn of
+    // the sphere. A facet of the mesh deviates from the sphere's normal by half of its own angle.
     CHECK_THAT(contact.n, close_to(n, 0.5 * voxel / ball_radius + std::numbers::pi / 96));
 }
 
@@ -113,7 +113,7 @@ TEST_CASE("at both ends of an interval a deforming level set is that of the mesh
 
 TEST_CASE("between frames a ball that grows has the radius and the velocity of its growth", "[deforming]")
 {
-    // R = 1 + 0.1 (f - 1): linear, so that its spline is it.
+    // R = 1 + 0.1 (f - 1) is linear, so its spline is exact.
     const Body ball(*make_sphere(1, 96, Vec3d::Zero()), 6,
                     [](const Vec3d& X, int frame) -> Vec3d { return (1 + 0.1 * (frame - 1)) * X; });
     const ShapePtr shape = ball.over(3, 4, voxel).shape;
@@ -126,7 +126,7 @@ TEST_CASE("between frames a ball that grows has the radius and the velocity of i
             if (above < 0.1)
                 CHECK(phi == Approx(above).margin(2e-3));
             else
-                CHECK((phi > 0.1 && phi <= above + 1e-3));  // a bound
+                CHECK((phi > 0.1 && phi <= above + 1e-3));  // a lower bound
             CHECK_THAT(shape->velocity_at(P, t * h), close_to(Vec3d(0.1 / h * Vec3d(1, 2, -2) / 3), 0.05));
         }
 }
@@ -187,14 +187,14 @@ TEST_CASE("a paddle of files that turns 40 degrees a frame lets no point through
     std::mt19937_64 random(4);
     std::uniform_real_distribution<double> u(0, 1);
     for (int i = 0; i < 300; ++i) {
-        // Between the two positions of its face, well within its ends.
+        // Starts between the two positions of its face, well within its ends.
         const double r = 0.5 + 1.4 * u(random), part = 0.2 + 0.6 * u(random), z = 0.8 * (u(random) - 0.5);
         const Path path{turned({r, 0, z}, 3 + part), {0, 0, 0.1}, {0, -9.81, 0}, h, 0};
         CAPTURE(i, r, part, z);
         const Contact contact = contact_with_deforming(shape, path);
         REQUIRE(contact.time != Contact::none);
-        if (contact.depth > 0) continue;  // it began in the paddle
-        // A spline through steps of 40 degrees has 3 % of the velocity's error (numerics.md: the second order).
+        if (contact.depth > 0) continue;  // it started inside the paddle
+        // A spline through steps of 40 degrees has a velocity error of 3 % (numerics.md: second order).
         const Vec3d at = path.P + contact.time * path.v + 0.5 * contact.time * contact.time * path.a;
         CHECK_THAT(contact.vc, close_to(Vec3d(step / h * Vec3d::UnitZ().cross(at)), 0.08 * step / h * r));
         CHECK(contact.n.dot(contact.vc) > 0);
@@ -212,7 +212,7 @@ TEST_CASE("a deforming body that jumps sweeps nothing along, and says so; cut = 
     REQUIRE(jump.jump);
     CHECK(jump.jump->distance == Approx(10.01).epsilon(1e-3));
     CHECK(contact_with_deforming(jump.shape, between).time == Contact::none);
-    // It arrives as it continues.
+    // It arrives with the velocity with which it continues.
     CHECK_THAT(jump.shape->velocity_at({10.5, 0, 0}, 0.5 * h), close_to(Vec3d(0.01 / h, 0, 0), 1e-4));
 
     PathOptions no_cut;

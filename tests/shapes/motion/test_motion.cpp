@@ -24,7 +24,7 @@ Eigen::Quaterniond about(const Vec3d& axis, double angle)
     return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()));
 }
 
-// A motion by a function of the time, as a script's is.
+// A motion given by a function of the time, like that of a script.
 class Formula final : public Motion {
 public:
     explicit Formula(std::function<Pose(double time)> pose) : pose_(std::move(pose)) {}
@@ -39,7 +39,7 @@ private:
 
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) { return a.angularDistance(b); }
 
-// As a script writes it: the pose, and how it is turned.
+// Returns a motion as a script creates it, with its pose and its rotations.
 MotionPtr rotation_by(const Vec3d& axis, double angle)
 {
     return constant_motion({{0, 0, 0}, about(axis, angle)}, Turns{{axis.normalized(), angle}});
@@ -94,7 +94,7 @@ TEST_CASE("keys that turn about one axis are joined by their angles, whole turns
     const double angle = GENERATE(0.5, 2.0, 1.0001 * pi, 200 * pi / 180, -1.5 * pi, 2 * pi, 4 * pi, -9 * pi);
     const MotionPtr start = rotation_by(axis, 0.3), end = rotation_by(axis, 0.3 + angle);
     const MotionPtr placed = constant_motion({{3, 1, -2}, Eigen::Quaterniond::Identity(), 2});
-    const MotionPtr tilt = rotation_by({0, 0, 1}, 0.7);  // about an axis of its own, in each key alike
+    const MotionPtr tilt = rotation_by({0, 0, 1}, 0.7);  // the same additional rotation in each key, about another axis
     for (int step = 0; step <= 10; ++step) {
         CAPTURE(angle, step);
         const double now = angle * step / 10;
@@ -158,7 +158,7 @@ TEST_CASE("a track of a falling, spinning body is one piece, and exact between i
         const double t = 6.0 / 24 + s;
         const Pose asked = motion.at({0, t, 0}), read = track.at(s);
         CHECK_THAT(read.translation, close_to(asked.translation, 1e-12));
-        CHECK(angle_between(read.rotation, asked.rotation) < 1e-7);  // of the square root of rounding
+        CHECK(angle_between(read.rotation, asked.rotation) < 1e-7);  // the square root of rounding
         CHECK(read.scale == Approx(asked.scale).epsilon(1e-13));
         const VelocityField field = track.velocity_at(s);
         CHECK_THAT(field.linear, close_to(Vec3d(v + t * g), 1e-9));
@@ -171,7 +171,7 @@ TEST_CASE(
     "a track of an orbit is within a hundred-thousandth of its length, and its velocity field is that of the orbit",
     "[motion]")
 {
-    const double speed = GENERATE(0.1, 5.0, 40.0, 200.0);  // rad/s; the last is more than a turn in a frame
+    const double speed = GENERATE(0.1, 5.0, 40.0, 200.0);  // rad/s; the last is more than a turn per frame
     CAPTURE(speed);
     const Formula orbit([&](double t) {
         const Pose turn{Vec3d::Zero(), about({0, 1, 0}, speed * t)};

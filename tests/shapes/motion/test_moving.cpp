@@ -14,11 +14,11 @@ using rapid::test::close_to;
 namespace {
 
 using std::numbers::pi;
-const FrameClock clock_1{1, 0};  // a frame a second
+const FrameClock clock_1{1, 0};  // one frame per second
 
 MotionPtr along(const Vec3d& way) { return keyed_motion({{0, {}}, {1, {way}}}); }
 
-// About the z axis, by an angle below half a turn, in a second.
+// Returns a rotation about the z axis by this angle, below half a turn, in one second.
 MotionPtr spinning(double angle)
 {
     return keyed_motion({{0, {}}, {1, {{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3d::UnitZ()))}}});
@@ -36,7 +36,8 @@ Contact contact_of(const ShapePtr& shape, const Path& path)
     return contact;
 }
 
-// The first time in [0, duration] at which f falls to 0: by bisection of the first change of sign, on a fine comb.
+// Returns the first time in [0, duration] at which f falls to 0: samples f densely for the first change of sign, then
+// bisects.
 template <class F>
 double first_root(const F& f, double duration)
 {
@@ -60,7 +61,7 @@ TEST_CASE("a wall that moves at 100 m/s meets a falling point when their formula
     const ShapePtr floor = moving_in_a_second(make_plane({0, 1, 0}, 0), along({5, speed, 0}));
     const double r = 0.1;
     const Path path{{1, 20, 2}, {0, -1, 0}, {0, -9.81, 0}, 1, r};
-    // 20 - s - 9.81 s²/2 = speed s + r
+    // Solves 20 - s - 9.81 s²/2 = speed s + r.
     const double b = 1 + speed, c = 20 - r, a = 9.81 / 2;
     const double s = 2 * c / (b + std::sqrt(b * b + 4 * a * c));
     const Contact contact = contact_of(floor, path);
@@ -75,7 +76,7 @@ TEST_CASE("a wall that moves at 100 m/s meets a falling point when their formula
 
 TEST_CASE("an accelerated ball meets a point at the root of their distance", "[moving]")
 {
-    // Its centre is at (0, 0, 0) + 40 s² x: in the ball's frame the point's path is a parabola of its own.
+    // Its centre is at 40 s² along x, so in the ball's frame the point's path is another parabola.
     const MotionPtr accelerated = [] {
         struct Accelerated final : Motion {
             Pose at(const Frame& f) const override { return {{40 * f.time * f.time, 0, 0}}; }
@@ -93,7 +94,7 @@ TEST_CASE("an accelerated ball meets a point at the root of their distance", "[m
 
 TEST_CASE("a spinning paddle meets a point at the root of its distance, with its rim's velocity", "[moving]")
 {
-    // Far thinner than it moves in the interval.
+    // The paddle is much thinner than its travel in the interval.
     const double angle = GENERATE(0.7, -3.0, 0.02);
     const Vec3d half(2, 0.05, 1);
     const ShapePtr paddle = moving_in_a_second(make_box_shape(2 * half, {2, 0, 0}), spinning(angle));
@@ -136,7 +137,7 @@ TEST_CASE("a spinning, rising and growing ball meets points where its sphere is 
         const double s = first_root(height, 1);
         const double found = contact_of(ball, path).time;
         if (s == Contact::none) {
-            // A graze below the comb's teeth is for neither to find.
+            // A graze between two samples is invisible to both methods.
             if (found != Contact::none) RC_ASSERT(height(found) < 1e-9);
         } else {
             RC_ASSERT(std::abs(found - s) < 1e-9);
@@ -159,7 +160,7 @@ TEST_CASE("nothing passes a moving wall, at any speed or turn", "[moving][extrem
         int passed = 0;
         double deepest = 0;
         for (int i = 0; i < 500; ++i) {
-            // In the plate's own frame the point goes from above the plate to below it.
+            // In the plate's own frame the point moves from above the plate to below it.
             const Vec3d from(in(random), 0.3 + 0.2 * in(random), in(random)), to(in(random), -0.3, in(random));
             const Vec3d P = from, Q = end * to;
             const Vec3d a(0, -9.81, 0);
@@ -210,9 +211,9 @@ TEST_CASE("paths that begin later meet the shape at its pose then", "[moving]")
     const ShapePtr ball = moving_in_a_second(make_sphere_shape(1, {0, 0, 0}), along({100, 0, 0}));
     Path path{{55, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.2, 0};
     path.begin = 0.5;
-    CHECK(contact_of(ball, path).time == Approx(0.04));  // the ball's front is at 51 then
+    CHECK(contact_of(ball, path).time == Approx(0.04));  // the front of the ball is at 51 m at that time
     path.begin = 0.6;
-    const Contact within = contact_of(ball, path);  // its centre is at 60: 4 m behind its front, out of it again
+    const Contact within = contact_of(ball, path);  // its centre is at 60 m, so the point is outside again
     CHECK(within.time == Contact::none);
     path.begin = 0.545;
     const Contact inside = contact_of(ball, path);
@@ -226,7 +227,7 @@ TEST_CASE("a point at rest on a moving floor is in contact, and one that it leav
     const Path pressed{{0, 0, 0}, {0, 0, 0}, {0, -9.81, 0}, 1, 0};
     CHECK(contact_of(moving_in_a_second(make_plane({0, 1, 0}, 0), along({0, 2, 0})), pressed).time == 0);
     CHECK(contact_of(moving_in_a_second(make_plane({0, 1, 0}, 0), along({3, 0, 0})), pressed).time == 0);
-    // A floor that falls at 2 m/s is caught up after 2 v / g.
+    // A floor that falls at 2 m/s is reached after 2 v / g.
     CHECK(contact_of(moving_in_a_second(make_plane({0, 1, 0}, 0), along({0, -2, 0})), pressed).time ==
           Approx(4 / 9.81).epsilon(1e-9));
 

@@ -27,7 +27,7 @@ std::vector<Birthplace> births(const ScatterPtr& scatter, std::size_t n, std::ui
     return out;
 }
 
-// Pearson's sum over bins of (found - expected)² / expected.
+// Returns Pearson's sum over bins of (found - expected)² / expected.
 double chi_square(const std::vector<double>& found, const std::vector<double>& expected)
 {
     double sum = 0;
@@ -35,15 +35,15 @@ double chi_square(const std::vector<double>& found, const std::vector<double>& e
     return sum;
 }
 
-// The 99.9th percentile of chi-square with so many degrees of freedom (Wilson and Hilferty 1931). The keys
-// are fixed, so a test that passes always passes.
+// Returns the 99.9th percentile of chi-square with these degrees of freedom (Wilson and Hilferty 1931). The keys are
+// fixed, so a test that passes always passes.
 double rarely_above(double degrees)
 {
     const double z = 3.0902, k = 2 / (9 * degrees);
     return degrees * std::pow(1 - k + z * std::sqrt(k), 3);
 }
 
-// The winding number of a mesh around P, by solid angles: not how births are placed.
+// Returns the winding number of a mesh around P from solid angles, which differs from the method used for births.
 double winding(const Mesh& mesh, const Vec3f& P)
 {
     double angle = 0;
@@ -88,7 +88,7 @@ TEST_CASE("births within a face are uniform, on its plane, with its normal", "[s
     const MeshPtr mesh = make_mesh({{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, {{0, 1, 2}});
     const Vec3f normal = Vec3f(6, 3, 2).normalized();
     constexpr std::size_t n = 90'000;
-    // The triangle in nine of equal area, by rows of b2 and columns of b1.
+    // Divides the triangle into nine of equal area, by rows of b2 and columns of b1.
     std::vector<double> found(9, 0);
     for (const Birthplace& birth : births(scatter_on_surface(mesh), n)) {
         REQUIRE((birth.b1 >= 0 && birth.b2 >= 0 && birth.b1 + birth.b2 <= 1.000001f));
@@ -147,8 +147,8 @@ TEST_CASE("births in a box mesh are uniform in its volume", "[scatter]")
     CHECK(chi_square(found, std::vector<double>(64, n / 64.0)) < rarely_above(63));
 }
 
-// In a torus the volume within a distance s of its circle is s², and around its axis it is even; outside the circle
-// there is more of it than inside.
+// In a torus the volume within distance s of its circle is proportional to s², and uniform around its axis. There is
+// more volume outside the circle than inside.
 TEST_CASE("births in a torus mesh are uniform across its tube and around its axis", "[scatter]")
 {
     const auto scatter = scatter_in_volume(make_torus(1, 0.3, 200, Vec3d::Zero()));
@@ -163,7 +163,7 @@ TEST_CASE("births in a torus mesh are uniform across its tube and around its axi
         around[static_cast<int>(16 * (std::atan2(P.z(), P.x()) / (2 * pi) + 0.5)) % 16] += 1;
         mean_ring += ring / n;
     }
-    // The mesh's 60 sides leave out 0.2 % of the outermost bin's share: well below what the test resolves.
+    // The mesh's 60 sides omit 0.2 % of the outermost bin's share, well below the test's resolution.
     CHECK(chi_square(across, std::vector<double>(10, n / 10.0)) < rarely_above(9));
     CHECK(chi_square(around, std::vector<double>(16, n / 16.0)) < rarely_above(15));
     CHECK(mean_ring == Approx(1 + 0.3 * 0.3 / 4).margin(4 * 0.15 / std::sqrt(n)));
@@ -171,7 +171,7 @@ TEST_CASE("births in a torus mesh are uniform across its tube and around its axi
 
 TEST_CASE("births in a mesh are where its winding number is not 0", "[scatter]")
 {
-    // Turned so that no face is along an axis.
+    // Rotated so that no face is axis-aligned.
     const Eigen::Affine3d turn(Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()));
     const MeshPtr shell = both(make_box({1, 1, 1}, Vec3d::Zero()), make_box({0.9, 0.9, 0.9}, Vec3d::Zero()), true);
     const MeshPtr overlapping = both(make_box({1, 1, 1}, Vec3d::Zero()), make_box({1, 1, 1}, {0.5, 0.5, 0}), false);
@@ -213,11 +213,12 @@ TEST_CASE("births on a level set sphere are on it, uniform, and have outward nor
         REQUIRE(from_center.norm() == Approx(0.5).margin(0.05 * 0.05 / (4 * 0.45)));
         REQUIRE(birth.N.norm() == Approx(1).margin(1e-5));
         REQUIRE(birth.N.dot(from_center) > 0.99 * 0.5);
-        bands[std::clamp(static_cast<int>(20 * (0.5 + from_center.y())), 0, 19)] += 1;  // Archimedes: even in height
+        bands[std::clamp(static_cast<int>(20 * (0.5 + from_center.y())), 0, 19)] += 1;  // uniform in height, Archimedes
         octants[(from_center.x() > 0) * 4 + (from_center.y() > 0) * 2 + (from_center.z() > 0)] += 1;
     }
     CHECK(chi_square(octants, std::vector<double>(8, n / 8.0)) < rarely_above(7));
-    // The surface is made of quads of a voxel, whose area differs from the sphere's by up to 1 % locally.
+    // The surface consists of quads with the size of a voxel, whose area differs locally from the sphere's by up to 1
+    // %.
     for (const double found : bands) CHECK(found == Approx(n / 20.0).epsilon(0.07));
 }
 

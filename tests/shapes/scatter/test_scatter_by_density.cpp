@@ -18,10 +18,10 @@ std::vector<Birthplace> places_of(const ScatterPtr& scatter, std::size_t n)
     return out;
 }
 
-// The square [0, 1]² in the plane y = 0, of two triangles each cell.
+// Returns the square [0, 1]² in the plane y = 0, with two triangles per cell.
 MeshPtr square(int divisions) { return make_grid(1, 1, divisions, Vec3d(0.5, 0, 0.5)); }
 
-// At the corners of faces.
+// Returns the density x at the corners of faces.
 std::vector<float> by_x(const Mesh& mesh)
 {
     std::vector<float> density;
@@ -39,7 +39,7 @@ std::vector<float> uniform(const Mesh& mesh, float density)
 
 TEST_CASE("births by the density x on a square are distributed as x², and uniformly across", "[scatter][density]")
 {
-    // In one cell the density varies within faces alone, in 30 mostly between them.
+    // With one cell the density varies only within faces, with 30 mostly between them.
     const int divisions = GENERATE(1, 30);
     CAPTURE(divisions);
     const MeshPtr mesh = square(divisions);
@@ -49,7 +49,7 @@ TEST_CASE("births by the density x on a square are distributed as x², and unifo
         ++along[std::min(bins - 1, static_cast<std::size_t>(birth.P.x() * bins))];
         ++across[std::min(bins - 1, static_cast<std::size_t>(birth.P.z() * bins))];
     }
-    // Chi-square of 19 degrees of freedom has the deviation sqrt(38); the key is fixed.
+    // Chi-square with 19 degrees of freedom has the standard deviation sqrt(38). The key is fixed.
     double chi_along = 0, chi_across = 0;
     for (std::size_t b = 0; b < bins; ++b) {
         const double expected = n * (std::pow((b + 1.0) / bins, 2) - std::pow(double(b) / bins, 2));

@@ -225,7 +225,7 @@ TEST_CASE("the longest run of the points that stay is not moved", "[column]")
 TEST_CASE("a column whose oldest points die while others are born stays where it is, within a quarter", "[column]")
 {
     // Removes 1/64 per round. If the room before the values were never reused, it would grow to 64 times the size.
-    const std::size_t size = GENERATE(std::size_t{1} << 12, std::size_t{1} << 17), dead = size / 64;  // from heap; from pages
+    const std::size_t size = GENERATE(std::size_t{1} << 12, std::size_t{1} << 17), dead = size / 64;  // heap; pages
     Column<std::int64_t> column;
     std::int64_t next = 0;
     const auto bear = [&](std::size_t n) {

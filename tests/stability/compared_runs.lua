@@ -1,21 +1,21 @@
--- Runs a scene in several ways, each a process and a folder of its own, and compares what they leave.
+-- Runs a scene in several ways, each as a separate process in a separate folder, and compares the results.
 --
 --   local compared_runs = require "tests.stability.compared_runs"      from the folder of the project
 --   local fault, status = compared_runs.fault(compared_runs.scene(text), {
 --     { name = "one", lines = "rapid run $SCENE -f 1-4 -o a.####.csv --threads 1" }, ... })
 --
--- A way is lines of the shell, of which the first that fails is the last. `fault` is nil if every way has the status of
--- the first and, where that is 0, its files, else its last message: FILE:LINE: node "NAME": what is wrong. Fields of a
--- way: files = false if it leaves none; except, a pattern of files that it does not have; is_part, if it runs parts,
--- which may be refused, and of which another point may be the first to fail. What is in the folder `aside` is not
--- compared.
+-- A way consists of shell lines and stops at the first one that fails. `fault` is nil if all ways end with the status
+-- of the first one and, if that is 0, with the same files, otherwise with the same last message: FILE:LINE: node
+-- "NAME": what is wrong. Fields of a way: files = false if it leaves none; except, a pattern of files that it lacks;
+-- is_part, if it runs parts, in which another point may fail first, and which may be refused. The contents of the
+-- folder `aside` are not compared.
 local command = require "testing.command"
 
 local compared_runs = {}
 
 local folder = command.folder()
 
--- The path of a scene of this text.
+-- Writes a scene with this text and returns its path.
 function compared_runs.scene(text)
   return folder:write("scene.lua", 'local rapid = require "rapid" ' .. text)
 end
@@ -24,7 +24,7 @@ local function is_error_of_node(message)
   return message:match '^%S+:%d+: node "[%w_]+": .' ~= nil
 end
 
--- Without how much memory is free, which differs from run to run.
+-- Removes the amount of free memory from a message, because it differs between runs.
 local function comparable(message) return (message:gsub(", and %S+ %wiB are free of %S+ %wiB", "")) end
 
 local function outcome_of(way)
@@ -57,7 +57,7 @@ function compared_runs.fault(scene, ways)
       :format(way.name, way.name, way.lines, way.name, way.name)
   end
   for _, way in ipairs(ways) do
-    -- OpenVDB gives each file of volumes a random UUID.
+    -- OpenVDB gives each volume file a random UUID.
     script = script .. ("diff -rq -x aside -x '*.vdb' -x '%s' %s %s >%s.files\n"):format(way.except or "", ways[1].name,
       way.files == false and ways[1].name or way.name, way.name)
   end

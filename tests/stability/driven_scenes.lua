@@ -1,14 +1,14 @@
--- Passive scenes (verification/passive_scenes.lua) whose shapes and pins move. A number and a seed give the same
--- everywhere.
+-- Passive scenes (verification/passive_scenes.lua) whose shapes and pins move. Each number and seed gives the same
+-- scene on every machine.
 --
 --   local driven_scenes = require "tests.stability.driven_scenes"
---   driven_scenes.together(seed, number)   all of them alike and uniformly: seen from them the scene is passive
---   driven_scenes.apart(seed, number)      each by a motion of its own
+--   driven_scenes.together(seed, number)   all move alike and uniformly: the scene is passive in their frame
+--   driven_scenes.apart(seed, number)      each has its own motion
 --
--- and of the first kind:
+-- For the first kind there are also:
 --
---   driven_scenes.seen(scene, result)      the scene and its result, as they are seen from the shapes
---   driven_scenes.at_rest(scene)           the passive scene that it is, as it is seen from there
+--   driven_scenes.seen(scene, result)   the scene and its result in the frame of the shapes
+--   driven_scenes.at_rest(scene)        the equivalent passive scene in that frame
 local lehmer = require "tests.lehmer"
 local passive_scenes = require "tests.verification.passive_scenes"
 
@@ -18,7 +18,7 @@ local draw = lehmer.new()
 local pick, chance, between, magnitude = draw.pick, draw.chance, draw.between, draw.magnitude
 local function short(x) return tonumber(("%.6g"):format(x)) end
 
--- Motions that all shapes have together: with a velocity, m/s, and an acceleration along y.
+-- Returns a motion shared by all shapes: a velocity, m/s, and an acceleration along y.
 local function going()
   local speed = magnitude(-1, 1.3)
   local function along() return short(speed * between(-1, 1)) end
@@ -34,7 +34,7 @@ local function text_of(motion)
     motion.z)
 end
 
--- Motions of one shape.
+-- Motions of a single shape.
 local apart = {
   function() return text_of(going()) end,
   function()
@@ -49,13 +49,13 @@ local apart = {
     return function_text("rapid.translate(0, %.6g * t, 0) * rapid.rotate({0.3, 0, 1}, %.6g * t)", between(-2, 2),
       magnitude(0, 2.5))
   end,
-  function() -- a jump
+  function()  -- a jump
     return ("{ [1] = rapid.translate(0, 0, 0), [8] = rapid.translate(0, %.6g, 0), [9] = rapid.translate(%.6g, 0, 0) }")
       :format(between(-0.3, 0.3), between(-3, 3))
   end,
 }
 
--- The first passive scene, from a number on, that has a shape and something that couples points.
+-- Returns the first passive scene, counting from `number`, that has a shape and a node that couples points.
 local function passive(seed, number)
   local scene
   repeat
@@ -74,7 +74,7 @@ function driven_scenes.together(seed, number)
   local nodes, text = {}, text_of(scene.motion)
   for _, node in ipairs(scene.nodes) do
     if node.kind == "collide" or node.kind == "pin" then node.transform = text end
-    if node.kind == "spring" then -- to a sphere that goes along; its damping would be that of the world
+    if node.kind == "spring" then  -- to a sphere that moves along; its damping would be relative to the world
       node.radius, node.target, node.damping = node.radius or 2 * scene.spacing, nil, 0
       node.along = text
     end
@@ -102,7 +102,7 @@ function driven_scenes.apart(seed, number)
   return scene
 end
 
--- A point as it is seen from shapes that have moved for t seconds.
+-- Returns a point's state in the frame of shapes that have moved for t seconds.
 local function seen_from(motion, t, p)
   return p.P - way(motion, t), p.v - vec3(motion.x, motion.y + motion.a * t, motion.z)
 end

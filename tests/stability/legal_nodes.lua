@@ -1,14 +1,14 @@
--- Calls of nodes with legal arguments, from their declarations: a node that is registered is there without a change
--- here, unless it has a required parameter of a type that no other node has.
+-- Generates calls of nodes with legal arguments from their declarations. A newly registered node is included without a
+-- change here, unless it has a required parameter of a type that no other node has.
 --
 --   local legal_nodes = require "tests.stability.legal_nodes"      from the folder of the project
---   legal_nodes.start(seed, number)     begins again, with values over 18 decades
---   legal_nodes.start(seed, number, 1)  with values up to 10 and down to 0.1
+--   legal_nodes.start(seed, number)     restarts, with values over 18 decades
+--   legal_nodes.start(seed, number, 1)  restarts, with values from 0.1 to 10
 --   legal_nodes.types                   the declarations by name
---   legal_nodes.plain(name)             the text of a call with the required arguments alone
---   legal_nodes.drawn(name)             of one with arguments at random
+--   legal_nodes.plain(name)             the text of a call with only the required arguments
+--   legal_nodes.drawn(name)             the text of a call with random arguments
 --
--- The text stands after legal_nodes.head, or in legal_nodes.with_head(text), in a chain whose points have the float
+-- The text belongs after legal_nodes.head, or in legal_nodes.with_head(text), in a chain whose points have the float
 -- `own` and the group `some`.
 local command = require "testing.command"
 local json = require "dkjson"
@@ -19,8 +19,8 @@ local legal_nodes = {}
 local draw = lehmer.new()
 local random, pick, chance, magnitude = draw.random, draw.pick, draw.chance, draw.magnitude
 legal_nodes.draw = draw
-local widest, usual = 9, 2 -- decades of numbers above and below 1
-local files = 0            -- that the nodes of the scene write
+local widest, usual = 9, 2  -- decades above and below 1
+local files = 0  -- number of files that the scene's nodes write
 
 function legal_nodes.start(seed, number, decades)
   draw.start(seed, number)
@@ -35,7 +35,7 @@ local function vector(low, high)
 end
 legal_nodes.literal, legal_nodes.vector = literal, vector
 
--- What texts of values refer to. Level sets and grids bring OpenVDB with them.
+-- Definitions to which values refer. Level sets and grids need OpenVDB.
 local scenery = {
   { "flow", [[rapid.grid.from { size = {2, 2, 2}, voxel = 0.5, at = function(P) return vec3(P.y, -P.x, P.z) end }]] },
   { "solid", [[rapid.levelset.box { size = {0.6, 0.4, 0.5}, voxel = 0.1 }]] },
@@ -46,7 +46,7 @@ local scenery = {
 legal_nodes.head = ""
 for _, thing in ipairs(scenery) do legal_nodes.head = legal_nodes.head .. ("local %s = %s\n"):format(unpack(thing)) end
 
--- The text behind that part of the head which it refers to.
+-- Returns the text after the definitions to which it refers.
 function legal_nodes.with_head(text)
   local head = ""
   for _, thing in ipairs(scenery) do
@@ -55,8 +55,8 @@ function legal_nodes.with_head(text)
   return head .. text
 end
 
--- Texts of values by the type that the registry names. Colliders of no volume, points on surfaces and in their corners
--- come from zeros and ones.
+-- Texts of values by the registry's name of their type. Zeros and ones produce colliders without volume, and points on
+-- surfaces and in their corners.
 local values = {}
 
 function values.shape()
@@ -124,7 +124,7 @@ function values.number(param)
   return literal(math.max(x, low))
 end
 
--- What a kernel does is right at any step.
+-- Kernels that are correct at any step.
 values["function of the points"] = function() return "function(points) points.detail.many = #points end" end
 local kernels = { points = "function(p) p.v = p.v * 0.9 end", action = "function(p, step) p.v = p.v * 0.9 end" }
 
@@ -132,7 +132,7 @@ local types = {}
 for _, node in ipairs(json.decode(command.rapid("nodes --json").stdout)) do types[node.name] = node end
 legal_nodes.types = types
 
--- Texts that are required: the name of a group, or a file of its own.
+-- Returns a required string: the name of a group, or of a separate file.
 local function string_of(name, param)
   if param.name ~= "file" then return '"some"' end
   files = files + 1
@@ -148,7 +148,7 @@ local function required_value(name, param)
     param.name, param.type, param.type, "tests/stability/legal_nodes.lua"), 0)
 end
 
--- A parameter's value, as it is written; nil to leave it out. Some are each point's own, some change with the frame.
+-- Returns the text of a parameter's value, or nil to omit it. Some values differ per point, some change with the frame.
 local function value_of(param)
   if param.name == "group" then return chance(0.1) and '"some"' or nil end
   local value
@@ -162,7 +162,7 @@ local function value_of(param)
   return param.of_the_frame and chance(0.1) and ("function() return %s end"):format(value) or value
 end
 
-local rule = { -- of parameters that exclude each other
+local rule = {  -- for parameters that exclude each other
   field = function(given) if given.mode ~= '"velocity"' then given.drag = nil end end,
   attract = function(given) if given.shape then given.center = nil end end,
   emit = function(given)
@@ -175,7 +175,7 @@ local rule = { -- of parameters that exclude each other
   spawn = function(given)
     given.on, given.min_speed, given.kill_parent, given.rate, given.count = nil, nil, nil, nil, "2"
   end,
-  -- A band of a level set as wide as the radius costs its voxels: small ones, and some that are refused.
+  -- A level set's band as wide as the radius costs voxels, so the radius is small, or so large that it is refused.
   collide = function(given)
     if given.shape:find "solid" and given.radius then
       given.radius = literal(pick { magnitude(-9, 0), magnitude(-9, 0), magnitude(4, 9) })
@@ -199,7 +199,7 @@ local function call(name, given)
   return ("  :%s { %s }\n"):format(name, table.concat(texts, ", "))
 end
 
--- The required arguments, and those that say what the node is about.
+-- Returns a call with the required arguments and those that define the node's purpose.
 function legal_nodes.plain(name)
   local given = {}
   for _, param in ipairs(types[name].params) do

@@ -1,4 +1,4 @@
--- Every type of node at every place of a chain, by number.
+-- Places every type of node at every position in a chain, by number.
 --
 --   local placements = require "tests.stability.placements"      from the folder of the project
 --   placements.count
@@ -15,10 +15,10 @@ local emit = ":emit { source = rapid.mesh.sphere { radius = 0.5 }, rate = 240, l
 local create = "rapid.create { seed = 3 } "
 local grid = "rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0.5 } } "
 local parents = ":spawn { from = own, rate = 60, life = 0.1 } "
--- Another chain, which a merge is given too; its points lack attributes that those of the first one have.
+-- Another chain, also used as the second input of a merge. Its points lack attributes of the first chain's points.
 local other = "local other = rapid.create { seed = 5 } :attribute { pscale = 0.02 } " .. emit
 
--- Name, chain, and the chain `own` before it. NODE and NODE2 are the node.
+-- Name, chain, and the preceding chain `own`. NODE and NODE2 are replaced by the node.
 local places = {
   { "before an emitter", create .. given .. "NODE" .. emit .. ":solve {}" },
   { "between emitter and solve", create .. given .. emit .. "NODE :solve {}" },

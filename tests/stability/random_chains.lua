@@ -1,5 +1,5 @@
--- Random graphs by number: chains of any nodes with mild values, which merge, emit from each other, and end in
--- several outputs. A number and a seed give the same text everywhere.
+-- Random graphs by number: chains of any nodes with moderate values, which merge, emit from each other, and end in
+-- several outputs. Each number and seed gives the same text on every machine.
 --
 --   local random_chains = require "tests.stability.random_chains"      from the folder of the project
 --   local text, outputs = random_chains.make(seed, number)             outputs: their names
@@ -17,7 +17,7 @@ for name in pairs(legal_nodes.types) do
 end
 table.sort(any)
 
--- A node whose parents are the points of another chain.
+-- Returns a node that emits from the points of another chain.
 local function children_of(parents)
   local when = pick { ("rate = %s"):format(literal(magnitude(0, 2))), "count = 2", 'on = "death", count = 3',
     'on = "birth"', 'on = "hit"', 'on = "age > 0.1", kill_parent = true', 'on = "P.y < 0.2", limit = 1',
@@ -26,7 +26,7 @@ local function children_of(parents)
     pick { "", ', inherit = {"own"}', ', group = "some"', ", attributes = { pscale = 0.1, own = {0, 1} }" })
 end
 
--- Attributes that some chains have and others lack.
+-- Returns attributes that some chains have and others lack.
 local function attributes()
   local given = { "own = " .. literal(draw.random()), "heat = 1", "N = {0, 1, 0}" }
   for _, value in ipairs { "pscale = 0.05", "mass = 3", "airresist = 0.1", "extra = 2", "Cd = {1, 0, 0}" } do
@@ -35,7 +35,7 @@ local function attributes()
   return ("  :attribute { %s }\n"):format(table.concat(given, ", "))
 end
 
--- solved: names of chains that are finished; open: of those that no Solve has ended.
+-- solved: names of finished chains; open: names of chains that have no Solve yet.
 local function nodes_before_solve(solved, open)
   local text = ""
   for _ = 1, pick { 1, 2, 3, 4 } do

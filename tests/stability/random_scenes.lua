@@ -1,12 +1,12 @@
--- Scenes by number: every node there is, with legal values of every parameter over 18 decades. A number and a seed
--- give the same text everywhere.
+-- Random scenes by number, with every node and legal values of every parameter over 18 decades. Each number and seed
+-- gives the same text on every machine.
 --
 --   local random_scenes = require "tests.stability.random_scenes"      from the folder of the project
 --   random_scenes.start(seed, number)
---   random_scenes.text()               a scene of a few points; it takes `rapid` to be there
---   random_scenes.chunks()             a scene of thousands
+--   random_scenes.text()      a scene of a few points; requires a local `rapid`
+--   random_scenes.chunks()    a scene of thousands
 --
--- pick, magnitude and the others draw what else a scene has.
+-- pick, magnitude and the others generate the rest of a scene.
 local legal_nodes = require "tests.stability.legal_nodes"
 
 local random_scenes = {}
@@ -17,13 +17,13 @@ local literal, node = legal_nodes.literal, legal_nodes.drawn
 
 function random_scenes.start(seed, number) legal_nodes.start(seed, number) end
 
--- What is drawn here apart: which of several parameters is given, and how much a scene may cost.
+-- Nodes that need special treatment: only one of several parameters may be given, or the cost must be limited.
 local apart = {
   action = true, attribute = true, create = true, detail = true, merge = true, points = true, solve = true,
   rasterize = true, spawn = true, write = true,
 }
 
--- Kernels that are right at any step, and some that are not: their points may end infinite, which is an error.
+-- Kernels that work for any step, and some whose points may become infinite, which is an error.
 local function kernel()
   return pick {
     '  :points("swirl", function(p) p.v = p.v + vec3(0, 1, 0):cross(p.P) * p.dt end)\n',
@@ -73,12 +73,12 @@ local function text_of(set)
     chance(0.2) and "all:merge(all)" or "all")
 end
 
--- Of a few points.
+-- Returns a scene with few points.
 function random_scenes.text()
   return text_of(points(pick { 0, 1, 2, 20 }))
 end
 
--- Of more points than a chunk of 4,096 holds.
+-- Returns a scene with more points than a chunk (4,096).
 function random_scenes.chunks()
   return text_of "rapid.points.grid { size = {40, 0.4, 0.3}, spacing = 0.1 }"
 end

@@ -1,9 +1,9 @@
--- Random scenes of coupled points among shapes and on pins that move (driven_scenes.lua).
+-- Random scenes of coupled points between moving shapes and pins (driven_scenes.lua).
 --
--- Where all of these move alike and uniformly, energy does not grow as it is seen from them. Where each moves by
--- itself, points have the energy that the ledger says: what they had, and what contacts, pins, rods and drag have
--- changed it by. In the suite some are run; STABILITY_SCENES=1000 STABILITY_SEED=7 rapid test tests/stability runs
--- more, and others. Of a scene that is wrong, the simplest that still is so is shown, ready to run.
+-- If they all move alike and uniformly, the energy in their frame does not grow. If each moves by itself, the
+-- energy of the points matches the ledger: the initial energy plus the changes by contacts, pins, rods and drag. The
+-- suite runs some; STABILITY_SCENES=1000 STABILITY_SEED=7 rapid test tests/stability runs more, and others. For a
+-- failing scene, the simplest one that still fails is printed, ready to run.
 local scene = require "testing.scene"
 local amount = require "tests.amount"
 local json = require "dkjson"
@@ -14,10 +14,10 @@ local simplest = require "tests.verification.simplest"
 
 local scenes = amount.of("STABILITY_SCENES", 10)
 local seed = tonumber(os.getenv "STABILITY_SEED") or 1
-local allowed = 0.01 -- of the most energy that is in motion or stored in springs
+local allowed = 0.01  -- of the largest energy in motion or stored in springs
 
 
--- What --stats has of each frame.
+-- Returns the statistics of each frame from --stats.
 local function statistics(description)
   local told = scene.command("run", passive_scenes.text(description),
     ("-f 1-%d --quiet --stats stats.json"):format(description.frames))
@@ -25,20 +25,22 @@ local function statistics(description)
   return json.decode(scene.folder:read "stats.json").frames
 end
 
--- A fault of a scene, of fault(description, result), and of one that does not run.
+-- Returns a function that finds the fault of a scene with fault(description, result). A scene that does not run is at
+-- fault, too.
 local function fault_of(fault)
   return function(description)
     local ok, result = pcall(scene.run, passive_scenes.text(description), { frames = {1, description.frames},
       threads = 1 })
     if not ok then return tostring(result), math.huge end
     local text, size = fault(description, result)
-    collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+    collectgarbage()  -- the collector does not see a result's memory outside of Lua
     return text, size
   end
 end
 
--- Of a scene that corrections of positions give energy, as where points overlap at birth or rods contradict shapes, no
--- bound is known: where the run of the scene at rest tells of any, beside what it begins with, it is passed over.
+-- No bound is known for a scene in which position corrections add energy, as when points overlap at birth or rods
+-- contradict shapes. Such a scene is skipped if the run of its equivalent at rest reports added energy beyond its
+-- initial energy.
 local gains = fault_of(function(description, result)
   local seen, run = driven_scenes.seen(description, result)
   local part, frame, gain = mechanical_energy.gain(seen, run)
@@ -58,7 +60,7 @@ local is_off = fault_of(function(description, result)
   local energy, told, lively, rounding = mechanical_energy.of(description, result), 0, 0, 0
   for _, one in ipairs(energy) do lively = math.max(lively, one.lively) end
   for _, one in ipairs(statistics(description)) do
-    if one.frame > 1 and not one.ledger then return end -- nothing couples the points
+    if one.frame > 1 and not one.ledger then return end  -- nothing couples the points
     for _, name in ipairs(by) do told = told + (one.ledger and one.ledger[name] or 0) end
     rounding = rounding + energy[one.frame].rounding
     local off = energy[one.frame].total - energy[1].total - told
@@ -69,7 +71,7 @@ local is_off = fault_of(function(description, result)
   end
 end)
 
--- Of a list of scenes, {seed, number} each, all that are wrong are told.
+-- Checks a list of scenes, {seed, number} each, and reports all that fail.
 local function none_of(fault, draw, list)
   local faults = {}
   for _, one in ipairs(list) do
@@ -83,7 +85,7 @@ local function none_of(fault, draw, list)
   assert.equal("", table.concat(faults, "\n\n"))
 end
 
--- The first scenes of the seed that draw(seed, number) gives and that are wanted.
+-- Checks the first scenes of the seed for which `wanted` returns true.
 local function none(fault, draw, wanted)
   local list, number = {}, 0
   while #list < scenes do
@@ -98,7 +100,7 @@ describe(("random scenes of coupled points (%d of seed %d)"):format(scenes, seed
     none(gains, driven_scenes.together, function() return true end)
   end)
 
-  -- What interacts is not told apart, nor is what dies.
+  -- Skips scenes with `interact` or with points that die, which the ledger does not itemise.
   it("have the energy that the ledger says, among shapes and pins that move", function()
     none(is_off, driven_scenes.apart, function(description)
       for _, node in ipairs(description.nodes) do

@@ -1,6 +1,6 @@
--- What must not break anything (numerics.md, Extremes) and is not a solver's or node's own test: forces from the
--- shortest step to the longest, shapes that points are exactly on and in the middle of, shapes that come, go, jump and
--- have no volume, a thousand sub-steps, a hundred thousand frames, and numbers that are none.
+-- Extreme conditions that must not break anything (numerics.md, Extremes) and are not covered by the tests of a solver
+-- or node: forces from the shortest step to the longest, points exactly on shapes and at their centres, shapes that
+-- appear, vanish, jump and have no volume, a thousand sub-steps, a hundred thousand frames, and NaN.
 local scene = require "testing.scene"
 local command = require "testing.command"
 
@@ -12,7 +12,8 @@ local function finite(p)
 end
 
 describe("forces", function()
-  -- A point on a spring in thin air, at rest at x: exact at any step. With mass 1e-3 to 1e3 and Ω = √(k/m).
+  -- Returns the exact position of a point on a spring in thin air, released at x. Masses are 1e-3 to 1e3, and Ω =
+  -- √(k/m).
   local function swung(x, k, c, m, t)
     local omega, beta = math.sqrt(k / m), c / 2
     local turning = math.sqrt(omega ^ 2 - beta ^ 2)
@@ -24,7 +25,7 @@ describe("forces", function()
       for _, substeps in ipairs { 1, 1000 } do
         for _, m in ipairs { 1e-3, 1, 1e3 } do
           for _, size in ipairs { 1e-3, 1, 1e5 } do
-            -- Of the frame's length the part that shows: a radian or a millionth.
+            -- Uses the part of the frame's length that has an effect: a radian, or a millionth.
             local k, c = m * (0.9 / h) ^ 2, 0.2 / h
             local p = scene.run(([[
 return rapid.create { fps = %.17g, points = rapid.points.from { P = {{%.9g, 0, 0}} } }
@@ -44,11 +45,11 @@ return rapid.create { fps = %.17g, points = rapid.points.from { P = {{%.9g, 0, 0
 return rapid.create { fps = %.17g, points = rapid.points.from { P = {{0, 0, 0}}, v = {{%.9g, 0, 0}} } }
   :drag { linear = 2, quadratic = 0.5 } :solve {}]]):format(1 / h, speed), { frames = {4, 4} })[4][1]
         local t, v = 3 * h, speed
-        -- v' = -2 v - v²/2 by its closed form.
+        -- The closed form of v' = -2 v - v²/2.
         local fade = math.exp(-2 * t)
         local expected = v * fade / (1 + v / 4 * (1 - fade))
         assert.is_true(p.v.x >= 0 and p.v.x <= v)
-        -- Of second order where c v h is small; bounded by both drags alone where it is not.
+        -- Second order if c v h is small, otherwise bounded by both drags alone.
         if speed * h < 1e-2 then assert.near(expected, p.v.x, 1e-4 * v + 1e-12) end
         assert.is_true(p.v.x <= v * fade * (1 + 1e-6) + 1e-30)
         assert.is_true(p.P.x <= math.min(v / 2, v * t) * (1 + 1e-6))
@@ -58,7 +59,7 @@ return rapid.create { fps = %.17g, points = rapid.points.from { P = {{0, 0, 0}},
 end)
 
 describe("a whole scene that moves at 100 m/s", function()
-  -- Everything is moved: points, air, what points are drawn to, and the ground.
+  -- Everything moves: points, air, attractors, and the ground.
   local function run(u, frame)
     return scene.run(([[
 local u, P, v = %d, {}, {}
@@ -76,7 +77,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } }
       local still, moving = run(0, frame), run(100, frame)
       local time = (frame - 1) / 24
       for i = 1, #still do
-        -- An ulp of 50 m is 4e-6 m, at each of the frames; a bounce carries an error on a few times over.
+        -- An ulp of 50 m is 4e-6 m, added each frame; a bounce amplifies an error a few times.
         assert.near(still[i].P, moving[i].P - vec3(100 * time, 0, 0), 4e-6 * frame * 4)
         assert.near(still[i].v, moving[i].v - vec3(100, 0, 0), 8e-6 * frame * 16)
       end
@@ -92,14 +93,15 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}}, v = {{0.3, 0
   :gravity {} :collide { shape = rapid.shape.plane {}, bounce = 1 }
   :collide { shape = rapid.shape.plane { normal = {-1, 0, 0}, offset = -0.5 }, bounce = 1 }
   :solve {}]]
-    local turn = 1 + 60 -- 2.5 s: three bounces
+    local turn = 1 + 60  -- 2.5 s: three bounces
     local p = scene.run(text:format(turn + 1), { frames = {2 * turn - 1, 2 * turn - 1} })[2 * turn - 1][1]
-    assert.near({0, 1, 0}, p.P, 2e-5) -- 120 roundings of P and of v, for 5 s
+    assert.near({0, 1, 0}, p.P, 2e-5)  -- 120 roundings of P and of v, for 5 s
     assert.near({-0.3, -0.4, 0}, p.v, 2e-5)
   end)
 
-  -- At an analytic wall to rounding (tests/solver). A level set's is of facets: a point that grazes the valley between
-  -- two may slide on in it, which takes its speed out of the valley, at most the angle between them.
+  -- At an analytic wall this holds to rounding (tests/solver). A level set has facets: a point that grazes the valley
+  -- between two of them may slide on in it, which removes its speed out of the valley, at most by the angle between
+  -- them.
   it("a point in a hollow level set keeps its speed for thousands of bounces, and never gains any", function()
     local result = scene.run([[
 local hollow = rapid.levelset.box { size = {3, 3, 3}, voxel = 0.1 }
@@ -108,7 +110,7 @@ return rapid.create { fps = 1, points = rapid.points.from { P = {{0.1, 0.2, 0}},
   :collide { shape = hollow, bounce = 1 } :solve {}]], { frames = {101, 101} })
     local p, speed = result[101][1], math.sqrt(40 ^ 2 + 5 ^ 2 + 9 ^ 2)
     assert.is_true(p.v:length() <= speed * (1 + 100 * 6e-8)) -- v is rounded once a frame
-    assert.is_true(p.v:length() >= speed * math.cos(0.1)) -- a voxel of a radius of ten
+    assert.is_true(p.v:length() >= speed * math.cos(0.1))  -- the angle of a voxel at a radius of ten voxels
     assert.is_true(p.P:length() <= 1.01)
   end)
 end)
@@ -143,7 +145,7 @@ return rapid.create { points = rapid.points.from { P = {%s}, v = {%s} } } :gravi
             for i = 1, #points do
               local p = points[i]
               assert.is_true(finite(p), text)
-              -- Half a second's fall adds 4.9 m/s; the way out of a shape of 1 m, 4.4 m/s more to fall.
+              -- Half a second of falling adds 4.9 m/s. Leaving a shape of 1 m adds a fall of 4.4 m/s.
               assert.is_true(p.v:length() <= math.sqrt(2) + 4.91 + 4.5, text)
             end
           end
@@ -162,7 +164,7 @@ for i = 1, 20 do P[i], v[i] = {i / 20 - 0.5, 0.3 + i / 40, 0.1}, {0, -1, 0} end
 return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {} :collide { %s } :solve {}]])
       :format(collide), frames)
   end
-  -- A fall of a second from 0.8 m/s, and no more: nothing that a shape does is a push.
+  -- Allows the speed of a one-second fall from 0.8 m/s but no more, because no change of a shape may push points.
   local function check(points, most)
     for i = 1, #points do
       assert.is_true(finite(points[i]))
@@ -183,7 +185,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {} 
   it("that jumps past and onto points gives them no more than a hit at the speed of the jump", function()
     local keys = {}
     for f = 1, 25 do keys[f] = ("[%d] = rapid.translate(0, %d, 0)"):format(f, f % 2 * 40) end
-    -- At 24 fps it jumps at 960 m/s; what it meets on its way is hit, and leaves with (1 + bounce) times that at most.
+    -- At 24 fps it jumps at 960 m/s. A point in its path is hit and leaves with at most (1 + bounce) times that speed.
     local collide = "bounce = 0.5, shape = ball, transform = {" .. table.concat(keys, ", ") .. "}"
     check(run(collide, { frames = {25, 25} })[25], 1.5 * 960 * 1.01 + 12)
   end)
@@ -228,7 +230,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } }
   :collide { shape = rapid.shape.box { size = {4, 1e-6, 4} }, bounce = 1 } :solve {}]], { frames = {13, 13} })
     for i = 1, 20 do
       local p, side = result[13][i], i % 2 == 0 and 1 or -1
-      assert.near({i / 40, side * 1.2, 0.1}, p.P, 1e-5) -- there and back for half a second
+      assert.near({i / 40, side * 1.2, 0.1}, p.P, 1e-5)  -- back and forth for half a second
       assert.near({0, side * 3, 0}, p.v, 1e-5)
     end
   end)
@@ -276,7 +278,8 @@ return { still = still, born = born }]], { frames = {100001, 100001} })
     local still, born = result:output "still"[100001], result:output "born"[100001]
     assert.same({5, 0, 0}, { still[1].P.x, still[1].P.y, still[1].P.z })
     assert.same({0, 0, 0}, { still[1].v.x, still[1].v.y, still[1].v.z })
-    -- At t = 100,000 / 24 s: births number k at (k + 1) / 2.4, the last 10,000; each 1 m/s from its birth on.
+    -- At t = 100,000 / 24 s: birth number k is at (k + 1) / 2.4, the last one 10,000; each moves at 1 m/s from its
+    -- birth on.
     assert.equal(3, #born)
     for i = 1, 3 do
       local p = born[i]

@@ -1,8 +1,8 @@
--- What a file holds depends on what it asks for alone: neither on other files of the run nor on what is left out.
+-- The contents of a file depend only on its own request, not on other files of the run or on pruning.
 --
--- For the scenes of graphs and of its nodes, and for random graphs behind them, the files of a run with one output are
--- those of a run with several, and those of a run that leaves nothing out. In the suite a few scenes are run;
--- OUTPUT_SCENES=150 OUTPUT_SEED=7 rapid test tests/stability/test_outputs.lua runs more.
+-- For the scenes in graphs and those of its nodes, followed by random graphs, the files of a run with one output must
+-- equal those of a run with several, and those of a run without pruning. The suite runs a few scenes; OUTPUT_SCENES=150
+-- OUTPUT_SEED=7 rapid test tests/stability/test_outputs.lua runs more.
 local amount = require "tests.amount"
 local command = require "testing.command"
 local compared_runs = require "tests.stability.compared_runs"
@@ -17,7 +17,7 @@ for path in command.shell("ls $PWD/graphs/*.lua $PWD/graphs/nodes/*.lua").stdout
   graphs[#graphs + 1] = path
 end
 
--- The path of a scene: those of graphs first, in an order that the seed gives.
+-- Returns the path of a scene: first those in graphs, in an order that depends on the seed.
 local function scene_of(number)
   local draw = lehmer.new()
   draw.start(seed, 1)

@@ -1,9 +1,9 @@
--- Every type of node at every place of a chain: before and after an emitter and a Solve, without them, on no points,
--- twice, around merges, among parents and children.
+-- Places every type of node at every position in a chain: before and after an emitter and a Solve, without them, on
+-- empty sets, twice, around merges, among parents and children.
 --
--- `rapid check` and a run agree: both refuse a node, in the same words, or the run goes to its end, with the same files
--- on one thread and on seven, and with nothing left out. In the suite some placements are tried; PLACEMENTS=1300 rapid
--- test tests/stability/test_placements.lua tries all, PLACEMENT_SEED=7 others.
+-- `rapid check` and a run must agree: either both refuse a node with the same message, or the run succeeds, with the
+-- same files on one thread, on seven, and without pruning. The suite tries some placements; PLACEMENTS=1300 rapid test
+-- tests/stability/test_placements.lua tries all, and PLACEMENT_SEED=7 others.
 local amount = require "tests.amount"
 local compared_runs = require "tests.stability.compared_runs"
 local legal_nodes = require "tests.stability.legal_nodes"
@@ -18,7 +18,7 @@ local check = { name = "check", lines = "rapid check $SCENE", files = false }
 local ways = { { name = "one", lines = run .. "--threads 1" }, { name = "seven", lines = run .. "--threads 7" },
   { name = "all", lines = run .. "--keep-all" }, check }
 
--- So many different numbers of placements.
+-- Returns a random selection of distinct placement numbers.
 local function chosen()
   local draw, numbers = lehmer.new(), {}
   draw.start(seed, 1)
@@ -54,6 +54,6 @@ describe("a node at any place of a chain", function()
       end
       if not ran then never[#never + 1] = name end
     end
-    assert.same({}, never) -- else: tests/stability/legal_nodes.lua lacks what they need
+    assert.same({}, never)  -- otherwise extend tests/stability/legal_nodes.lua
   end)
 end)

@@ -1,4 +1,4 @@
--- Random scenes of grains that turn, among shapes at rest: no frame ends with more energy than it began with.
+-- Random scenes of spinning grains between shapes at rest: no frame ends with more energy than it began with.
 -- STABILITY_SEED=7 rapid test tests/stability runs others.
 local scene = require "testing.scene"
 local amount = require "tests.amount"
@@ -6,11 +6,11 @@ local lehmer = require "tests.lehmer"
 
 local scenes, seed = amount.of("SPINNING_SCENES", 3), tonumber(os.getenv "STABILITY_SEED") or 1
 local draw = lehmer.new(1)
--- Of what moves at first: corrections of overlaps may lift grains, 2e-5 in one scene of twelve.
+-- Fraction of the initial kinetic energy. Corrections of overlaps may lift grains, 2e-5 in one of twelve scenes.
 local allowed = 1e-4
 local between, chance = draw.between, draw.chance
 
--- 80 grains of masses over two decades that fly and turn over a floor, between four walls and a ball.
+-- 80 grains with masses over two decades that fly and spin above a floor, between four walls and a ball.
 local function text_of()
   local function vector(size)
     return ("{%.6f, %.6f, %.6f}"):format(between(-size, size), between(-size, size),
@@ -40,7 +40,7 @@ return chain :collide { shape = rapid.shape.sphere { radius = 0.25, center = {0.
     2 + draw.below(10))
 end
 
--- J: of motion, turning and weight.
+-- Returns the energy of motion, rotation and weight, J.
 local function energy(points)
   local sum, moving = 0, 0
   for i = 1, #points do

@@ -1,12 +1,12 @@
--- Hard spheres in a box, event by event: the truth that contacts are measured against, without a time step.
+-- Hard spheres in a box, advanced event by event without a time step: the reference for contacts.
 --
 --   local gas = event_driven.gas { P = ..., v = ..., mass = ..., radius = r, half = half, bounce = e }
 --   gas:advance(time)         to that time, s
 --   gas:energy()              J
 --
--- P and v are lists of {x, y, z}; the box's walls, at -half and half of each axis, are elastic. Between hits spheres
--- fly straight. Of each sphere the next hit is known (Lubachevsky 1991); after a hit those of its two are found
--- again, and of all whose partner they were.
+-- P and v are lists of {x, y, z}. The box's walls, at -half and half of each axis, are elastic. Between hits spheres
+-- move in straight lines. The next hit of each sphere is stored (Lubachevsky 1991). A hit invalidates those of its two
+-- spheres and of all spheres that had one of them as partner.
 local event_driven = {}
 
 local Gas = {}
@@ -23,14 +23,14 @@ function event_driven.gas(given)
   return gas
 end
 
--- To the time t, alone.
+-- Advances only this sphere, to time t.
 function Gas:move(i, t)
   local x, u, dt = self.x[i], self.u[i], t - self.since[i]
   for k = 1, 3 do x[k] = x[k] + u[k] * dt end
   self.since[i] = t
 end
 
--- The time at which i and j, apart, first touch.
+-- Returns the time at which i and j, which are apart, first touch.
 function Gas:meeting(i, j)
   local a, b, va, vb, now = self.x[i], self.x[j], self.u[i], self.u[j], self.now
   local dta, dtb = now - self.since[i], now - self.since[j]
@@ -46,7 +46,7 @@ function Gas:meeting(i, j)
   return now + math.max(0, (-along - math.sqrt(root)) / speed2)
 end
 
--- The next hit of i: with another (partner j) or with a wall (partner -axis).
+-- Finds the next hit of i: with another sphere (partner j) or with a wall (partner -axis).
 function Gas:predict(i)
   local x, u, time, partner = self.x[i], self.u[i], math.huge, 0
   for k = 1, 3 do
@@ -96,7 +96,7 @@ function Gas:advance(time)
       if k ~= i and k ~= j and (self.partner[k] == i or j > 0 and self.partner[k] == j) then again[#again + 1] = k end
     end
     for _, k in ipairs(again) do self:predict(k) end
-    -- A third whose next hit comes later than one with these two.
+    -- The new partner may have had a later hit with another sphere.
     for _, k in ipairs { i, j > 0 and j or nil } do
       local partner = self.partner[k]
       if partner > 0 and self.next_time[k] < self.next_time[partner] then

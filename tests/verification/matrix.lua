@@ -1,14 +1,14 @@
--- The verification matrix: what Rapid computes beside what is known, a row a law.
+-- The verification matrix compares Rapid's results with known ones, one law per row.
 --
 -- Each file in `cases` returns a list of rows:
 --
---   feature, law       what is tested, and what must hold of it
---   reference          where the truth comes from: a closed form, a publication, an independent computation
---   measure()          the figure, and the observed order of convergence where `order` is asserted
---   unit               of the figure; nothing where it is a ratio
+--   feature, law       the feature under test, and the law that must hold
+--   reference          the source of the truth: a closed form, a publication, an independent computation
+--   measure()          returns the figure, and the observed order of convergence if `order` is asserted
+--   unit               of the figure; nil for a ratio
 --   at_least, at_most  the tolerance: bounds of the figure
---   order              the least order of convergence that is asserted, less 0.2 for its fit
---   long               true where it takes more than about ten seconds: measured only where long rows are asked for
+--   order              the smallest order of convergence that is asserted, less 0.2 for its fit
+--   long               true if it takes more than about ten seconds: measured only if long rows are requested
 local matrix = {}
 
 local folder = "tests/verification/cases"
@@ -27,16 +27,16 @@ function matrix.rows()
   return rows
 end
 
-local fit = 0.2 -- of an observed order
+local fit = 0.2  -- tolerance of an observed order
 
--- Whether a figure and an order are within a row's bounds; NaN is within none.
+-- Returns true if a figure and an order are within a row's bounds. NaN never is.
 function matrix.holds(row, figure, order)
   return figure == figure and figure >= (row.at_least or -math.huge) and figure <= (row.at_most or math.huge)
     and (not row.order or order and order >= row.order - fit)
 end
 
--- The slope of log error over log step, of lists of both, by least squares; errors below `rounding` are left out.
--- Infinite, for exact, where fewer than two are above it.
+-- Returns the least-squares slope of log error over log step. Errors below `rounding` are ignored. Returns infinity,
+-- which means exact, if fewer than two remain.
 function matrix.order(steps, errors, rounding)
   local n, sx, sy, sxx, sxy = 0, 0, 0, 0, 0
   for i, error in ipairs(errors) do
@@ -62,7 +62,7 @@ end
 
 local function line(cells) return "| " .. table.concat(cells, " | ") .. " |\n" end
 
--- measured: of each row { row, figure, order, ok }.
+-- measured: for each row { row, figure, order, ok }.
 function matrix.markdown(measured)
   local text = line { "feature", "law", "reference", "tolerance", "measured", "order", "holds" }
     .. "|---|---|---|---|---|---|---|\n"

@@ -1,30 +1,29 @@
--- The mechanical energy of a scene of passive_scenes in a frame, J: of motion, of gravity, of springs and of compliant
--- rows.
+-- The mechanical energy of a scene of passive_scenes in a frame, J: of motion, gravity, springs and compliant rows.
 --
 --   local mechanical_energy = require "tests.verification.mechanical_energy"
 --   local energy = mechanical_energy.of(scene, result)
---   energy[frame].total, .lively (of motion and of what is stretched), .rounding (of the state's single precision)
---   mechanical_energy.gain(scene, result)      the largest gain over the first frame, above rounding: as a part of the
---                                              most that is lively in the run; its frame; in J. nil where there is none
+--   energy[frame].total, .lively (motion and stretched springs), .rounding (from the state's single precision)
+--   mechanical_energy.gain(scene, result)   the largest gain over the first frame, beyond rounding: as a fraction of
+--                                           the largest lively energy in the run; its frame; in J. nil without a gain
 --
--- A scene that is seen from where its shapes are (stability/driven_scenes.lua) has points with their `far`, m, and
--- `fast`, m/s, from the origin, which are what is rounded.
+-- A scene in the frame of its shapes (stability/driven_scenes.lua) has points with the original distance `far`, m, and
+-- speed `fast`, m/s, which determine the rounding.
 --
--- Gravity's potential is 0 at the lowest place that a point reaches, so that a point that dies takes energy away.
+-- Gravity's potential is 0 at the lowest position that a point reaches, so that a dying point removes energy.
 local mechanical_energy = {}
 
-local ulp = 2 ^ -23 -- of single precision, relative
+local ulp = 2 ^ -23  -- of single precision, relative
 
 local function length(P) return math.sqrt(P:dot(P)) end
 local function far(scene, p) return scene.motion and p.far or length(p.P) end
 
--- The energy that a stretch of so much stores, and what rounding at that distance from the origin makes of it.
+-- Returns the energy stored in a stretch, and its error from rounding at the distance `size` from the origin.
 local function stored(stiffness, stretch, size)
   local error = ulp * size
   return stiffness * stretch ^ 2 / 2, stiffness * (math.abs(stretch) * error + error ^ 2)
 end
 
--- Sums over what a node stretches; by_id: points of the frame that live.
+-- Functions that sum over a node's springs. by_id: living points of the frame.
 local stretches = {}
 function stretches.spring(node, scene, by_id, add)
   for id = 0, #scene.points - 1 do
@@ -62,7 +61,7 @@ local function of_frame(scene, points, lowest, place_of, t)
     local mass, speed2 = scene.points[p.id + 1].mass, p.v:dot(p.v)
     moving = moving + mass * speed2 / 2
     height = height + mass * scene.g * (p.P.y - lowest)
-    local slip = ulp * (far(scene, p) + p.pscale) * scene.fps * scene.substeps -- of P, as a speed
+    local slip = ulp * (far(scene, p) + p.pscale) * scene.fps * scene.substeps  -- of P, as a speed
     if scene.motion then slip = slip + ulp * p.fast end
     rounding = rounding + mass * (ulp * (speed2 + scene.g * far(scene, p)) + slip * (math.sqrt(speed2) + slip))
   end

@@ -1,26 +1,26 @@
--- Scenes in which nothing can give energy, by number: coupled points, drags, springs, shapes at rest. What draws or
--- drives for ever (wind, attract, vortex, turbulence, what interact separates and draws) is left out; a spring and a
--- compliant row have their potential.
+-- Scenes without energy sources, by number: coupled points, drag, springs, shapes at rest. Nodes that attract or drive
+-- points permanently (wind, attract, vortex, turbulence, separation and attraction of interact) are excluded. Springs
+-- and compliant rows have a potential.
 --
 --   local passive_scenes = require "tests.verification.passive_scenes"
---   local scene = passive_scenes.scene(seed, number)       a description; a number and a seed give the same everywhere
---   passive_scenes.text(scene)                             as graph code, which takes `rapid` to be there
---   passive_scenes.simpler(scene)                          a list of scenes with one thing less each
+--   local scene = passive_scenes.scene(seed, number)   a description, the same on every machine for a number and a seed
+--   passive_scenes.text(scene)                         the scene as graph code; requires a local `rapid`
+--   passive_scenes.simpler(scene)                      a list of scenes that are each simpler by one thing
 --
--- Masses, radii, speeds and compliances are drawn over decades. Points are born inside shapes and in each other.
+-- Masses, radii, speeds and compliances vary over decades. Points start inside shapes and inside each other.
 local lehmer = require "tests.lehmer"
 
 local passive_scenes = {}
 
 local drawn = lehmer.new()
 local random, pick, chance, between, magnitude = drawn.random, drawn.pick, drawn.chance, drawn.between, drawn.magnitude
--- As the text has it, so that the energy is that of the scene that runs.
+-- Rounds as the text does, so that the energy is that of the scene that runs.
 local function short(x) return tonumber(("%.6g"):format(x)) end
 local function vector(size)
   return { short(between(-size, size)), short(between(-size, size)), short(between(-size, size)) }
 end
 
--- Where points are at first. All are about the origin, where the shapes are.
+-- Initial positions, around the origin, where the shapes are.
 local places = {}
 function places.row(n, spacing)
   local P, along = {}, chance(0.5) and 0 or 1
@@ -102,7 +102,7 @@ local shapes = {
   end,
 }
 
--- Nodes by name: what is drawn of them. Each has a list `order` of parameters as the text has them.
+-- Functions that generate the parameters of a node, by its name.
 local draw = {}
 function draw.contact()
   return { bounce = pick { 0, 0, 0.5, 0.9, 1 }, friction = pick { 0, 0, 0.3, 1 },
@@ -160,7 +160,7 @@ local function written(value)
   return type(value) == "number" and ("%.9g"):format(value) or value
 end
 
--- Parameters of a node that its text has, in this order; those that are words.
+-- Parameters of a node in the order of its text, and those whose values are words.
 local params = { "stiffness", "damping", "linear", "quadratic", "strength", "shape", "bounce", "friction", "radius",
   "response", "method", "within", "rest", "compliance", "mass_scaling", "drag", "alignment", "target", "transform",
   "record" }
@@ -219,7 +219,7 @@ local function without(list, i)
   return result
 end
 
--- The scene without a point, its pairs, and its pins.
+-- Returns the scene without a point, its pairs and its pins.
 local function without_point(scene, i)
   local gone, result = scene.points[i], copy(scene)
   result.points, result.nodes = without(scene.points, i), {}
@@ -245,7 +245,7 @@ local function with(scene, name, value)
   return result
 end
 
--- Values that show the least, by parameter of a node, of a scene and of a point.
+-- The simplest values, by parameter of a node, a scene or a point.
 local plain = { bounce = 0, friction = 0, damping = 0, linear = 0, quadratic = 0, compliance = 0,
   method = "continuous", response = "bounce" }
 

@@ -1,10 +1,10 @@
--- The simplest scene found that is still wrong, of those of passive_scenes.
+-- Finds the simplest scene of passive_scenes that still fails.
 --
 --   local simplest = require "tests.verification.simplest"
 --   scene, fault = simplest(scene, fault_of)
 --
--- fault_of(scene): what is wrong with it, as a text, and by how much; nil where nothing is. A scene counts as wrong
--- still where it is so by at least a hundredth as much.
+-- fault_of(scene) returns a description of the fault and its size, or nil. A simpler scene still counts as failing if
+-- its fault has at least a hundredth of the size.
 local passive_scenes = require "tests.verification.passive_scenes"
 
 local most_tries = 300

@@ -1,6 +1,6 @@
--- Each row of the verification matrix (matrix.lua) holds. tests/run --thorough measures long rows, too, and so does
--- VERIFICATION_LONG=1. VERIFICATION_ONLY is a word that a row's case, feature or law must contain, VERIFICATION_TABLE a
--- file that the table is written into. tests/verification/run sets them.
+-- Checks that each row of the verification matrix (matrix.lua) holds. tests/run --thorough or VERIFICATION_LONG=1 also
+-- measures long rows. VERIFICATION_ONLY is a word that a row's case, feature or law must contain, VERIFICATION_TABLE a
+-- file to which the table is written. tests/verification/run sets them.
 local amount = require "tests.amount"
 local matrix = require "tests.verification.matrix"
 

@@ -1,8 +1,8 @@
--- Random scenes in which nothing can give energy (passive_scenes.lua): none has more than at its beginning, but for
--- rounding, a hundredth, and what the run tells that contacts have added.
+-- Random scenes without energy sources (passive_scenes.lua): none gains energy since its start, except for rounding,
+-- one per cent, and the energy that the run reports as added by contacts.
 --
--- In the suite some are run; PASSIVE_SCENES=2000 PASSIVE_SEED=7 rapid test tests/verification runs more, and others. Of
--- a scene that gains, the simplest that still does is shown, ready to run.
+-- The suite runs some; PASSIVE_SCENES=2000 PASSIVE_SEED=7 rapid test tests/verification runs more, and others. For a
+-- scene that gains energy, the simplest one that still does is printed, ready to run.
 local scene = require "testing.scene"
 local amount = require "tests.amount"
 local json = require "dkjson"
@@ -12,9 +12,9 @@ local simplest = require "tests.verification.simplest"
 
 local scenes = amount.of("PASSIVE_SCENES", 20) -- of each kind
 local seed = tonumber(os.getenv "PASSIVE_SEED") or 1
-local allowed = 0.01 -- of the most energy that is in motion or stored in springs
+local allowed = 0.01  -- of the largest energy in motion or stored in springs
 
--- What contacts have added up to a frame, as the run tells it, J.
+-- Returns the energy that contacts have added up to a frame, as reported by the run, J.
 local function told(text, frame)
   local run = scene.command("run", text, ("-f 1-%d --quiet --stats stats.json"):format(frame))
   assert(run.status == 0, run.stderr)
@@ -23,13 +23,13 @@ local function told(text, frame)
   return sum
 end
 
--- What is wrong with a scene, as a text, and by how much; nil where nothing is.
+-- Returns a description of a scene's fault and its size, or nil.
 local function fault_of(description)
   local text = passive_scenes.text(description)
   local ok, result = pcall(scene.run, text, { frames = {1, description.frames}, threads = 1 })
   if not ok then return tostring(result), math.huge end
   local part, frame, gain = mechanical_energy.gain(description, result)
-  collectgarbage() -- of what a result holds outside of Lua the collector sees nothing
+  collectgarbage()  -- the collector does not see a result's memory outside of Lua
   if not part or part <= allowed then return end
   local excess = gain - told(text, frame)
   if excess <= allowed * gain / part then return end
@@ -37,7 +37,7 @@ local function fault_of(description)
     gain - excess), part
 end
 
--- Which nodes a scene has.
+-- Returns the set of nodes in a scene.
 local function nodes_of(description)
   local has = {}
   for _, node in ipairs(description.nodes) do
@@ -47,7 +47,7 @@ local function nodes_of(description)
   return has
 end
 
--- All of the scenes that gain are told. list: {seed, number} of each.
+-- Checks a list of scenes, {seed, number} each, and reports all that gain energy.
 local function none_gains(list)
   local faults = {}
   for _, one in ipairs(list) do
@@ -63,7 +63,7 @@ local function none_gains(list)
   assert.equal("", table.concat(faults, "\n\n"))
 end
 
--- The first scenes of the seed that are wanted.
+-- Returns the first scenes of the seed for which `wanted` returns true.
 local function drawn(wanted)
   local list, number = {}, 0
   while #list < scenes do
@@ -90,12 +90,12 @@ describe(("random passive scenes (%d of seed %d)"):format(scenes, seed), functio
     none_gains(drawn(function(has) return has.collide end))
   end)
 
-  -- Rods that found no solution, springs to surfaces beside rods, springs that turn a point several times in a sub-
-  -- step among shapes, pins inside of shapes, bonds that have turned away from their impulse, springs to surfaces and
-  -- compliant rods whose points are put out of shapes, in one sub-step several times, too, points that are born inside
-  -- of what they stick to, rods that are corrected beside compliant pins, contacts that contradict rods, points that
-  -- `project` puts out of shapes at the end of a frame, points in the middle of the ball that a spring draws them to,
-  -- rods without a length, points that shapes put out and pins put back, rods to sleepers that had a velocity.
+  -- Rods without a solution, springs to surfaces next to rods, springs that turn a point several times in a sub-step
+  -- between shapes, pins inside shapes, bonds that have turned away from their impulse, springs to surfaces and
+  -- compliant rods whose points are moved out of shapes, also several times in one sub-step, points born inside shapes
+  -- that they stick to, rods that are corrected next to compliant pins, contacts that contradict rods, points that
+  -- `project` moves out of shapes at the end of a frame, points at the centre of the ball that a spring pulls them to,
+  -- rods of length 0, points that shapes push out and pins pull back, rods to sleeping points that had a velocity.
   it("that gained on earlier code gain none", function()
     none_gains { {11, 58}, {11, 19}, {11, 480}, {11, 150}, {11, 892}, {11, 113}, {11, 169}, {11, 219}, {11, 249},
       {13, 283}, {13, 538}, {17, 396}, {21, 378}, {21, 474}, {23, 188},

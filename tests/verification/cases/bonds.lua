@@ -1,8 +1,8 @@
--- Rows against each other and against a load: a bond that is pulled, a contact against a rod.
+-- Rows that compete with each other and with a load: a bond under tension, a contact against a rod.
 local scene = require "testing.scene"
 
--- The most kinetic energy in 2 s of three points that rods hold nearer than their radii, from rest, J; with one of them
--- on a pin that goes at u m/s, seen from it.
+-- Returns the largest kinetic energy in 2 s, J, of three points at rest that rods hold closer than their radii. With
+-- `pin`, one of them is on a pin that moves at u m/s, and the energy is relative to it.
 local function contradicted(u, pin)
   local most = 0
   for _, substeps in ipairs { 1, 4, 16 } do

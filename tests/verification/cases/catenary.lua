@@ -1,9 +1,10 @@
--- A rope of links between two hooks, at rest, beside the catenary.
+-- A rope of links at rest between two hooks, compared with the catenary.
 local scene = require "testing.scene"
 
 local links, span, length = 100, 1, 1.6
 
--- The depth of a catenary of that length below hooks at one height: y = a cosh(x/a), length = 2a sinh(span/2a).
+-- Returns the depth of a catenary of this length below hooks at equal height: y = a cosh(x/a), length = 2a
+-- sinh(span/2a).
 local function sag()
   local low, high = 0.01, 10
   for _ = 1, 100 do
@@ -16,7 +17,7 @@ end
 local function hanging()
   local step, P, pairs_text = length / links, {}, {}
   for i = 0, links do
-    -- A triangle of the rope's length.
+    -- Starts as a triangle with the rope's length.
     local half = math.sqrt((length / 2) ^ 2 - (span / 2) ^ 2)
     local part = i / links
     P[i + 1] = ("{%.9g, %.9g, 0}"):format(span * (part - 0.5), -half * (1 - math.abs(2 * part - 1)))

@@ -1,10 +1,10 @@
--- Points on ellipses of eccentricity 0.9 to 0.999 about a centre that draws by the square of the distance, one turn,
--- with a tolerance: what it promises a frame, times the frames, is kept.
+-- Points on ellipses of eccentricity 0.9 to 0.999 around a centre with an inverse-square attraction, one revolution,
+-- with a tolerance: the error must be within the tolerance per frame times the number of frames.
 local scene = require "testing.scene"
 
 local tolerance, strength = 1e-4, 1
 
--- The place on an ellipse of the semi-axis 1 that begins at its far end, at time t, by Kepler's equation.
+-- Returns the position at time t on an ellipse with semi-axis 1, starting at its far end, from Kepler's equation.
 local function ellipse(e, t)
   local mean = math.pi + t * math.sqrt(strength)
   local low, high = mean - 1, mean + 1
@@ -26,7 +26,7 @@ return {
         P[i] = ("{%.17g, 0, 0}"):format(-1 - e)
         v[i] = ("{0, %.17g, 0}"):format(-math.sqrt(strength * (1 - e) / (1 + e)))
       end
-      local frames, worst = 121, 0 -- 5 s; the centre is passed at pi
+      local frames, worst = 121, 0  -- 5 s; the centre is passed at pi
       local points = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} } }
   :attract { strength = %g } :solve { tolerance = %g, max_substeps = 1048576 }]]):format(table.concat(P, ", "),

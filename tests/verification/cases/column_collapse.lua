@@ -1,16 +1,16 @@
--- How far a column of grain runs out when the wall around it is gone at once: Lube et al. 2004, about an axis, who
--- found it to be the same for sand, salt, couscous, rice and sugar,
+-- How far a column of grain spreads when the wall around it vanishes: Lube et al. 2004, axisymmetric. They found the
+-- same law for sand, salt, couscous, rice and sugar,
 --
 --   (r - r0)/r0 = 1.24 a      a = h0/r0 < 1.7
 --   (r - r0)/r0 = 1.6 √a      above
 --
--- Grain falls into a wall without friction, comes to rest in disorder, and is cut off at h0, 12 grains and more. It has
--- a friction of 0.5, on the floor too, and a rolling friction of 0.2: heaps of it stand at 25 degrees. The front is the
--- grain farthest out that hangs together with the heap, by gaps of at most half a grain; r its mean over 24 sectors.
--- What has rolled on alone has left it: 2 to 4 % of the grains.
+-- Grain falls into a frictionless wall, comes to rest in disorder, and is cut off at h0, at least 12 grains high. It
+-- has a friction of 0.5, also on the floor, and a rolling friction of 0.2, which gives heaps of 25 degrees. The front
+-- is the outermost grain connected to the heap by gaps of at most half a grain, and r is its mean over 24 sectors.
+-- Grains that rolled on by themselves are excluded: 2 to 4 % of the grains.
 --
 -- The rolling friction is fitted: at a = 1 and 12 grains along r0, the run-out is 1.59 with 0.05, 1.35 with 0.1, 1.14
--- with 0.2 and 0.98 with 0.4. Without any, heaps of spheres hardly stand, and their front thins out for ever.
+-- with 0.2 and 0.98 with 0.4. Without it, heaps of spheres hardly stand, and their front keeps thinning out.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
@@ -50,7 +50,7 @@ for k = 1, sides do
 end
 return chain:contact { friction = 0.5, spin = true, rolling = 0.2 } :solve { substeps = 8, iterations = 4 }]]
 
--- The points that hang together with the one nearest to the axis.
+-- Returns the points connected to the one nearest to the axis.
 local function heap_of(points)
   local gap = 0.5 * d
   local width, cells, list, nearest = 1.15 * d + gap, {}, {}, 1
@@ -97,7 +97,7 @@ local function runout(aspect, across)
   return (mean - r0) / r0
 end
 
--- Of columns { a, grains along r0 }, measured once.
+-- Columns { a, grains along r0 }, each measured once.
 local low, high = { { 0.7, 18 }, { 1, 14 }, { 1.5, 12 } }, { { 2, 12 }, { 3, 11 }, { 5, 9 } }
 local function runouts(columns)
   local aspects, list = {}, {}
@@ -108,7 +108,7 @@ local function runouts(columns)
   return aspects, list
 end
 
--- The factor of f(a) that fits best.
+-- Returns the best-fitting factor of f(a).
 local function factor(columns, f)
   local aspects, list = runouts(columns)
   local above, below = 0, 0

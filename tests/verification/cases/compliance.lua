@@ -1,5 +1,5 @@
--- Compliant rows as springs: two masses, stretched, against the cosine of the reduced mass; a weight that is let go on
--- a compliant pin.
+-- Compliant rows as springs: two stretched masses, compared with the cosine for their reduced mass, and a weight
+-- released on a compliant pin.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
@@ -16,7 +16,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {%.
   return list
 end
 
--- The largest error of the stretch in a second, of the first.
+-- Returns the largest error of the stretch in a second, relative to the initial stretch.
 local function error_of(substeps)
   local list, worst = lengths(substeps, 1, frames), 0
   for frame = 1, frames do

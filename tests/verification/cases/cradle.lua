@@ -1,4 +1,4 @@
--- Newton's cradle: a sphere at 1 m/s hits five that touch, all in one line, with a bounce of 1.
+-- Newton's cradle: a sphere at 1 m/s hits five touching spheres in line, with a bounce of 1.
 local scene = require "testing.scene"
 
 local r = 0.05

@@ -1,5 +1,5 @@
--- A double pendulum of masses 1 and 0.3 from 120 and 90 degrees, against Lagrange's equations, solved by Runge-Kutta's
--- fourth order with steps of 1e-5 s.
+-- A double pendulum with masses 1 and 0.3 from 120 and 90 degrees, compared with Lagrange's equations, solved by
+-- fourth-order Runge-Kutta with steps of 1e-5 s.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 

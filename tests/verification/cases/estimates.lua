@@ -1,11 +1,11 @@
--- The error that a run tells of its positions, by the true one: that from a run of 64 times the sub-steps, at the last
--- frame. Of more than 20 points 95 % are below it, of fewer it is the worst one's. Scenes whose points part from any
--- truth in time, as those of many contacts do, end before that: a run of 16 times the sub-steps must be within a
--- third of the true error of the truth.
+-- Compares the position error that a run reports with the true one, from a run with 64 times the sub-steps, at the last
+-- frame. For more than 20 points this is the 95th percentile, for fewer the worst point. Scenes whose points diverge
+-- from any reference in time, such as those with many contacts, end before that: a run with 16 times the sub-steps must
+-- differ from the truth by at most a third of the true error.
 local scene = require "testing.scene"
 local json = require "dkjson"
 
--- Numbers in [0, 1), evenly spread: u(i, k) for the point i.
+-- u(i, k) are evenly distributed numbers in [0, 1) for point i.
 local head = [[
 local function u(i, k) return (i * ({0.8191725134, 0.6710436067, 0.5497004779, 0.4503})[k]) % 1 end
 local function centred(i, k) return 2 * u(i, k) - 1 end
@@ -38,7 +38,7 @@ end
 local floor = { shape = rapid.shape.plane {}, bounce = 0, friction = 0.4 }
 ]]
 
--- Features, scene, sub-steps, frames that are solved, text; %d stands for the sub-steps.
+-- Features, scene, sub-steps, number of solved frames, text; %d is the number of sub-steps.
 local scenes = {
   { "distance, pin", "pendulum from 60 degrees", 4, 24, [[
 return hooked({ P = {{0, 0, 0}, {0.866, -0.5, 0}} }, 1) :gravity {} :distance { pairs = {{1, 2}} }
@@ -183,7 +183,7 @@ return from { P = grid(5, 5, 5, 0.4, {0, 0, 0.1}) } :gravity {} :spring { stiffn
   { "action", "an action of first order", 4, 24, [[
 return from { P = grid(5, 5, 5, 0.2, {0, 1, 0}) } :gravity {}
   :action("slow", function(p, step) p.v = p.v * (1 - 3 * step.dt) end) :solve { substeps = %d }]] },
-  -- Of functions of the frame %d stands for sub-frames.
+  -- In scenes with functions of the frame, %d is the number of sub-frames.
   { "wind, gravity", "wind and gravity that are functions of the frame, 1 sub-frame", 1, 24, [[
 return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P = grid(4, 4, 4, 0.2, {0, 0, 0}) } }
   :wind { drag = 2, velocity = function(f) return {8 * math.sin(5 * f.time), 0, 4 * math.cos(5 * f.time)} end }
@@ -246,7 +246,7 @@ return from { P = grid(6, 6, 6, 0.2, {0, 0.5, 0}) } :gravity {} :turbulence { am
   :collide { shape = rapid.shape.plane {}, method = "project", bounce = 0.4 } :solve { substeps = %d }]] },
 }
 
--- m, of a list of errors.
+-- Returns the error of a list in the form in which it is reported, m.
 local function told_of(errors)
   table.sort(errors)
   return errors[#errors > 20 and math.floor(0.95 * (#errors - 1)) + 1 or #errors]
@@ -261,7 +261,7 @@ local function distances(a, b)
   return list
 end
 
--- doubt: how far apart two references are, the finer of which is the truth, m.
+-- doubt: distance between two references, m; the finer one is the truth.
 local function ratio(told, real, doubt)
   assert(3 * doubt <= real, ("no truth: two references are %g m apart, the error is %g m")
     :format(doubt, real))
@@ -281,7 +281,8 @@ local function told_by_true(substeps, last, text)
     told_of(distances(found, truth)), told_of(distances(near, truth)))
 end
 
--- The same of the 40th frame of a column, of points that are too many for more. The truth begins where the frame does.
+-- Does the same for the 40th frame of a column, which has too many points for more frames. The reference starts with
+-- that frame.
 local function told_of_frame()
   local function text(set, substeps)
     return head .. ([[

@@ -1,12 +1,12 @@
--- 343 frictionless spheres in a box of elastic walls: energy and its equal parts, and Haff's law of cooling, beside the
--- same gas advanced event by event.
+-- 343 frictionless spheres in a box with elastic walls: energy, its equipartition, and Haff's law of cooling, compared
+-- with the same gas advanced event by event.
 local scene = require "testing.scene"
 local event_driven = require "tests.verification.event_driven"
 local lehmer = require "tests.lehmer"
 
-local side, r, half = 7, 0.05, 0.7 -- spheres along an edge; m
+local side, r, half = 7, 0.05, 0.7  -- spheres along an edge; m
 
--- On a lattice, with velocities of the mean speed `speed` from a fixed sequence, without momentum.
+-- Returns spheres on a lattice, with a fixed sequence of velocities of mean speed `speed` and without total momentum.
 local function start(speed)
   local P, v, random, mean, sum = {}, {}, lehmer.new(12345).random, { 0, 0, 0 }, 0
   local n = side ^ 3
@@ -15,7 +15,7 @@ local function start(speed)
     local place, velocity = {}, {}
     for k = 1, 3 do
       place[k] = (2 * half / side) * (cell[k] + 0.5) - half
-      -- A normal distribution, by Box and Muller.
+      -- A normal distribution (Box and Muller).
       velocity[k] = math.sqrt(-2 * math.log(random())) * math.cos(2 * math.pi * random())
       mean[k] = mean[k] + velocity[k] / n
     end

@@ -1,9 +1,10 @@
--- What a column of grain rests on the floor of a square silo of rough walls: Janssen's law. The floor is of grains that
--- compliant pins hold, so that their give is the load; it goes down by half a grain a second, so that the friction of
--- the walls is all upwards (Bertho, Giorgiutti-Dauphiné, Hulin 2003). The grains turn, as those of the law do.
+-- The load of a column of grain on the floor of a square silo with rough walls: Janssen's law. The floor consists of
+-- grains on compliant pins, whose displacement gives the load. It descends by half a grain per second, so that the
+-- friction of the walls acts upwards everywhere (Bertho, Giorgiutti-Dauphiné, Hulin 2003). The grains rotate, as the
+-- law assumes.
 local scene = require "testing.scene"
 
-local give, sinking, friction = 1e-3, 0.01, 0.3 -- m/N; m/s, from 3 s on; of the walls
+local give, sinking, friction = 1e-3, 0.01, 0.3  -- m/N; m/s, from 3 s on; friction of the walls
 local width, g = 0.2, 9.81 -- m
 
 local silo = [[
@@ -40,7 +41,7 @@ return chain
   :contact { friction = 0.3, spin = true }
   :solve { substeps = 12, iterations = 4, sleep = math.huge }]]
 
--- The height, the weight and the load on the floor, of so many layers: means of the fifth second. In m and N.
+-- Returns the height, weight and floor load for this number of layers, averaged over the fifth second, in m and N.
 local function loads(layers)
   local result = scene.run(silo, { frames = {97, 120},
     set = { layers = layers, friction = friction, give = give, sinking = sinking } })
@@ -57,7 +58,7 @@ local function loads(layers)
   return { height = top - bottom, weight = weight, load = load }
 end
 
--- Janssen's load of a column, with the length over which it is borne by the walls.
+-- Returns Janssen's load of a column, given the length over which the walls support it.
 local function janssen(column, length)
   return column.weight / column.height * length * (1 - math.exp(-column.height / length))
 end
@@ -68,7 +69,7 @@ local function worst(columns, length)
   return most
 end
 
--- The columns, and the length that fits them best; measured once.
+-- The columns and the best-fitting length, measured once.
 local measured
 local function fit()
   if measured then return unpack(measured) end

@@ -1,11 +1,11 @@
--- Elastic bounces within level sets, against the energy and the angular momentum that the shape's symmetry keeps.
+-- Elastic bounces inside level sets: the shape's symmetry conserves energy and angular momentum.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
 local count = 40
 
--- Points that bounce between two spheres (walls) or along a torus' inside for 2 s. The largest changes of v² and of
--- the angular momentum about y, of the first.
+-- Points bounce between two spherical walls or along the inside of a torus for 2 s. Returns the largest changes of v²
+-- and of the angular momentum about y, relative to their initial values.
 local function changes(shape)
   local P, v = {}, {}
   for i = 1, count do

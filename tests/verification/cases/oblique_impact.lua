@@ -1,8 +1,8 @@
--- Two frictionless spheres that hit each other at every angle, of masses 1:1 to 1:1000, against the closed form.
+-- Two frictionless spheres that collide at every angle, with masses 1:1 to 1:1000, compared with the closed form.
 --
--- Sphere 1 comes along x with the impact parameter b onto sphere 2, which is at rest; at the hit the line of centres
--- has the angle asin(b / 2r), and along it alone an impulse (1 + e) u / (1/m1 + 1/m2) acts. Pairs are far from each
--- other, and begin at distances that meet in all parts of a sub-step.
+-- Sphere 1 moves along x with the impact parameter b towards sphere 2, which is at rest. At the hit the line of centres
+-- has the angle asin(b / 2r), and an impulse (1 + e) u / (1/m1 + 1/m2) acts along it. Pairs are far from each other,
+-- and start at distances for which the hits are spread over all parts of a sub-step.
 local scene = require "testing.scene"
 
 local r, speed, pairs_of_angle, apart = 0.05, 2, 8, 3
@@ -21,10 +21,10 @@ local function hits()
   return list
 end
 
-local frames = 9 -- a third of a second: all have met
+local frames = 9  -- a third of a second, in which all pairs collide
 
--- The largest error of momentum, the largest gain of energy, both of that before, and the mean error of the places of
--- those that are hit, m.
+-- Returns the relative errors: the largest of momentum and the largest gain of energy; and the mean position error of
+-- the spheres that are hit, m.
 local function run(bounce, substeps)
   local P, v, mass, list = {}, {}, {}, hits()
   for _, hit in ipairs(list) do

@@ -1,8 +1,8 @@
--- Quadratic drag: alone a logarithm, with gravity a hyperbolic tangent, with linear drag an exponential.
+-- Quadratic drag: a logarithm by itself, a hyperbolic tangent with gravity, an exponential with linear drag.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
-local rounding = 3e-6 -- m, of some 10 m, over 50 frames
+local rounding = 3e-6  -- m, at about 10 m over 50 frames
 
 local function run(nodes, v, substeps, frames)
   return scene.run(([[
@@ -29,7 +29,7 @@ return {
     feature = "drag", law = "quadratic 0.3/m and linear 0.5/s, 40 m/s, 1 s, 16 sub-steps: error of the way",
     reference = "closed form", at_most = 1e-3, unit = "m", order = 2,
     measure = function()
-      -- v' = -k v - c v²: x = ln(1 + c v0 (1 - e^(-kt))/k)/c.
+      -- v' = -k v - c v² gives x = ln(1 + c v0 (1 - e^(-kt))/k)/c.
       local v, c, k = 40, 0.3, 0.5
       local expected, steps, errors = math.log(1 + c * v * (1 - math.exp(-k)) / k) / c, {}, {}
       for i, substeps in ipairs { 1, 2, 4, 8, 16 } do

@@ -1,10 +1,10 @@
--- Free rods without forces: a dumbbell that turns, two rods with a light hub, chains of masses over three decades.
--- Energy and angular momentum are those of the start.
+-- Free rods without forces: a spinning dumbbell, two rods with a light hub, chains with masses over three decades.
+-- Energy and angular momentum are conserved.
 local scene = require "testing.scene"
 local lehmer = require "tests.lehmer"
 
--- Of all frames: the largest gain and loss of energy, of the first frame's, and the largest change of angular
--- momentum, of its length.
+-- Returns, over all frames, the largest gain and loss of energy relative to the first frame, and the largest relative
+-- change of angular momentum.
 local function changes(result)
   local first_energy, first_spin, gain, loss, turn = nil, nil, 0, 0, 0
   for _, points in result:frames() do
@@ -21,7 +21,7 @@ local function changes(result)
 end
 
 local substeps = 4
-local omega = 0.2 * 24 * substeps -- 1/s: a fifth of a radian in a sub-step
+local omega = 0.2 * 24 * substeps  -- 1/s: a fifth of a radian per sub-step
 
 local function dumbbell()
   return changes(scene.run(([[
@@ -31,8 +31,8 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{-0.5, 0, 0}, 
     { frames = {1, 241} }))
 end
 
--- Ends of 1 kg that part until the rods are straight, and the hub between them is thrown to the other side. The hub's
--- first velocity is the one that both rods allow. Of several speeds the worst, by each measure.
+-- Two masses of 1 kg separate until the rods are straight, and the hub between them is flung to the other side. The
+-- hub's initial velocity is the one that both rods allow. Returns the worst of several speeds for each measure.
 local function light_hub(count)
   local worst = { gain = 0, loss = 0, turn = 0 }
   for _, speed in ipairs { 1, 3, 10 } do
@@ -50,8 +50,8 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{-0.5, 0, 0}, 
   return worst
 end
 
--- Twenty chains of five rods each, far apart: the worst of them by each measure. Velocities begin with what the rods
--- allow: each chain turns as a whole, and along.
+-- Twenty chains of five rods each, far apart. Returns the worst for each measure. Initial velocities are consistent
+-- with the rods: each chain rotates and translates as a whole.
 local function chains()
   local worst, random = { gain = 0, loss = 0, turn = 0 }, lehmer.new(99).random
   for _ = 1, 20 do

@@ -1,10 +1,10 @@
--- A rope that falls from the horizontal, held at one end, and swings: it never has more energy than at first, nor much
--- less. The same as it is seen from a hook that goes along uniformly: there the solver has no bound on the energy of an
--- island, so that the forces of the rods alone must keep it.
+-- A rope held at one end falls from the horizontal and swings. It must never gain energy and lose little. The same is
+-- done with a uniformly moving hook, in its frame. There the solver has no bound on the energy of an island, so the
+-- forces of the rods must conserve it.
 local scene = require "testing.scene"
 
--- The most and the least by which energy has changed since the start, of half the rope's weight times its length. u:
--- the velocity of the hook, m/s.
+-- Returns the largest and smallest change of energy since the start, relative to half the rope's weight times its
+-- length. u: velocity of the hook, m/s.
 local function swing(u)
   local count, size, m, g = 30, 1 / 30, 0.1, 9.81
   local P, v, pairs_text = {}, {}, {}

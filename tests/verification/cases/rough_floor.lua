@@ -1,5 +1,5 @@
--- Points that turbulence of 50 m/s² drives over a rough plane without bounce, beside an integration of their own: free
--- flight, landing, Coulomb's friction as a differential inclusion (Filippov), lifting off.
+-- Points driven by turbulence of 50 m/s² over a rough plane without bounce, compared with a separate integration: free
+-- flight, landing, Coulomb friction as a differential inclusion (Filippov), lift-off.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
@@ -13,8 +13,8 @@ return rapid.create { fps = 24, points = %s }
     friction, substeps), { frames = {frames, frames} })[frames]
 end
 
--- Steps of 40 µs, each with the acceleration of its middle. A step is parted where the point lands and where friction
--- stops it. Kernels have the noise; the solver takes no part, as v stays 0.
+-- Steps of 40 µs, each with the acceleration of its midpoint. A step is split when the point lands and when friction
+-- stops it. The noise comes from kernels; the solver is inactive, as v stays 0.
 local function reference()
   return scene.run(([[
 local steps, mu = 1024, %g

@@ -1,11 +1,11 @@
--- How fast grain runs out of a slot in the flat floor of a silo that is thin: Beverloo's law for slots,
+-- How fast grain flows out of a slot in the flat floor of a thin silo: Beverloo's law for slots,
 --
---   W = C rho sqrt(g) l (D - k d)^(3/2)        D the slot's width, l its length, d the grain, rho the bulk density
+--   W = C rho sqrt(g) l (D - k d)^(3/2)    D the slot's width, l its length, d the grain size, rho the bulk density
 --
--- The silo is 40 grains wide and 5 thick, without friction at its front and back. W^(2/3) is a straight line over D,
--- whose slope is C^(2/3), whatever k. With k taken to be 1.4 the same flows have a C of 0.73 at 6 grains and of 0.83 at
--- 13: narrow slots are slower than the law, as Mankoc et al. 2007 found. That is for the density: grains are looser in
--- the slot than in the bulk, and the looser the narrower it is. With the density that is there C is the same at all D.
+-- The silo is 40 grains wide and 5 thick, with frictionless front and back. W^(2/3) is linear in D, with the slope
+-- C^(2/3) for any k. Assuming k = 1.4, the same flows give C = 0.73 at 6 grains and 0.83 at 13: narrow slots are slower
+-- than the law, as Mankoc et al. 2007 found. The cause is the density: grains are looser in the slot than in the bulk,
+-- and the narrower the slot, the looser they are. With the local density C is the same for all D.
 local scene = require "testing.scene"
 local matrix = require "tests.verification.matrix"
 
@@ -38,7 +38,7 @@ end
 wall(function(frame) if frame.number < 37 then return rapid.shape.plane {} end end, 0.3) -- until all are at rest
 return chain:contact { friction = 0.3 } :solve { substeps = 12, iterations = 4 }]]
 
-local opens, begins, ends = 36, 42, 54 -- frames: the flow is steady after a quarter of a second
+local opens, begins, ends = 36, 42, 54  -- frames; the flow is steady after a quarter of a second
 
 local function inside(points)
   local count = 0
@@ -48,7 +48,7 @@ local function inside(points)
   return count
 end
 
--- Grains in a box of the silo, of all its thickness, by its volume.
+-- Returns the volume fraction of grains in a box that spans the thickness of the silo.
 local function density(points, low, high, half_width)
   local count = 0
   for i = 1, #points do
@@ -58,8 +58,8 @@ local function density(points, low, high, half_width)
   return count / ((high - low) * 2 * half_width * depth)
 end
 
--- Volume of bulk a second, per sqrt(g) and length of the slot: C (D - k d)^(3/2). And the density just above the slot,
--- by that of the bulk.
+-- Returns the bulk volume per second, divided by sqrt(g) and the length of the slot: C (D - k d)^(3/2). Also returns
+-- the density just above the slot, relative to the bulk.
 local function flow_of(gap, seed)
   local result = scene.run(silo, { frames = {opens, ends}, set = { gap = gap, seed = seed } })
   local bulk, at_slot = density(result[opens], 5 * d, 25 * d, width / 2), 0
@@ -70,7 +70,8 @@ local function flow_of(gap, seed)
   return rate / bulk / depth / math.sqrt(g), at_slot / bulk
 end
 
--- The mean of four silos: of one, the exponent below has a standard deviation of 0.035 (of ten seeds, 1.57 to 1.69).
+-- Returns the mean of four silos. For a single one the exponent below has a standard deviation of 0.035 (ten seeds:
+-- 1.57 to 1.69).
 local function flow(gap)
   local rate, looser, seeds = 0, 0, 4
   for seed = 1, seeds do
@@ -90,7 +91,7 @@ local function flows()
   return measured.gaps, measured.flows, measured.looser
 end
 
--- C of each slot by the density that is there, with k = 1.4: the least, the mean and the largest.
+-- Returns C for the local density of each slot, with k = 1.4: minimum, mean and maximum.
 local function local_coefficient()
   local gaps, list, looser = flows()
   local least, mean, most = math.huge, 0, 0
@@ -116,7 +117,7 @@ return {
     feature = "contact, collide", law = "the same: coefficient C", reference = "1.03, Nedderman 1992",
     at_least = 0.8, at_most = 1.25, long = true,
     measure = function()
-      -- The slope of the line that fits W^(2/3) over D best.
+      -- The slope of the best linear fit of W^(2/3) over D.
       local gaps, list = flows()
       local n, sx, sy, sxx, sxy = #gaps, 0, 0, 0, 0
       for i = 1, n do

@@ -1,9 +1,10 @@
--- A point on a slope, alone and among the coupled: at rest below the angle of friction, else with g (sin - mu cos).
+-- A point on a slope, alone and among coupled points: at rest below the angle of friction, otherwise accelerating with
+-- g (sin - mu cos).
 local scene = require "testing.scene"
 
 local g, mu, frames = 9.81, 0.4, 25
 
--- How far a point from rest has come down a slope of so many degrees in a second. extra: nodes.
+-- Returns how far a point slides down a slope of this angle in a second, starting at rest. extra: nodes.
 local function way(degrees, extra)
   local angle = math.rad(degrees)
   local result = scene.run(([[

@@ -1,9 +1,9 @@
--- Balls that turn: from sliding to rolling, down slopes, against rolling friction; impacts that turn them.
+-- Spinning balls: from sliding to rolling, down slopes, against rolling friction, and impacts that spin them.
 local scene = require "testing.scene"
 
 local g, r = 9.81, 0.1
 
--- One ball on a slope of so many degrees, by frames.
+-- Returns the run of one ball on a slope of this angle.
 local function ball(degrees, options)
   local angle = math.rad(degrees)
   local text = [[
@@ -18,7 +18,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = { n * 0.1 }, v 
   return scene.run(text, { frames = {1, 97} })
 end
 
--- The largest error of the speed of a ball that begins to slide at 3 m/s, over two seconds.
+-- Returns the largest speed error of a ball that starts sliding at 3 m/s, over two seconds.
 local function sliding()
   local v, mu, worst = 3, 0.2, 0
   local result = ball(0, { SPEED = v, TURNING = 0, FRICTION = mu, ROLLING = 0 })
@@ -28,7 +28,7 @@ local function sliding()
   return worst
 end
 
--- The largest error of the way that a ball from rest has rolled down a slope in a second, of that way.
+-- Returns the largest relative error of the distance that a ball from rest rolls down a slope in a second.
 local function rolling()
   local worst = 0
   for _, degrees in ipairs { 5, 20, 40, 60, 80 } do
@@ -40,14 +40,14 @@ local function rolling()
   return worst
 end
 
--- How far a ball at 1 m/s rolls until rolling friction stops it, as a part of what it should be, less 1.
+-- Returns the relative error of the distance that a ball at 1 m/s rolls until rolling friction stops it.
 local function stopping()
   local result = ball(0, { SPEED = 1, TURNING = 1 / r, FRICTION = 0.5, ROLLING = 0.05 })
   return math.abs(result[97][1].P.x / (7 / (10 * 0.05 * g)) - 1)
 end
 
--- A cloud of 64 grains of many radii and masses that turn and fly into each other: the largest gain of energy in a
--- frame, and the largest changes of momentum and angular momentum, as parts of what is in motion.
+-- Runs a cloud of 64 spinning grains of many radii and masses that collide. Returns the largest energy gain in a frame,
+-- and the largest changes of momentum and angular momentum, relative to the motion.
 local measured
 local function cloud()
   if measured then return measured end

@@ -1,6 +1,7 @@
--- What `tolerance` promises: no point is further than it from its path after a frame, but those that are told to need
--- more than `max_substeps`. The scenes are hard for step doubling: near singular axes and centres, at jumps, with
--- forces that runs of n, 2n, 4n sub-steps meet at the same phase, at contacts. The truth is a run of 8,192 sub-steps.
+-- The promise of `tolerance`: after a frame no point is further than this from its exact path, except points that are
+-- reported to need more than `max_substeps`. The scenes are hard for step doubling: near singular axes and centres, at
+-- jumps, with forces that runs of n, 2n, 4n sub-steps sample at the same phase, at contacts. The reference is a run of
+-- 8,192 sub-steps.
 local scene = require "testing.scene"
 local json = require "dkjson"
 
@@ -32,8 +33,8 @@ end
 
 local turns, moves = box "rapid.rotate({0, 0, 1}, 400 * f.time)", box "rapid.translate(6 * f.time, 0, 0)"
 
--- Of each: its name, its nodes, the tolerance (m), and whether doubling sees all of the error, so that nearly no point
--- needs to be told.
+-- Each has a name, nodes, the tolerance (m), and whether step doubling sees the whole error, so that almost no point
+-- needs to be reported.
 local scenes = {
   { "a vortex", ":vortex { strength = 20 }", 1e-3, true },
   { "a vortex", ":vortex { strength = 20 }", 1e-5 },
@@ -61,7 +62,7 @@ local scenes = {
   { "drag about a box that moves", ":gravity {} :drag { linear = 1 } " .. moves, 1e-4 },
 }
 
--- The part of the points that are beyond the tolerance, less those that are told; and the part that is told.
+-- Returns the fraction of points beyond the tolerance that are not reported, and the fraction that is reported.
 local function parts(nodes, tolerance)
   local function text(solve) return head .. nodes .. " :solve { " .. solve .. " }" end
   local given = ("tolerance = %g, max_substeps = 1024"):format(tolerance)

@@ -114,7 +114,8 @@ void parents(benchmark::State& state, const char* birth, const char* event)
             v[i] = {0, 24, 0};
         }
     }
-    *source->record = {1.0 / 24, 1.0 / 24, 0, before, {}, {}, {}, {}, {}, true};
+    source->record->time = source->record->h = 1.0 / 24;
+    source->record->before = before;
 
     const Registry registry;
     const Node chain{&registry.at("create"), "create1", {}, 0, {}, {}};

@@ -65,7 +65,7 @@ public:
     Cell cell_at(const Vec3d& X) const;
     // Returns the spheres in a cell and its neighbours. The cell may be empty.
     Runs around(const Cell& cell) const;
-    // Returns the spheres in the cells `first` to `last` of a row and in their neighbours. Both end cells hold spheres.
+    // Returns the spheres in the occupied cells of keys `first` to `last`, part of a row, and in their neighbours.
     Runs around(std::uint64_t first, std::uint64_t last) const
     {
         Runs runs;
@@ -83,9 +83,9 @@ public:
         return runs;
     }
 
-    // Calls f(begin, end, first, last) for stretches of the spheres `begin` to `end`: consecutive occupied cells of a
-    // row, from key index `first` to `last`. A stretch groups cells until it has a few spheres, so that neighbours are
-    // looked up once for all of them.
+    // Calls f(begin, end, first, last) for stretches of the spheres `begin` to `end`. A stretch is a run of occupied
+    // cells of a row, `first` to `last`, that ends once it has a few spheres. Their neighbours can be looked up
+    // together.
     template <class F>
     void for_each_stretch(std::size_t begin, std::size_t end, const F& f) const
     {

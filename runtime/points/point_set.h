@@ -101,8 +101,8 @@ public:
     // Adds n points: every column gets its fallback value (P and v zero), groups 0, and ids -1 until the caller sets
     // them.
     void append(std::size_t n);
-    // Also sets `values` in the named columns and membership in the named groups, all of which must exist. A column
-    // that is uniform with the same value stays uniform.
+    // Adds n points with these values in the named columns, as members of the named groups, all of which must exist.
+    // A column that is uniform with the same value stays uniform.
     void append(std::size_t n, const std::vector<AttributeSpec>& values, const std::vector<std::string>& groups);
 
     // Removes the points whose mask is 0, shape [size]; the others keep their order. Columns are compacted in parallel.

@@ -145,7 +145,7 @@ private:
     }
 
     // Returns the contact of a path that starts inside. If the field has no gradient there (beyond a level set's band),
-    // the point moves straight back along its path (paper §4.1) until the field has one or the point is outside.
+    // the point moves straight back, against its velocity (paper §4.1), until the field has one or it is outside.
     Contact inside(const Path& path, double f, const Vec3d& gradient) const
     {
         Contact contact;

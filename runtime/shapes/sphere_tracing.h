@@ -68,7 +68,7 @@ public:
 
 private:
     static constexpr int most = 64;
-    static constexpr double much_faster = 64, a_world = 1e6;  // the distance is in features
+    static constexpr double much_faster = 64, a_world = 1e6;  // ratio of speeds; distance in features
     // Fraction of the predicted step that is used; largest slope away from the surface and longest step, in D, that are
     // relied on.
     static constexpr double cautious = 0.9, flattest = 0.9, farthest = 4;

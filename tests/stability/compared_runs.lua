@@ -5,10 +5,12 @@
 --     { name = "one", lines = "rapid run $SCENE -f 1-4 -o a.####.csv --threads 1" }, ... })
 --
 -- A way consists of shell lines and stops at the first one that fails. `fault` is nil if all ways end with the status
--- of the first one and, if that is 0, with the same files, otherwise with the same last message: FILE:LINE: node
--- "NAME": what is wrong. Fields of a way: files = false if it leaves none; except, a pattern of files that it lacks;
--- is_part, if it runs parts, in which another point may fail first, and which may be refused. The contents of the
--- folder `aside` are not compared.
+-- of the first one and, if that is 0, with the same files, otherwise with the same last message, which must have the
+-- form FILE:LINE: node "NAME": MESSAGE. The contents of the folder `aside` are not compared. Fields of a way:
+--
+--   files     false if it leaves none
+--   except    a pattern of files that it lacks
+--   is_part   true if it runs parts, in which another point may fail first, and which may be refused
 local command = require "testing.command"
 
 local compared_runs = {}

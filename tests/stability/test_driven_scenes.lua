@@ -110,9 +110,9 @@ describe(("random scenes of coupled points (%d of seed %d)"):format(scenes, seed
     end)
   end)
 
-  -- Rods beside springs that no sub-step resolves, on pins; rods whose points go along with a pin; points backtracked
-  -- to a plane that accelerates; rods and neighbours that stick to shapes; pinned points that shapes pass through;
-  -- springs through the middle of a ball; rods beside a box that `project` puts points out of, on stiff springs; heavy
+  -- Their features: pinned rods next to springs that no sub-step resolves; rods whose points move with a pin; points
+  -- backtracked to an accelerating plane; rods and neighbours that stick to shapes; pinned points that shapes pass
+  -- through; springs through the centre of a ball; rods on stiff springs next to a box with method `project`; heavy
   -- grains on light ones; rods on springs to a sphere that no sub-step resolves.
   it("that were wrong on earlier code are right", function()
     none_of(gains, driven_scenes.together, {

@@ -229,8 +229,8 @@ struct DeformingField {
         return contact;
     }
 
-    // The step is free of the surface, or a quarter of a voxel of travel relative to its nearest part. It is at most a
-    // voxel, in case another part approaches.
+    // Returns a step that is free of the surface. If a quarter of a voxel of travel relative to the nearest part takes
+    // longer, it returns that, limited to one voxel of closing distance because another part may approach.
     double step(double s, const Sample& here) const
     {
         const double fastest = std::max(path.velocity(s).norm(), path.velocity(path.duration).norm()) + body.fastest();

@@ -44,7 +44,7 @@ TEST_CASE("each voxel of a mesh's band has the distance to the nearest triangle,
         std::set<std::tuple<int, int, int>> near;
         std::array<float, MeshBand::voxels> distance;
         std::array<std::int32_t, MeshBand::voxels> nearest;
-        // Only a sample, because large triangles have many voxels.
+        // Tests a sample of the blocks, because large triangles have many voxels.
         const std::size_t every = 1 + band.size() / 40;
         for (std::size_t b = 0; b < band.size(); ++b) {
             const Eigen::Vector3i origin = band.origin(b);

@@ -73,8 +73,8 @@ struct Quarters {
     }
 };
 
-// Minimax polynomials of z = r²: (sin r - r) / r³ and (cos r - 1 + z/2) / z². Their error is at most 2e-17 relative to
-// the sum that they are part of.
+// Evaluate minimax polynomials in z = r²: (sin r - r) / r³ and (cos r - 1 + z/2) / z². Their error is at most 2e-17
+// relative to the sum that they are part of.
 template <class T>
 [[gnu::always_inline]] inline T sine_series(const T& z)
 {

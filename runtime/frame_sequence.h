@@ -40,7 +40,7 @@ struct FrameSequence {
         return std::nullopt;
     }
 
-    // The range of frames in which the file may change.
+    // Return the range of frames in which the file may change.
     double begins() const { return goes_on(before) ? -infinite : static_cast<double>(first + offset); }
     double ends() const { return goes_on(after) ? infinite : static_cast<double>(last + offset); }
 

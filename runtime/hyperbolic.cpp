@@ -12,7 +12,7 @@ using Parts = DoubleDouble<double>;
 constexpr double small = 0.25;  // below it e^x and e^-x cancel; the series are short
 constexpr double large = 22;    // above it e^-x is below the last digit of e^x
 
-// Taylor series. Precondition: |x| < small.
+// Computes a Taylor series. Precondition: |x| < small.
 Parts sine_of_small(double x)
 {
     constexpr double s[] = {1 / 6.0, 1 / 120.0, 1 / 5040.0, 1 / 362880.0, 1 / 39916800.0, 1 / 6227020800.0};

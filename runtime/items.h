@@ -12,9 +12,9 @@ namespace rapid {
 
 class Items {
 public:
-    // first, first + 1, ...
+    // Creates the items first, first + 1, ...
     Items(std::uint64_t first) : first_(first) {}
-    // first + offsets[0], first + offsets[1], ...; the offsets must outlive it.
+    // Creates the items first + offsets[0], first + offsets[1], ...; the offsets must outlive them.
     Items(std::uint64_t first, const std::uint32_t* offsets) : first_(first), offsets_(offsets) {}
 
     std::uint64_t operator[](std::size_t i) const { return first_ + (offsets_ ? offsets_[i] : i); }

@@ -12,7 +12,7 @@ public:
     static constexpr std::string_view param_type = "object";
     virtual ~Object() = default;
 
-    // Its name in messages: "mesh", "level set", "shape", "points", "motion", "function".
+    // Returns its name in messages: "mesh", "level set", "shape", "points", "motion", "function".
     virtual std::string_view kind() const = 0;
 
     // Returns true if it changes with time, such as a motion that is not constant, or an object that one moves.

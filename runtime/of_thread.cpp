@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Key of the list of objects that a thread keeps, latest first.
+// Returns the key of the list of objects that a thread keeps, latest first.
 pthread_key_t key_of_kept()
 {
     static const pthread_key_t key = [] {

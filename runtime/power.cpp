@@ -44,7 +44,7 @@ Doubles by_registers_of_both(const Doubles& x, const Doubles& y, const F& f)
     return std::bit_cast<Doubles>(a);
 }
 
-// C's pow(x, 0.5) differs from sqrt(x) at -0 and -infinity.
+// Returns pow(x, 0.5), which differs from sqrt(x) at -0 and -infinity.
 double power_of_half(double x) { return x == -HUGE_VAL ? HUGE_VAL : std::sqrt(x) + 0.0; }
 
 // Replaces the marked lanes of `value` by f(lane).

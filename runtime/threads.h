@@ -9,7 +9,8 @@ namespace rapid {
 
 class Threads {
 public:
-    // 0: one per processor of the machine. Larger counts are honoured, too, so that tests can show their effects.
+    // count: number of threads; 0 means one per processor of the machine. Larger counts are honoured, too, so that
+    // tests can show their effects.
     explicit Threads(int count)
         : count_(count > 0 ? count : tbb::info::default_concurrency()),
           limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count_)),

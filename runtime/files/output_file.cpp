@@ -189,7 +189,7 @@ public:
     HiddenName& operator=(const HiddenName&) = delete;
 
     const char* c_str() const { return path_.c_str(); }
-    // Call this once a file of that name exists.
+    // Throws Error if the process is about to end. Call this once a file of that name exists.
     void check_not_ending() const
     {
         if (ending) throw ending_error();
@@ -245,7 +245,7 @@ void OutputFile::open_hidden()
     }
 }
 
-// If the file system has no locks, other processes cannot get one either.
+// Locks the file. If the file system has no locks, other processes cannot get one either.
 void OutputFile::lock()
 {
     while (::flock(descriptor_.number(), LOCK_EX) != 0 && errno == EINTR) {
@@ -323,7 +323,7 @@ bool OutputFile::finish_unless_taken()
     return true;
 }
 
-// The name survives a power cut only if the folder is synchronised too.
+// Makes the name survive a power cut, which requires that the folder is synchronised too.
 void OutputFile::keep_name()
 {
     remember_own(descriptor_.number());

@@ -37,7 +37,7 @@ public:
     // Writes after the bytes appended so far. Single-threaded.
     void append(const void* data, std::size_t bytes);
     std::uint64_t appended() const { return appended_; }
-    // For another program that writes the file.
+    // Returns the descriptor, for another program that writes the file.
     int descriptor() const { return descriptor_.number(); }
 
     // Names the file and replaces any other file of that name. Throws Error if the file system reports a delayed
@@ -66,7 +66,7 @@ private:
 // Returns true if the file is unchanged and among the last that this process wrote.
 bool is_own_file(const std::filesystem::path& path);
 
-// From now on finish() returns only when the file is on the disk (fsync), so that it survives a power cut.
+// Makes finish() return only when the file is on the disk (fsync), so that it survives a power cut.
 void make_files_durable();
 
 // Another program that writes an unfinished file and that remove_unfinished_files() kills. Must be destroyed before the

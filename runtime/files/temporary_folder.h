@@ -8,7 +8,8 @@ namespace rapid {
 
 class TemporaryFolder {
 public:
-    // Created in the system's temporary folder. `purpose` is part of its name, and of the error if it can't be created.
+    // Creates the folder in the system's temporary folder. `purpose` is part of its name, and of the error if it can't
+    // be created.
     explicit TemporaryFolder(const std::string& purpose);
     ~TemporaryFolder();
     TemporaryFolder(const TemporaryFolder&) = delete;

@@ -119,7 +119,7 @@ constexpr std::int32_t polygon = 1;
 constexpr std::uint32_t run_of_primitives = 0xffffffff;
 constexpr char closed_mark = '<', open_mark = ':';
 
-// Bytes of a point index in a primitive.
+// Returns the bytes of a point index in a primitive.
 constexpr std::size_t number_bytes(std::size_t points) { return points < 65536 ? 2 : 4; }
 
 std::string line_section(const PointLines& lines)

@@ -38,10 +38,10 @@ struct Comparison {
     bool same = true;
 };
 
-// P is the same within `tolerance` times the diagonal of the joint bounding box. Other floats are the same within
-// `tolerance` times the larger of the two values (norms of vectors), and integers and groups only if equal. An integer
-// and a float attribute are compared by value, because .csv does not distinguish them. An attribute of only one set is
-// a difference, unless there are no points.
+// Compares by id. P is the same within `tolerance` times the diagonal of the joint bounding box. Other floats are the
+// same within `tolerance` times the larger of the two values (norms of vectors), and integers and groups only if equal.
+// An integer and a float attribute are compared by value, because .csv does not distinguish them. An attribute of only
+// one set is a difference, unless there are no points.
 Comparison compare(const PointSet& a, const PointSet& b, double tolerance = 1e-6);
 std::string to_text(const Comparison& comparison);
 std::string to_json(const Comparison& comparison);  // one object on one line

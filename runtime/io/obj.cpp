@@ -76,8 +76,8 @@ private:
     std::string_view line_;
 };
 
-// A line takes at least two bytes per position. A growing list briefly takes three times its size, before the columns
-// are created.
+// Throws Error if that many positions do not fit in memory. A line takes at least two bytes per position. A growing
+// list briefly takes three times its size, before the columns are created.
 void check_memory(std::size_t places)
 {
     constexpr double bytes_a_place = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);

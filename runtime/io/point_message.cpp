@@ -28,7 +28,7 @@ Column<T> receive_column(std::size_t points, MessageReader& message)
     return column;
 }
 
-// The other process has its own tokens, so strings are sent.
+// Sends the strings, because the other process has its own tokens.
 void send_column(const Column<Token>& column, MessageWriter& message)
 {
     const TextTable table = text_table(column);

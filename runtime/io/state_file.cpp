@@ -80,7 +80,7 @@ bool is_worth_packing(const Raw& raw)
 
 [[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
 
-// A piece as large as its content is stored uncompressed.
+// Decompresses a piece. One as large as its content is stored uncompressed.
 void unpack(std::string_view piece, char* data, std::size_t bytes)
 {
     if (piece.size() == bytes) {

@@ -302,7 +302,8 @@ private:
         ++at_;
     }
 
-    // A number takes at least two bytes of text, and more memory while its array grows and is converted to a column.
+    // Throws Error if the array is too large. A number takes at least two bytes of text, and more memory while its
+    // array grows and is converted to a column.
     void check_memory(const UsdArray& array) const
     {
         if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))

@@ -26,7 +26,7 @@ public:
 
     // Returns the leaves that have points, in tree order.
     const std::vector<VdbLeaf>& leaves() const { return leaves_; }
-    // The k-th point in order is points() at place(k).
+    // Returns the points. The k-th one in order is at place(k).
     const PointSet& points() const { return points_; }
     std::size_t place(std::size_t k) const { return is_sorted_ ? k : static_cast<std::uint32_t>(entries_[k]); }
 

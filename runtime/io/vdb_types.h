@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// Must be called before any other use of OpenVDB.
+// Registers OpenVDB's types. Must be called before any other use of OpenVDB.
 inline void initialize_openvdb()
 {
     static const bool done = (openvdb::initialize(), true);

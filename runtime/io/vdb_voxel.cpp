@@ -58,8 +58,9 @@ std::size_t occupied_cells(const std::vector<Vec3f>& sample, int exponent)
 
 }  // namespace
 
-// A sample of the points gives the width of a cell that contains several of them, and the dimension (line, surface,
-// volume) with which their number grows with the width. The width of a cell with leaf_points points follows from these.
+// Estimates the size from a sample of the points. The sample gives the width of a cell that contains several of them,
+// and the dimension (line, surface, volume) with which their number grows with the width. The width of a cell with
+// leaf_points points follows from these.
 int voxel_exponent(const PointSet& points)
 {
     const double largest = largest_coordinate(points);

@@ -146,7 +146,7 @@ Attribute attribute_of(const VdbOrder& order, const Column<T>& column, const Tex
     return result;
 }
 
-// An attribute that stores up to eight groups, one bit per point for each.
+// Returns an attribute that stores up to eight groups, one bit per point for each.
 Attribute attribute_of_groups(const VdbOrder& order, const std::vector<std::pair<int, Strided<std::uint8_t>>>& bits)
 {
     const auto value = [bits](std::size_t place) {
@@ -462,8 +462,8 @@ public:
     }
 };
 
-// OpenVDB gives each file a random UUID, so that equal points would give different bytes. This one is a hash of the
-// frame and a sample of its positions.
+// Returns a hash of the frame and a sample of its positions as the file's UUID. OpenVDB would use a random one, so that
+// equal points would give different bytes.
 std::string file_uuid(const PointSet& points, const FrameInfo& frame)
 {
     std::uint64_t hash = 14695981039346656037ull;

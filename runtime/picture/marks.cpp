@@ -307,7 +307,7 @@ private:
         if (!m.additive) pixel.open *= 1 - cover;
     }
 
-    // Only discs of several pixels are shaded as balls.
+    // Returns how round a mark is shaded. Only discs of several pixels are shaded as balls.
     static float roundness_of(const Mark& m)
     {
         return m.additive ? 0 : std::clamp((m.radius - 1.2f) / 2.5f, 0.0f, 1.0f);
@@ -367,7 +367,7 @@ private:
         });
     }
 
-    // A pixel belongs to only one of two consecutive segments.
+    // Draws a segment of a trail. A pixel belongs to only one of two consecutive segments.
     template <bool hidden>
     void line(const Mark& m)
     {

@@ -25,7 +25,7 @@ public:
     // Returns true if there have been points. Before that the view shows only the shapes and may still jump.
     bool settled() const { return most_points_ > 0; }
 
-    // The complete state for the following views.
+    // Serialises the complete state for the following views.
     template <class Archive>
     void serialize(Archive& keep)
     {

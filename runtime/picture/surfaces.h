@@ -46,7 +46,8 @@ struct SurfaceTile {
     Box3f cells;  // bounds of the positions in the shadow grid
 };
 
-// Memory of the tiles per pixel. With colliders: of pixels that show one and that the lamp may reach.
+// Returns the memory of the tiles per pixel. With colliders, it applies to a pixel that shows one and that the lamp may
+// reach.
 constexpr double surface_bytes_a_pixel(bool colliders)
 {
     constexpr double open = sizeof(Vec3f) + 3;

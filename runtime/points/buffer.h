@@ -32,7 +32,7 @@ public:
 
     // Drops the first `bytes` without moving the rest: data() then points to the bytes after them.
     void give_up(std::size_t bytes);
-    // Bytes dropped by give_up(), plus the stagger of less than a page.
+    // Returns the bytes dropped by give_up(), plus the stagger of less than a page.
     std::size_t given_up() const { return block_ ? static_cast<char*>(data_) - static_cast<char*>(block_) : 0; }
     // Makes the dropped bytes available again, except for the stagger: the first byte is 64-byte aligned again. Nothing
     // is moved.

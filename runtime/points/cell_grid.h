@@ -103,13 +103,13 @@ public:
         }
     }
 
-    // The stored cells (the occupied ones if the grid is sparse), with the key and the spheres of each.
+    // Access the stored cells (the occupied ones if the grid is sparse), with the key and the spheres of each.
     std::size_t cells() const { return begin_.empty() ? 0 : begin_.size() - 1; }
     std::size_t cell_of_sphere(std::size_t sphere) const;
     std::uint64_t key(std::size_t cell) const { return dense_ ? cell : key_[cell]; }
     std::uint32_t begin(std::size_t cell) const { return begin_[cell]; }
     std::uint32_t end(std::size_t cell) const { return begin_[cell + 1]; }
-    // Key differences between consecutive rows and between consecutive layers.
+    // Return the key differences between consecutive rows and between consecutive layers.
     std::uint64_t row_step() const { return static_cast<std::uint64_t>(count_[0]); }
     std::uint64_t layer_step() const { return row_step() * static_cast<std::uint64_t>(count_[1]); }
 

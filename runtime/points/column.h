@@ -73,7 +73,7 @@ public:
     const T& fallback() const { return fallback_; }
     void set_fallback(const T& value) { fallback_ = value; }
 
-    // Memory of the values. A column shared with another set counts in both.
+    // Returns the memory of the values. A column shared with another set counts in both.
     std::size_t bytes() const { return values_ ? size_ * sizeof(T) : sizeof(T); }
 
     // Returns true if both columns use the same memory, or both are uniform.

@@ -28,7 +28,7 @@ public:
         return *this;
     }
 
-    // New values are indeterminate. Throws std::bad_alloc.
+    // Resizes the array. New values are indeterminate. Throws std::bad_alloc.
     void resize(std::size_t size)
     {
         if (size > Buffer::max_bytes / sizeof(T)) throw std::bad_alloc();

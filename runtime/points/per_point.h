@@ -22,8 +22,8 @@ struct PerPoint {
         return result;
     }
 
-    // Valid while this parameter and the set's column stay unchanged. Throws Error if the attribute does not exist or
-    // has another type.
+    // Returns the values. Valid while this parameter and the set's column stay unchanged. Throws Error if the attribute
+    // does not exist or has another type.
     Strided<T> read(const PointSet& points) const
     {
         if (attribute.empty()) return {&constant, 0};

@@ -117,7 +117,7 @@ public:
     // Moves point order[i] to index i. `order` is a permutation, shape [size].
     void reorder(std::span<const std::uint32_t> order);
 
-    // Bytes of all columns and groups.
+    // Returns the bytes of all columns and groups.
     std::size_t bytes() const;
 
     std::map<std::string, DetailValue, std::less<>> details;

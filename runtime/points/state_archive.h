@@ -188,11 +188,11 @@ void load(StateReader& from, Column<T>& column)
 void save(StateWriter& to, const PointSet& points);
 void load(StateReader& from, PointSet& points);
 
-// Nested states.
+// Save and load nested states.
 void save(StateWriter& to, const SavedState& state);
 void load(StateReader& from, SavedState& state);
 
-// Cereal's wrappers of values.
+// Serialises cereal's wrappers of values.
 template <StateArchive Archive, class T>
 void serialize(Archive& keep, cereal::NameValuePair<T>& pair)
 {

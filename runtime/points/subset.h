@@ -43,7 +43,7 @@ public:
     bool operator==(const Subset&) const = default;
 
 private:
-    // The finaliser of SplitMix64 (Steele, Lea and Flood 2014), a bijection.
+    // Applies the finaliser of SplitMix64 (Steele, Lea and Flood 2014), a bijection.
     static std::uint64_t hash(std::uint64_t bits)
     {
         bits += 0x9e3779b97f4a7c15ull;

@@ -92,7 +92,7 @@ private:
     std::size_t unchecked_ = 0;  // bytes since the last check of the memory budget
 };
 
-// Leaked, because columns in static objects may outlive it.
+// Returns the table of the process. It is leaked, because columns in static objects may outlive it.
 Table& table()
 {
     static Table& all = *new Table;

@@ -14,7 +14,7 @@ namespace rapid {
 struct Token {
     std::uint32_t number = 0;
 
-    // Valid for the life of the process. Thread-safe for tokens from token_of().
+    // Returns the string. It is valid for the life of the process. Thread-safe for tokens from token_of().
     std::string_view text() const;
     bool operator==(const Token&) const = default;
 };

@@ -55,7 +55,7 @@ inline double general_step(double height, double slope_bound, double feature, do
     return time_to_travel(std::max(height / slope_bound, feature / 4), speed, acceleration);
 }
 
-// The step of a convex field. Its distance is a convex function, so along the path f'' >= n·a >= -|a|, and
+// Returns the step of a convex field. Its distance is a convex function, so along the path f'' >= n·a >= -|a|, and
 //
 //   f(s + τ) >= f + f' τ - |a| τ²/2.
 //

@@ -52,8 +52,8 @@ public:
     static constexpr std::string_view param_type = "shape";
     std::string_view kind() const override { return "shape"; }
 
-    // Bounding box; the distance is positive outside it. May be infinite. Contacts are found only within it, widened by
-    // the radius.
+    // Returns the bounding box; the distance is positive outside it. May be infinite. Contacts are found only within
+    // it, widened by the radius.
     virtual Box3d bounds() const = 0;
 
     // Computes signed distances and, unless `gradient` is empty, their gradients (not normalised; zero deep inside and
@@ -82,14 +82,15 @@ public:
     // Returns the half space if the shape is one. Callers then need no queries.
     virtual std::optional<HalfSpace> half_space() const { return std::nullopt; }
 
-    // The largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow-band level set.
+    // Returns the largest |distance| that is exact: infinite for analytic shapes, the half width of a narrow-band level
+    // set.
     virtual double band() const { return std::numeric_limits<double>::infinity(); }
 
-    // The largest slope of the distance field: 1 unless the field is not an exact distance.
+    // Returns the largest slope of the distance field: 1 unless the field is not an exact distance.
     virtual double slope_bound() const { return 1; }
 
-    // A wall thinner than this may be missed, and a crease with a smaller radius is a kink, m: one voxel for a level
-    // set. 0 means that the shape is convex and nothing is missed.
+    // Returns the resolution in m. A wall thinner than this may be missed, and a crease with a smaller radius is a
+    // kink: one voxel for a level set. 0 means that the shape is convex and nothing is missed.
     virtual double smallest_feature() const { return 0; }
 
     // Samplers of birth positions on or in the shape (scatter.h). A shape of finite area or volume overrides these; the

@@ -26,7 +26,7 @@ void write(const std::filesystem::path& path, const std::string& text, Unfinishe
     file.finish();
 }
 
-// Long enough to be torn.
+// Returns a text long enough to be torn.
 std::string long_text(char letter) { return std::string(300000, letter); }
 bool is_whole(const std::string& text) { return text == long_text(text.empty() ? ' ' : text[0]); }
 

@@ -32,7 +32,7 @@ Number read(const std::filesystem::path&, const std::string& what)
 
 const ApartReader<Number> reader("test: a number", read, send, receive);
 
-// A reader process can't be stopped again, so each test runs in a separate process.
+// Runs a test in a separate process, because a reader process can't be stopped again.
 void in_process(const std::function<void(const std::filesystem::path& file)>& test)
 {
     const TemporaryFolder folder;

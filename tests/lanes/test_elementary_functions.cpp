@@ -43,7 +43,7 @@ std::mt19937_64 engine(1);
 
 double between(double least, double most) { return std::uniform_real_distribution<double>(least, most)(engine); }
 
-// The largest error of f over the numbers that `draw` returns.
+// Returns the largest error of f over the numbers that `draw` returns.
 template <class F, class Truth, class Draw>
 double worst(const F& f, const Truth& truth, const Draw& draw)
 {

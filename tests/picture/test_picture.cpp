@@ -15,7 +15,7 @@ using namespace rapid::test;
 
 namespace {
 
-// From 10 m in front of the origin, 90° high, so that a metre at the origin is height / 20 pixels.
+// Returns a view from 10 m in front of the origin, 90° high, so that a metre at the origin is height / 20 pixels.
 PictureView front_view()
 {
     PictureView view;

@@ -6,7 +6,7 @@
 namespace rapid {
 namespace {
 
-// From 10 m in front of the origin, slightly above.
+// Returns a view from 10 m in front of the origin, slightly above.
 PictureView view_from_above()
 {
     PictureView view;

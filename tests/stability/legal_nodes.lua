@@ -46,7 +46,7 @@ local scenery = {
 legal_nodes.head = ""
 for _, thing in ipairs(scenery) do legal_nodes.head = legal_nodes.head .. ("local %s = %s\n"):format(unpack(thing)) end
 
--- Returns the text after the definitions to which it refers.
+-- Prepends the definitions to which the text refers.
 function legal_nodes.with_head(text)
   local head = ""
   for _, thing in ipairs(scenery) do

@@ -59,7 +59,7 @@ return rapid.create { fps = %.17g, points = rapid.points.from { P = {{0, 0, 0}},
 end)
 
 describe("a whole scene that moves at 100 m/s", function()
-  -- Everything moves: points, air, attractors, and the ground.
+  -- Runs a scene in which everything moves: points, air, attractors, and the ground.
   local function run(u, frame)
     return scene.run(([[
 local u, P, v = %d, {}, {}

@@ -10,7 +10,8 @@ local draw = lehmer.new(1)
 local allowed = 1e-4
 local between, chance = draw.between, draw.chance
 
--- 80 grains with masses over two decades that fly and spin above a floor, between four walls and a ball.
+-- Returns a scene with 80 grains with masses over two decades that fly and spin above a floor, between four walls and a
+-- ball.
 local function text_of()
   local function vector(size)
     return ("{%.6f, %.6f, %.6f}"):format(between(-size, size), between(-size, size),

@@ -23,8 +23,8 @@ struct BoxSampler {
         return most > 0 ? beyond.cwiseMax(0.0).norm() : most;
     }
 
-    // Outside, the gradient points away from the nearest point of the box. Inside, it points out of the nearest face,
-    // or the first one if several are equally near.
+    // Also computes the gradient. Outside, it points away from the nearest point of the box. Inside, it points out of
+    // the nearest face, or the first one if several are equally near.
     double distance(const Vec3d& P, Vec3d& gradient) const
     {
         const Vec3d d = P - center, beyond = d.cwiseAbs() - half;

@@ -46,9 +46,9 @@ struct Survey {
     }
 };
 
-// Within a trilinear cell each component of the gradient is affine along each axis, so its squared length is convex
-// along each axis. The maximum is therefore at a corner of the cell, where the components are the differences along the
-// edges that meet there.
+// Surveys a block. Within a trilinear cell each component of the gradient is affine along each axis, so its squared
+// length is convex along each axis. The maximum is therefore at a corner of the cell, where the components are the
+// differences along the edges that meet there.
 Survey survey_block(const float* values, const Eigen::Vector3i& first)
 {
     Survey survey;

@@ -118,18 +118,19 @@ public:
         });
     }
 
-    // The largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where the
-    // bands of two surfaces meet, anything for a field that is not a distance. At least 1, the slope of the bounds
+    // Returns the largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where
+    // the bands of two surfaces meet, anything for a field that is not a distance. At least 1, the slope of the bounds
     // beyond the band.
     double slope_bound() const { return slope_; }
-    // A wall thinner than this may have no voxel inside it, m.
+    // Returns the thickness below which a wall may have no voxel inside it, m.
     double smallest_feature() const { return voxel_; }
-    // The half width of the band, m. Within √3 voxels of its edge a cell has corners beyond the band, and the field
-    // flattens: for a radius r, request a band of r + 2 voxels.
+    // Returns the half width of the band, m. Within √3 voxels of its edge a cell has corners beyond the band, and the
+    // field flattens: for a radius r, request a band of r + 2 voxels.
     double band() const { return background_; }
-    // The error of a distance in single precision, m: seven interpolations of values up to the half width.
+    // Returns the error of a distance in single precision, m: seven interpolations of values up to the half width.
     double rounding() const { return 0x1p-21 * background_; }
-    // Outside this box the distance is positive and at least the distance to the box.
+    // Returns the bounds of the surface plus a voxel. Outside this box the distance is positive and at least the
+    // distance to the box.
     Box3d bounds() const
     {
         const Vec3d margin = Vec3d::Constant(voxel_);
@@ -163,8 +164,8 @@ private:
                 static_cast<float>(x - i), static_cast<float>(y - j), static_cast<float>(z - k), 0};
     }
 
-    // The surface lies in its box, so it is at least as far away as the box. One voxel is subtracted for the level r >
-    // 0 of the field, which interpolation can put slightly farther out than r.
+    // Bounds the distance outside the index. The surface lies in its box, so it is at least as far away as the box. One
+    // voxel is subtracted for the level r > 0 of the field, which interpolation can put slightly farther out than r.
     double far_outside(const Vec3d& P) const
     {
         const Vec3d beyond = (surface_.min() - P).cwiseMax(P - surface_.max()).cwiseMax(0.0);
@@ -184,7 +185,8 @@ private:
     Box3d surface_;
 };
 
-// differences(i, dx, dy, dz) receives the differences of the interpolant across its cell along the axes, m.
+// Evaluates many points. differences(i, dx, dy, dz) receives the differences of the interpolant across its cell along
+// the axes, m.
 template <class Differences>
 void BakedSampler::sample(int n, const double* X, const double* Y, const double* Z, double* phi,
                           const Differences& differences) const

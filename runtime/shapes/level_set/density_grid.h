@@ -27,9 +27,10 @@ public:
         sample(P, values);
     }
 
-    // Births in proportion to the density. For a time-dependent fog: the density at the end of the step being computed.
+    // Returns births in proportion to the density. For a time-dependent fog: the density at the end of the step being
+    // computed.
     virtual const ScatterPtr& scatter() const = 0;
-    // The integral of the density over all space, m³.
+    // Returns the integral of the density over all space, m³.
     virtual double total() const = 0;
 };
 

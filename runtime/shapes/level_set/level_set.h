@@ -36,8 +36,8 @@ public:
 
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
-// The inside is where the winding number of the mesh is not 0: pieces may overlap, and an inward-facing piece inside
-// another is a cavity. Holes smaller than a voxel are closed (see grid_on_demand.h).
+// Builds the level set of a mesh. The inside is where the winding number of the mesh is not 0: pieces may overlap, and
+// an inward-facing piece inside another is a cavity. Holes smaller than a voxel are closed (see grid_on_demand.h).
 //
 // Problems that still give a usable level set (holes, faces turned inside out) are appended to `warnings`, with
 // numbers. Throws Error if the mesh is empty, or if the voxel size would need over 2^31 voxels or is larger than the

@@ -25,7 +25,7 @@ BakedGrid bake(const openvdb::FloatGrid& grid);
 // Builds the same surface with another half width, in metres, from the grid's own source if that is known.
 using RebuildGrid = std::function<openvdb::FloatGrid::Ptr(double half_width)>;
 
-// The grid is shared from here on and must not change.
+// Creates a level set from a grid, which is shared from here on and must not change.
 BakedPtr level_set_of(openvdb::FloatGrid::ConstPtr grid, RebuildGrid rebuild);
 
 // Returns a grid whose tiles are all outside, without class and name. level_set_grid() completes it.

@@ -127,9 +127,9 @@ void for_each_neighbour(const Coord& voxel, bool across_faces, const F& f)
             }
 }
 
-// Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the updates,
-// and repeats around the changed voxels until nothing changes. A voxel depends only on the previous round, so the
-// result is independent of the order. Distances only shrink.
+// Runs a Jacobi iteration: calls `improve(voxel, phi, accessor, nearest, updates)` for all active voxels, applies the
+// updates, and repeats around the changed voxels until nothing changes. A voxel depends only on the previous round, so
+// the result is independent of the order. Distances only shrink.
 template <class Improve>
 void improve_until_done(Band& band, const Improve& improve)
 {

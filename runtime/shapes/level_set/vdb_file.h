@@ -19,10 +19,10 @@ public:
     explicit VdbFile(const std::filesystem::path& path);
     ~VdbFile();
 
-    // The grids without their values, sorted by name.
+    // Returns the grids without their values, sorted by name.
     const openvdb::GridPtrVec& grids() const;
 
-    // One of grids() with its values. Throws like the constructor.
+    // Returns one of grids() with its values. Throws like the constructor.
     openvdb::GridBase::Ptr read(const openvdb::GridBase::Ptr& grid);
 
 private:

@@ -23,8 +23,8 @@ public:
     static constexpr std::string_view param_type = "vector grid";
     std::string_view kind() const override { return "vector grid"; }
 
-    // P, values: shape [n], m and the grid's own unit. Thread-safe. A time-dependent grid is sampled at the end of the
-    // step being computed.
+    // Samples the field. P, values: shape [n], m and the grid's own unit. Thread-safe. A time-dependent grid is sampled
+    // at the end of the step being computed.
     virtual void sample(std::span<const Vec3d> P, std::span<Vec3d> values) const = 0;
     // Samples each position at its own time, s since the start of the simulation.
     virtual void sample_at(std::span<const Vec3d> P, std::span<const double> time, std::span<Vec3d> values) const

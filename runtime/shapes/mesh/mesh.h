@@ -48,8 +48,8 @@ using MeshPtr = std::shared_ptr<const Mesh>;
 // or cannot be parsed, has no triangles, or has a coordinate that is not finite.
 MeshPtr read_mesh(const std::filesystem::path& path);
 
-// Built-in meshes, centred on `center`. Lengths are in metres and above 0; divisions are at least 3 (sphere, torus) or
-// 1 (grid).
+// Create built-in meshes, centred on `center`. Lengths are in metres and above 0; divisions are at least 3 (sphere,
+// torus) or 1 (grid).
 MeshPtr make_sphere(double radius, int divisions, const Vec3d& center);
 MeshPtr make_box(const Vec3d& size, const Vec3d& center);
 MeshPtr make_grid(double size_x, double size_z, int divisions, const Vec3d& center);  // in the plane y = center.y

@@ -144,7 +144,7 @@ struct BlendedField {
 
     double top_speed() const { return std::max(path.velocity(0).norm(), path.velocity(path.duration).norm()); }
 
-    // The step is free of the surface, or a quarter of a voxel of relative travel.
+    // Returns a step that is free of the surface, or a quarter of a voxel of relative travel if that is longer.
     double step(double, const Sample& here) const
     {
         const double closing = body.slope_bound() * top_speed() + body.most_change();
@@ -193,7 +193,8 @@ public:
     }
     Vec3d velocity_at(const Vec3d& P, double time) const override { return body_.at(P, time).vc; }
 
-    // The surface turns under a point that slips along it. As with the Coriolis acceleration, the slip counts twice.
+    // Returns the surface's acceleration for a point with velocity v. The surface turns under a point that slips along
+    // it. As with the Coriolis acceleration, the slip counts twice.
     Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const override
     {
         const Vec3d vc = velocity_at(P, time);

@@ -65,7 +65,8 @@ struct FramePath {
     bool before = false, after = false;  // f-2, respectively f+1, belongs to the same motion
     std::optional<Jump> jump = {};       // detected between f-1 and f
 
-    // travel(i): distance that the body travels between frame i-1 and i (root mean square), m. size: its diagonal, m.
+    // Determines the path from frame - 1 to frame. travel(i): distance that the body travels between frame i-1 and i
+    // (root mean square), m. size: its diagonal, m.
     //
     // A jump is detected if a body travels more than 8 times as far as in both surrounding frames (in one, if the
     // motion begins or ends there), and more than half its size.

@@ -64,7 +64,7 @@ public:
     virtual CurvesPtr at(const FrameClock& clock, std::int64_t frame) const = 0;
     // Returns true if there are curves at this frame.
     virtual bool has(std::int64_t frame) const = 0;
-    // The frames between which they change.
+    // Returns the frames between which they change.
     virtual FrameRange range() const = 0;
 };
 
@@ -102,7 +102,7 @@ using MovingCurvesPtr = std::shared_ptr<const MovingCurves>;
 
 CurvesPtr transformed(const CurvesPtr& curves, const Eigen::Affine3d& map);
 
-// The travel of curves in the interval of a step, as for meshes (body_path.h).
+// Determines the travel of curves in the interval of a step, as for meshes (body_path.h).
 FramePath path_of(const MovingCurves& curves, const FrameClock& clock, std::int64_t step, const PathOptions& options);
 // Returns the curves of their points in the interval. curves_path() takes births on the curves at the end of the step.
 std::vector<Cubic<Vec3d>> point_curves(const MovingCurves& curves, const FrameClock& clock, std::int64_t step,

@@ -82,7 +82,7 @@ public:
     void set_body(DeformingLevelSetPtr body) { body_ = std::move(body); }
     const LevelSetPtr& at_end() const { return at_end_; }  // of the last interval
 
-    // The level set of the last interval is rebuilt with the same band.
+    // Stores the end and the band of the last interval, whose level set is rebuilt from them.
     template <class Archive>
     void serialize(Archive& keep)
     {

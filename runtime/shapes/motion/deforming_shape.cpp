@@ -348,7 +348,7 @@ public:
                 acceleration(point, t)};
     }
 
-    // Without an inside there are no contacts.
+    // Finds no contacts, because there is no inside.
     void first_contact(std::span<const Path>, std::span<Contact> contacts) const override
     {
         std::fill(contacts.begin(), contacts.end(), Contact());
@@ -357,7 +357,7 @@ public:
 private:
     double part_of(double time) const { return std::clamp(time / duration_, 0.0, 1.0); }
 
-    // On the surface itself the gradient is the normal of the face.
+    // Computes the distance and the gradient. On the surface itself the gradient is the normal of the face.
     void sample(std::size_t i, std::span<const Vec3d> P, double time, std::span<double> phi,
                 std::span<Vec3d> gradient) const
     {

@@ -15,8 +15,8 @@ struct TriangleTree;
 // Returns the hierarchy of faces for nearest-face queries. All frames and users of a mesh share it.
 std::shared_ptr<const TriangleTree> triangle_tree(const MeshPtr& mesh);
 
-// begin, end: level sets of the mesh. If the interval begins with a jump, begin is null and `end` is carried back.
-// curves: of the vertices, m, with times from 0 to 1. duration: s.
+// Creates the surface during an interval. begin, end: level sets of the mesh. If the interval begins with a jump, begin
+// is null and `end` is carried back. curves: of the vertices, m, with times from 0 to 1. duration: s.
 ShapePtr deforming_shape(const LevelSetPtr& begin, const LevelSetPtr& end,
                          const std::shared_ptr<const TriangleTree>& tree, std::vector<Cubic<Vec3d>> curves,
                          double duration);

@@ -36,7 +36,7 @@ public:
 
     // Single-threaded. Throws Error if the script does.
     virtual Pose at(const Frame& frame) const = 0;
-    // Empty for a constant, infinite for a script.
+    // Returns the frames in which it moves: empty for a constant, infinite for a script.
     virtual FrameRange range() const = 0;
     bool varies() const override { return !range().empty(); }
 };

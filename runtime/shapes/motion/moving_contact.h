@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// Body has at(P, time, exact), which returns phi, gradient and vc, and rounding(). Field is the field for ContactWalk,
-// constructed from {body, path, level}.
+// Returns the first contact of a path. Body has at(P, time, exact), which returns phi, gradient and vc, and rounding().
+// Field is the field for ContactWalk, constructed from {body, path, level}.
 template <class Field, class Body>
 Contact first_contact_of(const Body& body, const Path& path)
 {

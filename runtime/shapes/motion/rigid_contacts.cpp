@@ -41,7 +41,7 @@ void RigidContacts::begin(const Beginning& b, const RelativePath::State& here, d
         walkers_.push_back({b.path, b.to, walk});
 }
 
-// The rest shape finds the way out, for a path that goes straight on.
+// Returns the contact of a path that starts inside. The rest shape finds the way out, for a straight path.
 Contact RigidContacts::inside(const Beginning& b, const RelativePath::State& here) const
 {
     const Path& path = paths_[b.path];
@@ -58,7 +58,7 @@ Contact RigidContacts::inside(const Beginning& b, const RelativePath::State& her
     return contact;
 }
 
-// A parabola in world space is also one in a frame that only translates.
+// Finds contacts with a shape that only translates. A parabola in world space is also one in its frame.
 void RigidContacts::fly_straight()
 {
     std::vector<Path> relative;

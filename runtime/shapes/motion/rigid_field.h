@@ -114,8 +114,8 @@ public:
         const double speed = here.velocity.norm() + path_.speed_beside(level_) / rest_->slope_bound;
         return general_step(here.height, rest_->slope_bound, rest_->feature, speed, acceleration());
     }
-    // Along a face of a convex shape and flush with it, the acceleration bound would shrink steps to the size of
-    // rounding.
+    // Returns the shortest step. Along a face of a convex shape and flush with it, the acceleration bound would shrink
+    // steps to the size of rounding.
     double hop(const Sample& here) const
     {
         if (!rest_->is_convex() || !(acceleration() > 0)) return 0;

@@ -65,7 +65,7 @@ MeshPtr any_mesh(const Vec3d& around)
     return mesh;
 }
 
-// Computed from the solid angles of the faces (van Oosterom and Strackee 1983).
+// Computes the winding number from the solid angles of the faces (van Oosterom and Strackee 1983).
 int winding_number(const Mesh& mesh, const Vec3d& P)
 {
     double sum = 0;

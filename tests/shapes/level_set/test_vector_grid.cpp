@@ -31,7 +31,7 @@ Vec3d sample(const VectorGrid& grid, const Vec3d& P)
     return value;
 }
 
-// A field linear in the position, which trilinear interpolation reproduces exactly.
+// Returns a field linear in the position, which trilinear interpolation reproduces exactly.
 Vec3d linear(const Vec3d& P) { return {1 + 2 * P.x(), -3 * P.y() + P.z(), 0.5 * P.x() * 1.0}; }
 
 openvdb::Vec3SGrid::Ptr linear_grid(const char* name, const openvdb::math::Transform::Ptr& transform, bool staggered)

@@ -20,7 +20,7 @@ namespace rapid {
 
 class JsonText {
 public:
-    // With an indent (spaces per level), each member and element gets its own line.
+    // indent: spaces per level. If it is not 0, each member and element gets its own line.
     explicit JsonText(std::size_t indent = 0) : indent_(indent) {}
 
     void begin_object() { begin('{', '}'); }

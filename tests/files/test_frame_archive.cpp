@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> words = {"one", "", "a record of some length", std::string(3, '\0'), "last"};
 
-// Returns the end of each of these words in the journal: 8 bytes of magic, and 16 before each word.
+// Returns the end of each word in the journal, which has 8 bytes of magic and 16 bytes before each word.
 std::vector<std::size_t> ends_of_words()
 {
     std::vector<std::size_t> ends;

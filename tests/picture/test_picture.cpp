@@ -238,7 +238,7 @@ TEST_CASE("additive points add up, in any order, and hide nothing", "[io][pictur
     const double both = light_of(balls({{0, 0, 1}, {0, 0, -1}}, {dim, dim}, 0.5f), adds);
     CHECK(both == Approx(one + other).epsilon(0.03));
     CHECK(light_of(balls({{0, 0, -1}, {0, 0, 1}}, {dim, dim}, 0.5f), adds) == both);
-    // Where they overlap, the nearer one hides the one in the background.
+    // The nearer one hides the other in the area of overlap.
     CHECK(light_of(balls({{0, 0, 1}, {0, 0, -1}}, {dim, dim}, 0.5f), {}) < 0.8 * both);
 }
 

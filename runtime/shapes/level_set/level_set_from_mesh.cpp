@@ -16,8 +16,8 @@ namespace {
 
 // There are two routes. A narrow band of a closed mesh whose pieces do not overlap is measured by blocks and baked from
 // them: three voxels took 71 ms where OpenVDB's distances with corrections took 145, and resolving OpenVDB's symbols
-// would take another 35. All else needs an OpenVDB grid: searches and signs that go from voxel to voxel, and bands so
-// wide that asking each triangle takes longer (twice as long at 50 voxels).
+// would take another 35. Everything else needs an OpenVDB grid: searches and signs that propagate between voxels, and
+// bands so wide that testing each triangle takes longer (twice as long at 50 voxels).
 std::shared_ptr<const BakedLevelSet> build(const MeshPtr& mesh, bool balanced, const LevelSetOptions& options)
 {
     const Box3d bounds = mesh->bounds().cast<double>();

@@ -39,7 +39,7 @@ std::vector<float> uniform(const Mesh& mesh, float density)
 
 TEST_CASE("births by the density x on a square are distributed as x², and uniformly across", "[scatter][density]")
 {
-    // With one cell the density varies only within faces, with 30 mostly between them.
+    // The density varies only within faces for one cell, and mostly between faces for 30.
     const int divisions = GENERATE(1, 30);
     CAPTURE(divisions);
     const MeshPtr mesh = square(divisions);

@@ -105,6 +105,18 @@ std::string variable_of(lua_State* L, int index)
     return found;
 }
 
+// A value as a scene writes it: of tables all entries, where messages show some.
+std::string written(const Value& value)
+{
+    const Table* table = value.table();
+    if (!table) return describe(value);
+    std::vector<std::string> entries;
+    for (const Value& entry : table->list) entries.push_back(written(entry));
+    for (const auto& [key, entry] : table->numbered) entries.push_back(fmt::format("[{}] = {}", key, written(entry)));
+    for (const auto& [name, entry] : table->named) entries.push_back(fmt::format("{} = {}", name, written(entry)));
+    return fmt::format("{{{}}}", fmt::join(entries, ", "));
+}
+
 // Refuses `:emit { source = chain }`, and says how :spawn takes the arguments, which are on the stack behind the type;
 // and `inherit`, which no rule of likeness leads to inherit_velocity.
 void refuse_former_words(State& state)
@@ -130,7 +142,7 @@ void refuse_former_words(State& state)
         const std::string variable = is_function || lua_isuserdata(L, -1) ? variable_of(L, lua_gettop(L)) : "";
         texts[is_share ? "inherit_velocity" : name] = !variable.empty() ? variable
                                                       : is_function     ? "function(...) ... end"
-                                                                        : describe(to_value(state, -1));
+                                                                        : written(to_value(state, -1));
     }
     texts.erase("source");
     std::string call = fmt::format(":spawn {{ from = {}", chain.empty() ? "chain" : chain);

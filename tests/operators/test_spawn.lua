@@ -399,6 +399,8 @@ return chain]]):format(emit)))
       "source = stars, count = many, on = old, velocity = size")
     expect(':spawn { from = stars, attributes = {Cd = {1, 0, 0}}, inherit = {"heat"}, rate = rapid.attr "n" }',
       'source = stars, rate = rapid.attr "n", inherit = {"heat"}, attributes = { Cd = {1, 0, 0} }')
+    expect(":spawn { from = stars, attributes = {a = 1, b = {1, 2}, c = 3, d = 4, e = 5, f = 6, g = 7}, count = 1 }",
+      "source = stars, count = 1, attributes = { a = 1, b = {1, 2}, c = 3, d = 4, e = 5, f = 6, g = 7 }")
     expect(":spawn { from = chain, birth = function(...) ... end, rate = 5 }",
       "source = rapid.create {} :solve {}, rate = 5, birth = function(p) p.heat = 2 end")
     assert.matches('node "burst": .*name = "burst"', refused 'source = stars, count = 1, name = "burst"')

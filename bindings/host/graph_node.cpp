@@ -194,8 +194,8 @@ int make_node(State& state)
 
     const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
     const std::string number_name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);
-    if (type.name == "emit") name_errors(number_name, where(state), [&] { refuse_former_words(state); });
     copy_table(state.lua(), 2);
+    if (type.name == "emit") name_errors(number_name, where(state), [&] { refuse_former_words(state); });
     const std::map<std::string, ObjectPtr> kernels = take_kernels(state, type, 2);
     return construct(state, [&]() -> ObjectPtr {
         auto node = make_node();

@@ -424,6 +424,13 @@ return chain]]):format(emit)))
     assert.same_points(named, found)
   end)
 
+  it("asks no metatable of the arguments", function()
+    local result = scene.run [[
+local given = setmetatable({ source = two, count = 1 }, { __index = function(_, name) error(name) end })
+return rapid.create {} :emit(given) :solve {}]]
+    assert.equal(2, #result[3])
+  end)
+
   it("finds a node that a function of the frame returns, too", function()
     local message = scene.error [[
 local stars = rapid.create { points = two } :solve {}

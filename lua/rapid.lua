@@ -342,13 +342,13 @@ local function make(native, load_node, numeric, shapes, studies)
     fog = { sample = shapes.sample_fog, write = write_by "density" },
     motion = {},
   }
-  for _, kind in ipairs { "shape", "plane", "sphere", "box", "level set", "mesh", "moving mesh", "moving shape",
-    "deforming level set", "level set sequence" } do
+  for _, kind in ipairs { "shape", "level set", "mesh", "moving mesh", "moving shape", "deforming level set",
+    "level set sequence" } do
     value_methods[kind] = value_methods[kind] or {}
     for name, query in pairs(shapes.queries) do value_methods[kind][name] = query end
   end
-  for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "plane", "sphere", "box", "moving shape",
-    "deforming level set", "points", "moving points", "curve", "moving curve" } do
+  for _, kind in ipairs { "mesh", "moving mesh", "level set", "shape", "moving shape", "deforming level set", "points",
+    "moving points", "curve", "moving curve" } do
     value_methods[kind] = value_methods[kind] or {}
     value_methods[kind].transform = transformed
   end
@@ -366,7 +366,7 @@ local function make(native, load_node, numeric, shapes, studies)
       if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
       return method_of(name)
     end
-    local known = value_methods[kind] or shapes.pointer_of(object) and shapes.queries or {}
+    local known = value_methods[kind] or shapes.pointer_of(object) and value_methods.shape or {}
     if known[name] then return known[name] end
     local what = kind:find "points$" and kind .. " have" or kind:find "^[aeiou]" and "an " .. kind .. " has"
       or "a " .. kind .. " has"

@@ -99,6 +99,17 @@ TEST_CASE("the example of a shape is hit where its edge is", "[docs]")
     CHECK_THAT(points.P()[1], test::close_to(Vec3f(0, 1, 0), 1e-5));
 }
 
+TEST_CASE("the example of a shape moves by :transform, and carries what sticks to it", "[docs]")
+{
+    const PointSet points =
+        run("rapid.create { points = rapid.points.from { P = {{0, 3, 0}} } }"
+            ":gravity {} :collide { shape = rapid.shape.rounded_box { size = {1, 2, 1} }:transform(function(frame)"
+            " return rapid.translate(0.01 * (frame.number - 25), 0, 0) end), response = \"stick\" } :solve {}",
+            24);
+    CHECK(points.P()[0].y() == Approx(1).epsilon(1e-5));
+    CHECK(points.v()[0].x() == Approx(0.24).epsilon(1e-5));  // 0.01 m a frame of 1/24 s
+}
+
 TEST_CASE("the example of a format is read as it was written", "[docs]")
 {
     const test::TemporaryFolder folder;

@@ -17,7 +17,7 @@ int column_into(rapid_frame* frame, const char* name, rapid_column* column, rapi
 {
     return guarded(error, [&] {
         const auto open = open_frame(frame);
-        give(column, column_in_c(take(find(open->frame, &not_null(name, "name")))), "column");
+        give(column, column_in_c(find(open->frame, &not_null(name, "name")).value()), "column");
     });
 }
 
@@ -35,7 +35,6 @@ int tell(rapid_error** to, SceneError error) noexcept
     if (to) try {
             auto object = std::make_shared<OpenError>();
             object->text = error.text();
-            object->stack = SceneError::script_stack();
             object->error = std::move(error);
             *to = static_cast<rapid_error*>(Errors::add(std::move(object)));
         } catch (...) {
@@ -81,7 +80,7 @@ const char* rapid_error_text(const rapid_error* error)
 const char* rapid_error_stack(const rapid_error* error)
 {
     return text_of(
-        error, [](const OpenError& open) -> auto& { return open.stack; });
+        error, [](const OpenError& open) -> auto& { return open.error.script_stack; });
 }
 int rapid_error_line(const rapid_error* error)
 {
@@ -99,7 +98,7 @@ int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, r
 {
     return guarded(error, [&] {
         not_null(frame, "frame") = nullptr;
-        *frame = new_frame(take(open_frame(of)->frame.output(&not_null(name, "name"))));
+        *frame = new_frame(open_frame(of)->frame.output(&not_null(name, "name")).value());
     });
 }
 
@@ -176,7 +175,7 @@ int rapid_token_text(uint32_t token, const char** text, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(text, "text") = nullptr;
-        *text = take(SceneFrame::text_of(token)).data();
+        *text = SceneFrame::text_of(token).value().data();
     });
 }
 
@@ -184,7 +183,7 @@ int rapid_text_token(const char* text, uint32_t* token, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(token, "token") = 0;
-        *token = take(SceneFrame::token_of(&not_null(text, "text")));
+        *token = SceneFrame::token_of(&not_null(text, "text")).value();
     });
 }
 
@@ -202,14 +201,14 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
 
 int rapid_frame_write(rapid_frame* frame, const char* path, rapid_error** error)
 {
-    return guarded(error, [&] { take(open_frame(frame)->frame.write(&not_null(path, "path"))); });
+    return guarded(error, [&] { open_frame(frame)->frame.write(&not_null(path, "path")).value(); });
 }
 
 int rapid_frame_read(const char* path, rapid_frame** frame, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(frame, "frame") = nullptr;
-        *frame = new_frame(take(SceneFrame::read(&not_null(path, "path"))));
+        *frame = new_frame(SceneFrame::read(&not_null(path, "path")).value());
     });
 }
 
@@ -218,7 +217,7 @@ int rapid_frame_describe(rapid_frame* frame, const char** json, rapid_error** er
     return guarded(error, [&] {
         not_null(json, "json") = nullptr;
         const auto open = open_frame(frame);
-        SceneReport report = take(open->frame.describe());
+        SceneReport report = open->frame.describe().value();
         const std::lock_guard lock(open->mutex);
         open->description = std::move(report.json);
         *json = open->description.c_str();
@@ -231,7 +230,7 @@ int rapid_frame_compare(rapid_frame* frame, rapid_frame* with, double tolerance,
     return guarded(error, [&] {
         if (json) *json = nullptr;
         const auto open = open_frame(frame);
-        FrameComparison found = take(open->frame.compare(open_frame(with)->frame, tolerance));
+        FrameComparison found = open->frame.compare(open_frame(with)->frame, tolerance).value();
         if (same) *same = found.same;
         const std::lock_guard lock(open->mutex);
         open->comparison = std::move(found.report.json);

@@ -31,7 +31,7 @@ struct OpenFrame {
 };
 struct OpenError {
     SceneError error;
-    std::string text, stack;
+    std::string text;
 };
 
 // Calls the program's functions when the last callback of a set of offers is gone.
@@ -83,15 +83,7 @@ int guarded(rapid_error** error, const F& f) noexcept
     }
 }
 
-// The value, or the error as a Refusal.
-template <class T>
-T take(Result<T> result)
-{
-    if (!result) throw Refusal{result.error()};
-    return std::move(*result);
-}
-
-// The open object of a handle. Refusal: there is none.
+// The open object of a handle. Error: there is none.
 template <class Table>
 auto open(const void* handle, const char* what)
 {
@@ -102,12 +94,12 @@ auto open(const void* handle, const char* what)
     return object;
 }
 inline auto open_scene(rapid_scene* handle) { return open<Scenes>(handle, "scene"); }
-// The scene for the length of a call. Refusal: another one is running, which what is merely read would see half done.
+// The scene for the length of a call. Error: another one is running, which what is merely read would see half done.
 class SceneCall {
 public:
     explicit SceneCall(rapid_scene* handle) : open_(open_scene(handle))
     {
-        if (open_->is_busy.exchange(true)) throw Refusal{busy()};
+        if (open_->is_busy.exchange(true)) throw SceneException(busy());
     }
     ~SceneCall() { open_->is_busy = false; }
     SceneCall(const SceneCall&) = delete;

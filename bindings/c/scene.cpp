@@ -67,7 +67,7 @@ int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
 {
     return guarded(error, [&] {
         not_null(scene, "scene") = nullptr;
-        auto object = std::shared_ptr<OpenScene>(new OpenScene{take(open()), false, {}, {}, {}, {}, {}});
+        auto object = std::shared_ptr<OpenScene>(new OpenScene{open().value(), false, {}, {}, {}, {}, {}});
         *scene = static_cast<rapid_scene*>(Scenes::add(std::move(object)));
     });
 }
@@ -76,7 +76,7 @@ int advance_into(rapid_scene* scene, rapid_frame** frame, rapid_error** error, c
 {
     return guarded(error, [&] {
         if (frame) *frame = nullptr;
-        SceneFrame result = take(advance(SceneCall(scene).scene()));
+        SceneFrame result = advance(SceneCall(scene).scene()).value();
         if (frame) *frame = new_frame(std::move(result));
     });
 }
@@ -150,7 +150,7 @@ extern "C" {
 
 int rapid_load_plugin(const char* file, rapid_error** error)
 {
-    return guarded(error, [&] { take(Scene::load_plugin(&not_null(file, "file"))); });
+    return guarded(error, [&] { Scene::load_plugin(&not_null(file, "file")).value(); });
 }
 
 int rapid_scene_open(const char* file, const rapid_options* options, rapid_scene** scene, rapid_error** error)
@@ -193,7 +193,7 @@ int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* par
 
 int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error)
 {
-    return guarded(error, [&] { take(SceneCall(scene).scene().set(settings_of(settings, count))); });
+    return guarded(error, [&] { SceneCall(scene).scene().set(settings_of(settings, count)).value(); });
 }
 
 int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error)
@@ -218,7 +218,7 @@ int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** 
         not_null(json, "json") = nullptr;
         const SceneCall open(scene);
         std::vector<std::string> types;
-        for (const SceneNodeType& type : take(open.scene().node_types())) types.push_back(in_json(type));
+        for (const SceneNodeType& type : open.scene().node_types().value()) types.push_back(in_json(type));
         open->node_types = fmt::format("[{}]", fmt::join(types, ","));
         *json = open->node_types.c_str();
     });
@@ -239,7 +239,7 @@ int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** err
     return guarded(error, [&] {
         not_null(json, "json") = nullptr;
         const SceneCall open(scene);
-        open->explanation = take(open.scene().explain()).json;
+        open->explanation = open.scene().explain().value().json;
         *json = open->explanation.c_str();
     });
 }
@@ -249,7 +249,7 @@ int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t numb
 {
     return guarded(error, [&] {
         not_null(frame, "frame") = nullptr;
-        *frame = new_frame(take(SceneCall(scene).scene().points_behind(&not_null(node, "node"), number)));
+        *frame = new_frame(SceneCall(scene).scene().points_behind(&not_null(node, "node"), number).value());
     });
 }
 
@@ -261,7 +261,7 @@ int rapid_scene_graph(rapid_scene* scene, int form, const char** text, rapid_err
         if (form < RAPID_GRAPH_DOT || form > RAPID_GRAPH_JSON)
             refuse(
                 fmt::format("form = {}; it must be one of RAPID_GRAPH_DOT, RAPID_GRAPH_SVG, RAPID_GRAPH_JSON", form));
-        open->graph = take(open.scene().graph(static_cast<GraphForm>(form)));
+        open->graph = open.scene().graph(static_cast<GraphForm>(form)).value();
         *text = open->graph.c_str();
     });
 }
@@ -278,10 +278,10 @@ int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, cons
         if (create) options.create = create;
         options.first = first;
         options.last = last;
-        SceneTrace trace = take(open.scene().trace(options));
+        SceneTrace trace = open.scene().trace(options).value();
         open->lives = std::move(trace.lives.json);
         *json = open->lives.c_str();
-        if (trace.fault) throw Refusal{*trace.fault};
+        if (trace.fault) throw SceneException(*trace.fault);
     });
 }
 
@@ -291,7 +291,7 @@ int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** er
         const SceneCall open(scene);
         const auto given = open_offers(offers);
         const std::lock_guard lock(given->mutex);
-        for (const auto& [name, object] : given->objects) take(open.scene().offer(name, object));
+        for (const auto& [name, object] : given->objects) open.scene().offer(name, object).value();
     });
 }
 
@@ -317,7 +317,7 @@ int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** fra
 
 int rapid_scene_restart(rapid_scene* scene, rapid_error** error)
 {
-    return guarded(error, [&] { take(SceneCall(scene).scene().restart()); });
+    return guarded(error, [&] { SceneCall(scene).scene().restart().value(); });
 }
 
 int rapid_scene_cancel(rapid_scene* scene, rapid_error** error)
@@ -329,14 +329,14 @@ int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error*
 {
     return guarded(error, [&] {
         not_null(snapshot, "snapshot") = nullptr;
-        auto saved = std::make_shared<SceneSnapshot>(take(SceneCall(scene).scene().save()));
+        auto saved = std::make_shared<SceneSnapshot>(SceneCall(scene).scene().save().value());
         *snapshot = static_cast<rapid_snapshot*>(Snapshots::add(std::move(saved)));
     });
 }
 
 int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error)
 {
-    return guarded(error, [&] { take(SceneCall(scene).scene().restore(*open_snapshot(snapshot))); });
+    return guarded(error, [&] { SceneCall(scene).scene().restore(*open_snapshot(snapshot)).value(); });
 }
 
 int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error)
@@ -351,14 +351,14 @@ int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error*
 
 int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error)
 {
-    return guarded(error, [&] { take(open_snapshot(snapshot)->write(&not_null(path, "path"))); });
+    return guarded(error, [&] { open_snapshot(snapshot)->write(&not_null(path, "path")).value(); });
 }
 
 int rapid_snapshot_read(const char* path, rapid_snapshot** snapshot, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(snapshot, "snapshot") = nullptr;
-        auto read = std::make_shared<SceneSnapshot>(take(SceneSnapshot::read(&not_null(path, "path"))));
+        auto read = std::make_shared<SceneSnapshot>(SceneSnapshot::read(&not_null(path, "path")).value());
         *snapshot = static_cast<rapid_snapshot*>(Snapshots::add(std::move(read)));
     });
 }
@@ -379,7 +379,7 @@ int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int h
         not_null(bytes, "bytes") = 0;
         const SceneCall open(scene);
         const auto of = open_frame(frame);
-        std::string picture = take(open.scene().picture(of->frame, {width, height}));
+        std::string picture = open.scene().picture(of->frame, {width, height}).value();
         const std::lock_guard lock(of->mutex);
         of->picture = std::move(picture);
         *png = of->picture.data();

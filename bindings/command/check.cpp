@@ -5,7 +5,6 @@
 #include "bindings/command/file_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
@@ -45,10 +44,10 @@ public:
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
-            const std::string text = or_throw(check_outputs(scene, files_.files()));
+            const std::string text = check_outputs(scene, files_.files()).value();
             if (!races_) {
                 print(text);
-                print(or_throw(advice_on(scene, files_.files())));
+                print(advice_on(scene, files_.files()).value());
                 return status_done;
             }
             const std::int64_t first = scene.first_frame();
@@ -68,11 +67,11 @@ private:
     {
         const Result<SceneRaces> races = find_races(scene, files_.files(), frames);
         if (!races) {  // while a frame ran
-            print_error(as_error(races.error()), verbose);
+            print_error(races.error(), verbose);
             return false;
         }
         if (races->found)
-            print_error(as_error(*races->found), verbose);
+            print_error(*races->found, verbose);
         else if (!races->compared)
             print_warning(
                 fmt::format("there is no point in frames {} to {}, and nothing to compare; choose later "

@@ -8,8 +8,8 @@
 
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/untrusted.h"
+#include "include/rapid/scene.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -68,8 +68,8 @@ private:
 
     FrameComparison compare(const std::string& a, const std::string& b) const
     {
-        const SceneFrame of_a = or_throw(SceneFrame::read(a)), of_b = or_throw(SceneFrame::read(b));
-        return or_throw(of_a.compare(of_b, tolerance_));
+        const SceneFrame of_a = SceneFrame::read(a).value(), of_b = SceneFrame::read(b).value();
+        return of_a.compare(of_b, tolerance_).value();
     }
 
     int compare_files() const

@@ -6,7 +6,6 @@
 #include "bindings/command/file_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
@@ -48,10 +47,10 @@ public:
         Threads threads(common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
-            const SceneReport kept = or_throw(explain_outputs(scene, files_.files()));
+            const SceneReport kept = explain_outputs(scene, files_.files()).value();
             if (!against_.empty()) {
                 Scene other = graph_.open_other(against_, common);
-                const SceneReport more = or_throw(explain_difference(scene, files_.files(), other));
+                const SceneReport more = explain_difference(scene, files_.files(), other).value();
                 print(json_ ? indented(ordered_json::parse(more.json)) : more.text);
                 return status_done;
             }
@@ -60,7 +59,7 @@ public:
                 if (*state_after_ < scene.first_frame())
                     throw Error(fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_,
                                             scene.first_frame()));
-                state = or_throw(explain_state(scene, files_.files(), *state_after_));
+                state = explain_state(scene, files_.files(), *state_after_).value();
             }
             if (json_) {
                 ordered_json json = ordered_json::parse(kept.json);

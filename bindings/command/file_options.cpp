@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "bindings/command_line/or_throw.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {
@@ -96,7 +95,7 @@ void FileOptions::declare(Options& options)
 bool FileOptions::makes_films() const
 {
     return std::any_of(names().begin(), names().end(),
-                       [](const std::string& text) { return or_throw(output_format(text)).is_film; });
+                       [](const std::string& text) { return output_format(text).value().is_film; });
 }
 
 }  // namespace rapid

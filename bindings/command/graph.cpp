@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/files/whole_file.h"
@@ -48,7 +47,7 @@ public:
             const GraphForm form = extension == ".svg"    ? GraphForm::Svg
                                    : extension == ".json" ? GraphForm::Json
                                                           : GraphForm::Dot;
-            const std::string text = or_throw(scene.graph(form));
+            const std::string text = scene.graph(form).value();
             if (file_.empty())
                 print(text);
             else

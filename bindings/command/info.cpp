@@ -5,7 +5,6 @@
 
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/printable.h"
 #include "runtime/threads.h"
@@ -41,15 +40,15 @@ public:
         ordered_json all = ordered_json::array();
         for (const auto& [frame, path] : cache.frames) {
             if (SceneSnapshot::is_file(path)) {
-                const SceneReport report = or_throw(SceneSnapshot::describe(path));
+                const SceneReport report = SceneSnapshot::describe(path).value();
                 ordered_json json = {{"file", path.string()}};
                 json.update(ordered_json::parse(report.json));
                 if (!json_) print(report.text);
                 all.push_back(std::move(json));
                 continue;
             }
-            const SceneFrame points = threads.run([&, &file = path] { return or_throw(SceneFrame::read(file)); });
-            const SceneReport report = threads.run([&] { return or_throw(points.describe()); });
+            const SceneFrame points = threads.run([&, &file = path] { return SceneFrame::read(file).value(); });
+            const SceneReport report = threads.run([&] { return points.describe().value(); });
             if (json_) {
                 ordered_json json = {{"file", path.string()}};
                 if (cache.sequence) json["frame"] = frame;

@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/untrusted.h"
 #include "include/rapid/merge.h"
 #include "runtime/threads.h"
@@ -47,9 +46,9 @@ public:
         Threads threads(common.threads);
         return threads.run([&] {
             const Result<MergedFiles> merged = merge_files(parts_, output_);
-            if (!merged && merged.error().kind == SceneError::WrongCall) throw_error(merged.error());
+            if (!merged && merged.error().kind == SceneError::WrongCall) throw SceneException(merged.error());
             if (!merged) {
-                print_error(as_error(merged.error()), common.verbose);
+                print_error(merged.error(), common.verbose);
                 return status_failed;
             }
             if (!quiet_)

@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/files/output_file.h"
 
@@ -65,7 +64,7 @@ public:
             if (std::error_code none; fs::exists(fs::symlink_status(file, none)))
                 throw Error("is there already and is left as it is; take another name").at({file, 0});
 
-        const fs::path lua = or_throw(Installation::find()).lua;
+        const fs::path lua = Installation::find().value().lua;
         make(scene, fill_in(lua, "scene.lua", name_));
         make(test, fill_in(lua, "test.lua", name_));
         make(".luacheckrc", fill_in(lua, "luacheckrc", name_));
@@ -87,7 +86,7 @@ private:
                 fmt::format("rapid new: \"{}\" is no name of a scene; it must be made of letters, digits, _ and "
                             "-, and begin with a letter",
                             name_));
-        const std::vector<SceneNodeType> types = or_throw(Scene::all_node_types());
+        const std::vector<SceneNodeType> types = Scene::all_node_types().value();
         if (std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name_; }))
             throw Error(
                 fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from scenes "

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 
 namespace rapid {
 namespace {
@@ -38,7 +37,7 @@ public:
 
     int run(const CommonOptions&) override
     {
-        const NodeDocuments documents = or_throw(Scene::documents());
+        const NodeDocuments documents = Scene::documents().value();
         for (const std::string& warning : documents.warnings) print_warning(warning);
         if (annotations_) {
             if (!name_.empty()) throw Error("rapid nodes: --annotations is of all nodes; leave out " + name_);

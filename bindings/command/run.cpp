@@ -16,7 +16,6 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/memory_limit.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/signals.h"
 #include "bindings/command_line/untrusted.h"
@@ -129,11 +128,11 @@ public:
             made = &*run;
             {
                 const MemoryLimit limit(graph_.file(), fail);
-                or_throw(run->prepare());
+                run->prepare().value();
             }
             if (farm_.asked()) return submit(*run);
             terminal.begin(run->first_frame(), run->frames().last);
-            const RunOutcome outcome = or_throw(run->run());
+            const RunOutcome outcome = run->run().value();
             return terminal.end(outcome, end.signal());
         });
     }
@@ -163,8 +162,7 @@ private:
         SceneHooks hooks;
         hooks.late = hooks.beyond_memory = end;
         if (tell_) hooks.reads = [](const std::string& file) { Watch::tell(file); };
-        return or_throw(
-            SceneRun::make(graph_.file(), std::move(scene), std::move(hooks), options_, std::move(listener)));
+        return SceneRun::make(graph_.file(), std::move(scene), std::move(hooks), options_, std::move(listener)).value();
     }
 
     void check_farm() const
@@ -184,7 +182,7 @@ private:
     {
         FarmJob job;
         job.name = "rapid-" + std::filesystem::path(graph_.file()).stem().string();
-        const std::vector<std::string> folders = or_throw(output_folders(options_.files));
+        const std::vector<std::string> folders = output_folders(options_.files).value();
         job.outputs = folders.empty() ? "." : folders.front();
         job.words = farm_.words(*given_, {"--parts"});
         job.words.emplace_back("--quiet");
@@ -200,7 +198,7 @@ private:
             return farm_.submit(std::move(job));
         }
         const int parts = static_cast<int>(parts_);
-        const auto merges = or_throw(run.merges(parts));
+        const auto merges = run.merges(parts).value();
         for (int number = 1; number <= parts; ++number) {
             const std::string name = part_name(number, parts);
             job.tasks.push_back(
@@ -216,7 +214,7 @@ private:
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, {}};
-        for (const std::string& folder : or_throw(output_folders(options_))) access.writable.emplace_back(folder);
+        for (const std::string& folder : output_folders(options_).value()) access.writable.emplace_back(folder);
         return access;
     }
 

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <utility>
 
-#include "bindings/command_line/or_throw.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {
@@ -46,10 +45,12 @@ int RunTerminal::end(const RunOutcome& outcome, int signal)
         return status_done;
     }
     const bool has_failed = outcome.ending == RunOutcome::Failed;
-    print_error(has_failed ? as_error(*outcome.error)
-                           : Error(fmt::format("interrupted after frame {}; the same command goes on behind it",
-                                               outcome.last_frame)),
-                verbose_);
+    if (has_failed)
+        print_error(*outcome.error, verbose_);
+    else
+        print_error(
+            Error(fmt::format("interrupted after frame {}; the same command goes on behind it", outcome.last_frame)),
+            verbose_);
     print_unwritten(outcome.unwritten);
     return has_failed ? status_failed : 128 + signal;
 }

@@ -15,7 +15,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
-#include "bindings/command_line/or_throw.h"
 
 namespace rapid {
 
@@ -30,7 +29,7 @@ void run_tests_as_child(const std::string& file, const SceneTestOptions& options
             _exit(status_failed);
     };
     auto began = std::chrono::steady_clock::now();
-    or_throw(run_scene_tests(file, options, [&](const SceneTestEvent& event) {
+    run_scene_tests(file, options, [&](const SceneTestEvent& event) {
         const auto now = std::chrono::steady_clock::now();
         std::fflush(stdout);
         send({{"kind", event.kind},
@@ -41,7 +40,7 @@ void run_tests_as_child(const std::string& file, const SceneTestOptions& options
               {"out", lseek(STDOUT_FILENO, 0, SEEK_CUR)},
               {"err", lseek(STDERR_FILENO, 0, SEEK_CUR)}});
         began = now;
-    }));
+    }).value();
     send({{"end", true}});
 }
 

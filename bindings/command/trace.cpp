@@ -5,7 +5,6 @@
 
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/threads.h"
@@ -54,8 +53,8 @@ public:
             const RunFrames frames = frames_.value_or(RunFrames{start, start + default_frames - 1});
             if (frames.last < start)
                 throw Error(fmt::format("-f: frame {} is before the scene's first, {}", frames.last, start));
-            const SceneTrace trace = or_throw(scene.trace({ids_, create_, frames.first, frames.last, frames.step}));
-            if (trace.fault) print_error(as_error(*trace.fault), common.verbose);
+            const SceneTrace trace = scene.trace({ids_, create_, frames.first, frames.last, frames.step}).value();
+            if (trace.fault) print_error(*trace.fault, common.verbose);
             for (const std::int64_t id : trace.unborn)
                 print_warning(fmt::format("no point has the id {} up to frame {}", id, frames.last));
             print(json_ ? trace.lives.json + '\n' : trace.lives.text);

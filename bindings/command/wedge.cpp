@@ -21,7 +21,6 @@
 #include "bindings/command/swept_setting.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/picture_sheet.h"
@@ -305,7 +304,7 @@ bool write_sheet(const fs::path& file, const std::vector<SweptSetting>& varied, 
     }
     // Of combinations those that differ by the last setting alone belong together.
     const std::size_t of_last = varied.back().values.size(), series = of_last < rows.size() ? of_last : 1;
-    if (drawn) write_whole(file, or_throw(picture_sheet(pictures, series)));
+    if (drawn) write_whole(file, picture_sheet(pictures, series).value());
     return drawn;
 }
 
@@ -354,7 +353,7 @@ public:
     int run(const CommonOptions& common) override
     {
         rows_ = wedge_rows(settings_, zip_, files_.names());
-        const std::vector<std::string> folders = or_throw(output_folders(files_.files()));
+        const std::vector<std::string> folders = output_folders(files_.files()).value();
         if (!folders.empty()) folder_ = folders.front();
         cache_.check();
         farm_.check();

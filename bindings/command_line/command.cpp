@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "include/rapid/scene.h"
 #include "runtime/files/output_file.h"
 #include "runtime/printable.h"
 
@@ -29,6 +30,14 @@ bool parse(std::string_view text, T& value)
     return error == std::errc() && end == text.data() + text.size();
 }
 
+void print_error(std::string_view error, std::string_view trace)
+{
+    std::fflush(stdout);
+    std::string text = printable(error) + '\n';
+    if (!trace.empty()) text += printable(trace) + '\n';
+    std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
 }  // namespace
 
 CommandRegistration::CommandRegistration(std::unique_ptr<Command> (*make)()) { command_makers().push_back(make); }
@@ -47,12 +56,11 @@ void print(std::string_view text)
     std::fwrite(shown.data(), 1, shown.size(), stdout);
 }
 
-void print_error(const Error& error, bool verbose)
+void print_error(const Error& error, bool verbose) { print_error(error.what(), verbose ? error.trace() : ""); }
+
+void print_error(const SceneError& error, bool verbose)
 {
-    std::fflush(stdout);
-    std::string text = printable(error.what()) + '\n';
-    if (verbose && !error.trace().empty()) text += printable(error.trace()) + '\n';
-    std::fwrite(text.data(), 1, text.size(), stderr);
+    print_error(error.text(), verbose ? error.script_stack : "");
 }
 
 void print_warning(const std::string& warning)

@@ -16,6 +16,8 @@
 
 namespace rapid {
 
+struct SceneError;
+
 enum ExitStatus : int { status_done = 0, status_failed = 1, status_refused = 2 };
 
 // Options of every command.
@@ -50,6 +52,7 @@ struct CommandRegistration {
 void print(std::string_view text);
 // Writes the error to standard error, and with --verbose its trace. Above a progress bar, if there is one.
 void print_error(const Error& error, bool verbose);
+void print_error(const SceneError& error, bool verbose);
 void print_warning(const std::string& warning);
 
 // For limits that are reached in the middle of something, from any thread: prints the message and ends the process.

@@ -16,7 +16,6 @@
 
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/options.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/files/output_file.h"
@@ -168,19 +167,29 @@ int become(const Program& program, const Arguments& arguments)
 }
 
 int run_command(Command& command, const CommonOptions& common)
+// Whether nothing that was given to the command is to blame.
+bool is_of_system(const SceneError& error)
+{
+    const bool has_place = !error.file.empty() || !error.node.empty();
+    return error.kind == SceneError::Unexpected || (error.kind == SceneError::OutOfMemory && !has_place);
+}
+
 {
     try {
         auto* const confined = dynamic_cast<Confined*>(&command);
         if (confined) confined->confine(common);
         if (!confined || confined->takes_plugins()) {
-            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) or_throw(Scene::load_plugins(path));
-            for (const std::string& file : common.plugins) or_throw(Scene::load_plugin(file));
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) Scene::load_plugins(path).value();
+            for (const std::string& file : common.plugins) Scene::load_plugin(file).value();
         }
         return finish(command.run(common));
     } catch (const Error& error) {
         print_error(error, common.verbose);
         return status_refused;
     } catch (const std::bad_alloc&) {
+    } catch (const SceneException& exception) {
+        print_error(exception.error(), common.verbose);
+        return is_of_system(exception.error()) ? status_failed : status_refused;
         print_error(Error("out of memory"), false);
     } catch (const std::exception& error) {  // of a library: its text is all that is known
         print_error(Error(error.what()), false);

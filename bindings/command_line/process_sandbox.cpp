@@ -17,7 +17,6 @@
 #include <string_view>
 #include <vector>
 
-#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/error.h"
 #include "runtime/files/read_apart.h"
@@ -79,7 +78,7 @@ void allow(int ruleset, const std::filesystem::path& path, std::uint64_t rights)
 
 std::vector<std::filesystem::path> own_files()
 {
-    const Installation installation = or_throw(Installation::find());
+    const Installation installation = Installation::find().value();
     std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), installation.lua,
                                                 installation.library};
     // Of the process no more than the memory that it has: its environment and its addresses are for nobody.

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "bindings/command_line/memory_limit.h"
-#include "bindings/command_line/or_throw.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
@@ -15,7 +14,7 @@ namespace {
 Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
     const MemoryLimit limit(file, hooks.late);
-    return or_throw(Scene::open(file, std::move(options), std::move(hooks)));
+    return Scene::open(file, std::move(options), std::move(hooks)).value();
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "bindings/command_line/or_throw.h"
 #include "bindings/scene/installation.h"
 #include "runtime/path_list.h"
 
@@ -46,7 +45,7 @@ void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, con
         all.readable.insert(all.readable.end(), allowed_.begin(), allowed_.end());
         enter_sandbox(all);
     }
-    or_throw(Installation::load_all());  // the limits of memory forbid it
+    Installation::load_all().value();  // the limits of memory forbid it
     complete_sandbox(processes, connections);
 }
 

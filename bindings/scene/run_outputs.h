@@ -6,10 +6,10 @@
 
 namespace rapid {
 
-// Throws a Refusal: a size or an angle that can't be. Error: an output that is none.
+// Error: a size or an angle that can't be, or an output that is none.
 FrameFiles frame_files(const FileOutputs& files);
 
-// Throws a Refusal: frames that do not go up, or that no file's name or format holds.
+// Error: frames that do not go up, or that no file's name or format holds.
 void check_frames(const RunFrames& frames);
 
 }  // namespace rapid

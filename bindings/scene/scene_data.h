@@ -50,7 +50,7 @@ struct [[gnu::visibility("hidden")]] SceneShapes::Data
 
 SceneValue value_of(const DetailValue& detail);
 
-// As the renderer takes it, which refuses sizes. Refusal: a camera that looks at its own place,
+// As the renderer takes it, which refuses sizes. Error: a camera that looks at its own place,
 // or nowhere; an angle of view that none has.
 std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size);
 

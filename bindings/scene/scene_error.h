@@ -1,4 +1,4 @@
-// Exceptions as values.
+// Exceptions as values: what is thrown inside becomes a SceneError once, where a call returns.
 #pragma once
 
 #include <functional>
@@ -16,11 +16,8 @@ constexpr int most_threads = 4096;  // of a scene: more are a typing error, not 
 SceneError wrong_call(std::string message);
 SceneError busy();  // of a call while the scene is in another one
 
-// Thrown inside of a call that is refused.
-struct Refusal {
-    SceneError error;
-};
-[[noreturn]] inline void refuse(std::string message) { throw Refusal{wrong_call(std::move(message))}; }
+// Refuses the call.
+[[noreturn]] inline void refuse(std::string message) { throw SceneException(wrong_call(std::move(message))); }
 // Where the program's callback has said so.
 [[noreturn]] void end_as_cancelled();
 

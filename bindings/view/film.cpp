@@ -6,8 +6,6 @@
 #include <fstream>
 #include <utility>
 
-#include "bindings/command_line/or_throw.h"
-
 namespace rapid {
 
 ViewFilm::ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of)
@@ -19,7 +17,7 @@ ViewFilm::ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of
         throw Error(fmt::format("a film of the frames {} to {} has none", wish_.first, wish_.last));
     folder_.emplace("film");
     file_ = folder_->path() / ("film" + wish_.extension);
-    drawn_ = or_throw(SceneFilm::begin(file_, wish_.film));
+    drawn_ = SceneFilm::begin(file_, wish_.film).value();
     progress_.of = wish_.last - wish_.first + 1;
     thread_ = std::thread([this] { run(); });
 }
@@ -72,11 +70,11 @@ std::string ViewFilm::draw()
         if (frame->run != run) throw Error("the scene has begun again; make the film when it is computed");
         const Result<SceneFrame> points = frame->points.output(wish_.output);
         if (!points) throw Error("the scene has no such output");
-        or_throw(drawn_->add(*points, frame->shapes));
+        drawn_->add(*points, frame->shapes).value();
         const std::lock_guard lock(mutex_);
         progress_.done = drawn_->done();
     }
-    or_throw(drawn_->finish());
+    drawn_->finish().value();
     std::ifstream in(file_, std::ios::binary);
     std::string film(std::istreambuf_iterator<char>(in), {});
     if (!in || film.empty()) throw Error("the film can't be read");

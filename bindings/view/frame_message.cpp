@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
-#include "bindings/command_line/or_throw.h"
 #include "runtime/error.h"
 #include "runtime/picture/tone.h"
 
@@ -240,7 +239,7 @@ std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
     std::unordered_map<std::uint32_t, float> ranks;
     for (std::size_t k = 0; k < tokens.size(); ++k) ranks.try_emplace(*tokens[k]);
     std::vector<std::pair<std::string_view, float*>> texts;
-    for (auto& [token, rank] : ranks) texts.emplace_back(or_throw(SceneFrame::text_of(token)), &rank);
+    for (auto& [token, rank] : ranks) texts.emplace_back(SceneFrame::text_of(token).value(), &rank);
     std::sort(texts.begin(), texts.end());
     for (std::size_t r = 0; r < texts.size(); ++r) *texts[r].second = static_cast<float>(r);
     std::vector<float> result(tokens.size());

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "bindings/command_line/or_throw.h"
 #include "runtime/checked_json.h"
 
 namespace rapid {
@@ -187,7 +186,7 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
             const auto number = entry.at("frame").get<std::int64_t>();
             Known known{entry.at("statistics").get<std::string>(), entry.at("warnings").get<std::vector<std::string>>(),
                         entry.at("shapes").get<std::int64_t>()};
-            if (!or_throw(scene.are_unchanged(entry.at("read").get<std::map<std::string, std::string>>())) ||
+            if (!scene.are_unchanged(entry.at("read").get<std::map<std::string, std::string>>()).value() ||
                 !fs::exists(archive_.file(frame_kind, number), none) || !Json::accept(known.statistics) ||
                 (known.shapes != 0 && !fs::exists(archive_.file(shapes_kind, known.shapes), none)))
                 continue;
@@ -258,7 +257,7 @@ SceneShapes CachedRun::shapes(std::int64_t number)
 {
     if (number == 0) return {};
     if (loaded_number_ == number) return loaded_;
-    loaded_ = or_throw(SceneShapes::load(archive_.file(shapes_kind, number)));
+    loaded_ = SceneShapes::load(archive_.file(shapes_kind, number)).value();
     loaded_number_ = number;
     return loaded_;
 }
@@ -274,7 +273,7 @@ ViewFramePtr CachedRun::load(std::int64_t number, std::uint64_t run)
         fs::remove(archive_.file(frame_kind, number), none);
         there_.erase(there);
     }
-    SceneFrame points = or_throw(std::move(loaded));
+    SceneFrame points = std::move(loaded).value();
     return std::make_shared<ViewFrame>(ViewFrame{number, run, std::move(points), "", shapes(there->second)});
 }
 
@@ -285,7 +284,7 @@ FrameCache::FrameCache(const fs::path& folder)
 
 std::shared_ptr<CachedRun> FrameCache::open(Scene& scene)
 {
-    const std::string hash = or_throw(scene.fingerprint()).hash;
+    const std::string hash = scene.fingerprint().value().hash;
     auto run = std::make_shared<CachedRun>(folder_ / hash, hash, scene);
     remove_old();
     return run;

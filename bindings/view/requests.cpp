@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "bindings/command_line/or_throw.h"
 #include "bindings/view/request_fields.h"
 
 namespace rapid {
@@ -78,7 +77,7 @@ Json value_at(const SceneColumn& column, std::size_t i)
         case ColumnType::UInt8:
             return *column.at<std::uint8_t>(i);
         case ColumnType::String:
-            return std::string(or_throw(SceneFrame::text_of(*column.at<std::uint32_t>(i))));
+            return std::string(SceneFrame::text_of(*column.at<std::uint32_t>(i)).value());
     }
     return nullptr;
 }
@@ -94,7 +93,7 @@ Json row_of(const SceneFrame& points, std::size_t i)
     return {{"values", row}, {"groups", groups}};
 }
 
-std::uint32_t place_of(const SceneFrame& points, std::int64_t id) { return or_throw(points.places({id})).front(); }
+std::uint32_t place_of(const SceneFrame& points, std::int64_t id) { return points.places({id}).value().front(); }
 
 Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size_t i)
 {
@@ -119,7 +118,7 @@ Json camera_of_scene(const ViewFrame& frame, const Json& json)
 {
     const Result<SceneFrame> points = chosen_output(frame, json);
     if (!frame.shapes.has_camera() || !points) return nullptr;
-    const PictureCamera camera = or_throw(points->camera(frame.shapes, {}, size_of(json)));
+    const PictureCamera camera = points->camera(frame.shapes, {}, size_of(json)).value();
     const auto &from = *camera.position, &to = *camera.target;
     return {from[0], from[1], from[2], to[0], to[1], to[2], *camera.fov};
 }
@@ -391,7 +390,7 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
             if (!frame) break;
             const Result<SceneFrame> points = chosen_output(*frame, json);
             if (!points) break;
-            const std::vector<std::uint32_t> places = or_throw(points->places(ids));
+            const std::vector<std::uint32_t> places = points->places(ids).value();
             const SceneColumn P = *points->column("P");
             const auto age = static_cast<float>(last - number) / static_cast<float>(last - first);
             for (std::size_t k = 0; k < shown.count; ++k) {
@@ -529,7 +528,7 @@ void ViewRequests::tell_picture(const Json& json, const Ask& ask)
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return ask.fail("the frame is not computed");
     with_points(json, ask, [=](const SceneFrame& points) {
-        ask.send(or_throw(points.picture(frame->shapes, camera_of(json), size_of(json))));
+        ask.send(points.picture(frame->shapes, camera_of(json), size_of(json)).value());
     });
 }
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "bindings/command_line/or_throw.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -51,14 +50,14 @@ void ViewSimulation::Run::ask(Task task)
 ViewSimulation::Results ViewSimulation::Run::inspect(std::int64_t frame)
 {
     Results results =
-        or_throw(scene_->points_behind_all(frame, inspected_ == frame ? std::nullopt : snapshot_before(frame)));
+        scene_->points_behind_all(frame, inspected_ == frame ? std::nullopt : snapshot_before(frame)).value();
     inspected_ = frame;
     return results;
 }
 
 ViewSimulation::Arguments ViewSimulation::Run::arguments(std::int64_t frame)
 {
-    return or_throw(scene_->arguments(frame));
+    return scene_->arguments(frame).value();
 }
 
 PointOrigin ViewSimulation::Run::origin(std::int64_t frame, const std::string& output, std::int64_t id)
@@ -70,7 +69,7 @@ PointOrigin ViewSimulation::Run::origin(std::int64_t frame, const std::string& o
     const ViewFramePtr shown = view_.store_.find(frame);
     if (!shown || shown->run != number_) throw Error("the frame is not computed");
     inspect(frame);
-    return or_throw(scene_->origin(or_throw(shown->points.output(output)), id));
+    return scene_->origin(shown->points.output(output).value(), id).value();
 }
 
 template <class F>
@@ -116,14 +115,14 @@ void ViewSimulation::Run::begin()
     hooks.tell_points = true;
     hooks.watch_memory = false;  // frames have a share of it, and give way
     view_.note_file(number_, view_.options_.graph);
-    scene_ = or_throw(Scene::open(view_.options_.graph, view_.scene_options(), std::move(hooks)));
+    scene_ = Scene::open(view_.options_.graph, view_.scene_options(), std::move(hooks)).value();
     const std::int64_t start = scene_->first_frame();
     const auto [first, last] = view_.options_.frames.value_or(std::pair(start, start + 239));
     if (last < start) throw Error(fmt::format("-f: frame {} is before the scene's first, {}", last, start));
     first_ = start;
     last_ = last;
     if (view_.cache_) cached_ = view_.cache_->open(*scene_);
-    const std::vector<SceneAttribute> attributes = or_throw(scene_->attributes());
+    const std::vector<SceneAttribute> attributes = scene_->attributes().value();
     tell([&, last_frame = last](ViewStatus& status) {
         status.state = ViewState::Computing;
         status.first = start;
@@ -189,31 +188,31 @@ void ViewSimulation::Run::compute()
     while (due <= last_ && is_known(due)) ++due;
     if (due > first_) {
         draw_graph();
-        if (const auto snapshot = cached_snapshot_before(due)) or_throw(scene_->restore(*snapshot));
+        if (const auto snapshot = cached_snapshot_before(due)) scene_->restore(*snapshot).value();
     }
     while (!stopped() && due <= last_ && scene_->next_frame() <= last_) {
         while (const Task task = next_task(false)) task(*this);
         if (stopped()) return;
         const std::int64_t number = scene_->next_frame();
-        const SceneFrame result = or_throw(scene_->advance());
+        const SceneFrame result = scene_->advance().value();
         if (is_known(number)) continue;  // it leads from a snapshot to what is due
         std::vector<std::string> warnings = result.warnings();
         const auto add_shapes = [&](ViewFrame& frame) {
-            frame.shapes = or_throw(scene_->shapes(number));
+            frame.shapes = scene_->shapes(number).value();
             for (std::string& text : frame.shapes.warnings()) warnings.push_back(std::move(text));
             frame.bytes = bytes_of(frame);
         };
         auto frame = std::make_shared<ViewFrame>(
-            ViewFrame{number, number_, or_throw(result.without_statistics()), result.statistics_json()});
+            ViewFrame{number, number_, result.without_statistics().value(), result.statistics_json()});
         frame->bytes = bytes_of(*frame);
         // Shapes of the first frame come after its points: they may take long.
         if (number > first_) add_shapes(*frame);
         if (since_snapshot.seconds() > snapshot_seconds) {
-            keep_snapshot(or_throw(scene_->save()));
+            keep_snapshot(scene_->save().value());
             since_snapshot = Stopwatch();
         }
         if (cached_ && (since_cached.seconds() > cached_seconds || number == last_)) {
-            cached_->keep(or_throw(scene_->save()));
+            cached_->keep(scene_->save().value());
             since_cached = Stopwatch();
         }
         if (!publish(frame, warnings, 0, number > first_)) return;
@@ -238,7 +237,7 @@ bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<s
                                   bool is_whole)
 {
     if (stopped()) return false;
-    if (cached_ && is_whole) cached_->put(*frame, warnings, or_throw(scene_->take_inputs()));
+    if (cached_ && is_whole) cached_->put(*frame, warnings, scene_->take_inputs().value());
     bool kept = view_.store_.put(frame, is_whole ? cached_ : nullptr);
     if (!kept && cached_ && is_whole) {
         view_.store_.add(frame->number, number_, frame->statistics, cached_);
@@ -271,10 +270,10 @@ void ViewSimulation::Run::draw_graph()
         if (graph)
             drawn = std::move(*graph);
         else
-            why_not = as_error(graph.error()).what();
+            why_not = graph.error().text();
         view_.keep(std::move(layout));
     }
-    if (drawn.empty()) drawn = or_throw(scene_->graph_json(nullptr));
+    if (drawn.empty()) drawn = scene_->graph_json(nullptr).value();
     const auto json = std::make_shared<const std::string>(std::move(drawn));
     tell([&](ViewStatus& status) {
         status.no_graph = why_not;

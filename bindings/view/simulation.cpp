@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "bindings/command_line/or_throw.h"
 #include "bindings/view/points.h"
 #include "bindings/view/run.h"
 
@@ -47,6 +46,10 @@ int bytes_of_value(const SceneColumn& column)
 Error error_of(const std::exception& error)
 {
     if (const auto* known = dynamic_cast<const Error*>(&error)) return *known;
+    if (const auto* of_scene = dynamic_cast<const SceneException*>(&error)) {
+        const SceneError& known = of_scene->error();
+        return Error(known.message).in_node(known.node).at({known.file, known.line});
+    }
     return Error(dynamic_cast<const std::bad_alloc*>(&error) ? "out of memory" : error.what());
 }
 
@@ -54,7 +57,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
-    or_throw(Scene::keep_spare_columns(most_spare));
+    Scene::keep_spare_columns(most_spare).value();
     if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();
@@ -177,7 +180,7 @@ ViewFramePtr ViewSimulation::read_file(std::int64_t number)
 {
     const auto file = options_.files.find(static_cast<int>(number));
     if (file == options_.files.end()) return nullptr;
-    const SceneFrame points = or_throw(SceneFrame::read(file->second));
+    const SceneFrame points = SceneFrame::read(file->second).value();
     auto frame = std::make_shared<ViewFrame>(ViewFrame{number, ++file_uses_, points, ""});  // older ones make room
     frame->statistics = fmt::format("{{\"frame\": {}, \"points\": {}}}", number, points.size());
     frame->bytes = bytes_of(*frame);
@@ -231,23 +234,22 @@ void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
     tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
     tracer_stop_ = std::stop_source();
-    tracer_ =
-        std::thread([=, this, options = scene_options(), stop = tracer_stop_.get_token(), told = std::move(told)] {
-            tbb::task_arena arena(options_.threads);
-            arena.execute([&] {
-                try {
-                    SceneHooks hooks;
-                    hooks.stop = stop;
-                    Scene scene = or_throw(Scene::open(options_.graph, options, hooks));
-                    const SceneTrace trace =
-                        or_throw(scene.trace({{point.id}, point.create, scene.first_frame(), last, 1}));
-                    if (trace.fault) throw_error(*trace.fault);
-                    told(trace.lives.json, "");
-                } catch (const std::exception& error) {
-                    told("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
-                }
-            });
+    tracer_ = std::thread([=, this, options = scene_options(), stop = tracer_stop_.get_token(),
+                           told = std::move(told)] {
+        tbb::task_arena arena(options_.threads);
+        arena.execute([&] {
+            try {
+                SceneHooks hooks;
+                hooks.stop = stop;
+                Scene scene = Scene::open(options_.graph, options, hooks).value();
+                const SceneTrace trace = scene.trace({{point.id}, point.create, scene.first_frame(), last, 1}).value();
+                if (trace.fault) throw SceneException(*trace.fault);
+                told(trace.lives.json, "");
+            } catch (const std::exception& error) {
+                told("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
+            }
         });
+    });
 }
 
 }  // namespace rapid

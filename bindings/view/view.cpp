@@ -12,7 +12,6 @@
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/or_throw.h"
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/signals.h"
@@ -34,7 +33,7 @@ constexpr int watch_interval = 100;  // ms between two looks at the files that a
 // In an installation beside the Lua modules, in a checkout among the sources.
 std::filesystem::path page_folder()
 {
-    const std::filesystem::path root = std::filesystem::path(or_throw(Installation::find()).lua).parent_path();
+    const std::filesystem::path root = std::filesystem::path(Installation::find().value().lua).parent_path();
     std::error_code none;
     return std::filesystem::exists(root / "view/index.html", none) ? root / "view" : root / "bindings/view/page";
 }

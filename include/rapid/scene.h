@@ -53,12 +53,22 @@ struct SceneError {
     std::string file;        // of the scene or module, as it was named; empty where there is none
     int line = 0;            // from 1; 0 where there is none
     std::string node;        // of the scene; empty where there is none
+    // The calls of the script in which it was raised, a line each, the innermost first; empty if it was in no script.
+    std::string script_stack;
 
     // FILE:LINE: node "NAME": MESSAGE, of what is known.
     std::string text() const;
-    // Of the last error that a function of this header returned on this thread: the calls of the script in which it was
-    // raised, a line each, the innermost first; empty where it was in no script.
-    static std::string script_stack();
+};
+
+// What Result::value() throws.
+class SceneException : public std::runtime_error {
+public:
+    explicit SceneException(SceneError error) : std::runtime_error(error.text()), error_(std::move(error)) {}
+
+    const SceneError& error() const { return error_; }
+
+private:
+    SceneError error_;
 };
 
 // A T or the error that kept it from being made.
@@ -79,14 +89,24 @@ public:
     // Only where there is none.
     const SceneError& error() const { return std::get<1>(held_); }
 
-    // For programs that prefer exceptions: std::runtime_error with the error's text where there is no value.
-    T& value()
+    // For programs that prefer exceptions: throws a SceneException if there is no value.
+    T& value() &
     {
-        if (!*this) throw std::runtime_error(error().text());
+        throw_error();
         return **this;
+    }
+    T value() &&
+    {
+        throw_error();
+        return std::move(**this);
     }
 
 private:
+    void throw_error() const
+    {
+        if (!*this) throw SceneException(error());
+    }
+
     std::variant<T, SceneError> held_;
 };
 

@@ -212,7 +212,7 @@ TEST_CASE("a wrong trace is an error, and one that fails half-way tells what is 
     REQUIRE(trace.fault);
     CHECK(trace.fault->kind == SceneError::FailedFrame);
     CHECK(trace.fault->line == 3);
-    CHECK_THAT(SceneError::script_stack(), Contains("told.lua:3"));
+    CHECK_THAT(trace.fault->script_stack, Contains("told.lua:3"));
     CHECK_THAT(trace.lives.json, Contains(R"({"frame":2,"time")"));
     CHECK(failing.next_frame() == 1);
     CHECK(good(failing.advance_to(2)).number() == 2);
@@ -242,17 +242,18 @@ TEST_CASE("a trace is cancelled, and refused within another call", "[reports]")
     CHECK(good(scene.trace({{0}, "", 1, 5, 1})).lives.text.size() > 10);
 }
 
-TEST_CASE("the calls of a script are told of the last error of a thread", "[reports]")
+TEST_CASE("an error has the calls of the script in which it was raised", "[reports]")
 {
     const Result<Scene> wrong = Scene::open_text("deep.lua",
                                                  "local function inner() error 'here' end\n"
                                                  "local function outer() inner(); return 1 end\nouter()\n");
     REQUIRE_FALSE(wrong);
-    const std::string stack = SceneError::script_stack();
+    const std::string& stack = wrong.error().script_stack;
     CHECK(stack.find("deep.lua:1") < stack.find("deep.lua:2"));
     CHECK(stack.find("deep.lua:2") < stack.find("deep.lua:3"));
-    REQUIRE_FALSE(Scene::open(""));
-    CHECK(SceneError::script_stack().empty());
+    const Result<Scene> unnamed = Scene::open("");
+    REQUIRE_FALSE(unnamed);
+    CHECK(unnamed.error().script_stack.empty());
 }
 
 TEST_CASE("a program is told of a script that is late, before it is stopped", "[reports]")

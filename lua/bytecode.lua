@@ -586,8 +586,9 @@ local function analyse(kernel, env, of_a_point, point_names)
 end
 
 -- Where a function of the frame keeps something for its next call: the `stores` of analyse().
-local function remembers(f, env)
-  local found = nothing_found(env, remedies.frame, "a function of the frame", {})
+-- cache: what the program calls the setting for snapshots.
+local function remembers(f, env, cache)
+  local found = nothing_found(env, remedies.frame:format(cache), "a function of the frame", {})
   analyse_function(f, found)
   return { stores = found.stores }
 end

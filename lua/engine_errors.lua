@@ -5,12 +5,14 @@
 
 local function added(text, remedy) return { message = ("%s; %s"):format(text, remedy) } end
 
-local no_files = "a script has no files: rapid.points.read and rapid.mesh.read read some, :write and -o write them"
 local no_clock = "a script has neither a clock nor an environment: frame.time is the time, rapid.param takes values"
 local no_chance = "math.random is not there, as each run would differ: p:rand(k) of a point is the same in every run"
 
--- memory_limit: the text for a state that needs more memory than it may have.
-return function(memory_limit)
+-- memory_limit: the text for a state that needs more memory than it may have. output: what the program calls the
+-- setting for files of frames.
+return function(memory_limit, output)
+  local no_files = ("a script has no files: rapid.points.read and rapid.mesh.read read some, :write and %s write them")
+    :format(output)
   return {
     ["not enough memory"] = { message = memory_limit },
     ["stack overflow"] = { message = "stack overflow: a function calls itself without end", full_stack = true },

@@ -103,11 +103,11 @@ function entry.analyse(f, of_a_point)
 end
 
 function entry.remembers(f)
-  return bytecode.remembers(f, env)
+  return bytecode.remembers(f, env, native.cache_setting)
 end
 
 entry.fingerprint = bytecode.fingerprint
-entry.engine_errors = engine_errors(native.memory_limit_text)
+entry.engine_errors = engine_errors(native.memory_limit_text, native.output_setting)
 
 -- A function that runs the kernel f, with what all points share compared before and after some of its calls: the first,
 -- the second, the fourth, ... Error: the kernel has changed it.

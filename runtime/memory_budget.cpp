@@ -1,4 +1,5 @@
 #include "runtime/memory_budget.h"
+#include "runtime/setting_names.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -113,9 +114,9 @@ std::uint64_t free_memory()
 
 Error beyond_memory(const std::string& what, double bytes, const std::string& remedy)
 {
-    return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set --memory", what,
-                             memory_text(bytes), memory_text(static_cast<double>(free_memory())),
-                             memory_text(static_cast<double>(memory_budget())), remedy));
+    return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set {}", what, memory_text(bytes),
+                             memory_text(static_cast<double>(free_memory())),
+                             memory_text(static_cast<double>(memory_budget())), remedy, name_of(Setting::Memory)));
 }
 
 std::string memory_text(double bytes)

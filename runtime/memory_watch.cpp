@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "runtime/memory_budget.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -88,9 +89,8 @@ void MemoryWatch::watch(std::uint64_t most)
     std::string message = "out of memory";
     try {
         message = fmt::format(
-            "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set "
-            "--memory",
-            memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)));
+            "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set {}",
+            memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)), name_of(Setting::Memory));
         beyond_(message);
     } catch (const std::exception&) {  // this thread has no caller
     }

@@ -19,6 +19,7 @@
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/untrusted.h"
 #include "runtime/files/output_file.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -166,7 +167,6 @@ int become(const Program& program, const Arguments& arguments)
     }
 }
 
-int run_command(Command& command, const CommonOptions& common)
 // Whether nothing that was given to the command is to blame.
 bool is_of_system(const SceneError& error)
 {
@@ -174,6 +174,7 @@ bool is_of_system(const SceneError& error)
     return error.kind == SceneError::Unexpected || (error.kind == SceneError::OutOfMemory && !has_place);
 }
 
+int run_command(Command& command, const CommonOptions& common)
 {
     try {
         auto* const confined = dynamic_cast<Confined*>(&command);
@@ -186,10 +187,10 @@ bool is_of_system(const SceneError& error)
     } catch (const Error& error) {
         print_error(error, common.verbose);
         return status_refused;
-    } catch (const std::bad_alloc&) {
     } catch (const SceneException& exception) {
         print_error(exception.error(), common.verbose);
         return is_of_system(exception.error()) ? status_failed : status_refused;
+    } catch (const std::bad_alloc&) {
         print_error(Error("out of memory"), false);
     } catch (const std::exception& error) {  // of a library: its text is all that is known
         print_error(Error(error.what()), false);
@@ -197,8 +198,31 @@ bool is_of_system(const SceneError& error)
     return status_failed;
 }
 
+// What the library's messages call its settings here.
+void name_options()
+{
+    name_settings({{Setting::Memory, "--memory"},
+                   {Setting::ScriptMemory, "--script-memory"},
+                   {Setting::ScriptSeconds, "--script-timeout"},
+                   {Setting::Value, "--set"},
+                   {Setting::Seed, "--seed"},
+                   {Setting::EstimateErrors, "--quiet"},
+                   {Setting::Output, "-o"},
+                   {Setting::Frames, "-f"},
+                   {Setting::PictureSize, "--size"},
+                   {Setting::Statistics, "--stats"},
+                   {Setting::Profile, "--profile"},
+                   {Setting::Events, "--events"},
+                   {Setting::Cache, "--cache"},
+                   {Setting::CacheAgain, "--again"},
+                   {Setting::Part, "--part"},
+                   {Setting::Parts, "--parts"},
+                   {Setting::Sample, "--sample"}});
+}
+
 int run(const Arguments& arguments)
 {
+    name_options();
     CLI::App app("Rapid: particles from Lua graphs, without a user interface.", "rapid");
     app.set_version_flag("--version", "rapid " RAPID_VERSION);
     app.footer(

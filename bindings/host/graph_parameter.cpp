@@ -9,6 +9,7 @@
 
 #include "bindings/host/construct.h"
 #include "bindings/host/lua_text.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -33,8 +34,8 @@ std::vector<double> numbers_in(std::string text)
 Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
 {
     const auto refuse = [&](const char* wanted) -> Value {
-        throw Error(fmt::format("--set {}={}: the parameter is {}, as its default {} is", name, text, wanted,
-                                describe(fallback)));
+        throw Error(fmt::format("{} {}={}: the parameter is {}, as its default {} is", name_of(Setting::Value), name,
+                                text, wanted, describe(fallback)));
     };
     if (fallback.get<std::string>()) return Value(text);
     if (fallback.get<bool>()) {

@@ -1,6 +1,6 @@
 // What the handles of a state hold: level sets, meshes and points, whose bytes Lua's collector does not see. It runs
 // when they have doubled, so that a script which makes another one in each frame keeps a few, not all. Many that are
-// small, nodes of the graph too, fill the memory as one does that is large: beyond --memory the next one is an error.
+// small, nodes of the graph too, fill the memory as one does that is large: beyond the budget the next one is an error.
 #pragma once
 
 #include <cstddef>

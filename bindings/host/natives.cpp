@@ -22,6 +22,7 @@
 #include "runtime/points/point_names.h"
 #include "runtime/points/token.h"
 #include "runtime/printable.h"
+#include "runtime/setting_names.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/mesh/mesh.h"
@@ -69,10 +70,8 @@ int require_memory(State& state)
     const double bytes = lua_tonumber(state.lua(), 2);
     const std::string what = text_at(state.lua(), 1), remedy = text_at(state.lua(), 3);
     if (const auto most = static_cast<double>(state.host().options().script_memory); bytes > most)
-        throw Error(
-            fmt::format("{} would take about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set "
-                        "--script-memory",
-                        what, bytes / 0x1p20, most / 0x1p20, remedy));
+        throw Error(fmt::format("{} would take about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set {}", what,
+                                bytes / 0x1p20, most / 0x1p20, remedy, name_of(Setting::ScriptMemory)));
     if (!fits_in_memory(bytes)) throw beyond_memory(what, bytes, remedy);
     return 0;
 }
@@ -277,6 +276,10 @@ void push_natives(State& state, const std::string& chunk_header)
     lua_setfield(L, -2, "chunk_header");
     push_text(L, state.memory_limit_text());
     lua_setfield(L, -2, "memory_limit_text");
+    push_text(L, name_of(Setting::Output));
+    lua_setfield(L, -2, "output_setting");
+    push_text(L, name_of(Setting::Cache));
+    lua_setfield(L, -2, "cache_setting");
     push_point_names(L);
     lua_setfield(L, -2, "point_names");
     set_kernel_functions(L);

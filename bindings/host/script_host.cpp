@@ -15,6 +15,7 @@
 #include "bindings/host/script_function.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/override.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 
@@ -113,8 +114,8 @@ void ScriptHost::apply_arguments()
     for (const auto& [name, value] : options_.set) {
         if (std::find(names.begin(), names.end(), name) != names.end()) continue;
         if (name.find('.') == std::string::npos)
-            throw Error(fmt::format("--set {}={}: the graph has no parameter \"{}\"{}", name, value, name,
-                                    did_you_mean(name, names)))
+            throw Error(fmt::format("{} {}={}: the graph has no parameter \"{}\"{}", name_of(Setting::Value), name,
+                                    value, name, did_you_mean(name, names)))
                 .at({graph.file, 0});
         constexpr std::string_view offered = "host:";  // in a scene of a program: what rapid.host gives
         arguments.emplace(name, options_.offers && value.starts_with(offered)
@@ -126,7 +127,7 @@ void ScriptHost::apply_arguments()
         graph = with_arguments(graph, arguments);
     } catch (const Error& error) {
         if (!error.node().empty()) throw;
-        throw Error(fmt::format("--set {}", error.what())).at({graph.file, 0});
+        throw Error(fmt::format("{} {}", name_of(Setting::Value), error.what())).at({graph.file, 0});
     }
 }
 

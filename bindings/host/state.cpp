@@ -15,6 +15,7 @@
 #include "bindings/host/script_error.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -257,7 +258,8 @@ std::string State::memory_limit_text() const
 {
     const std::size_t most = host_.options().script_memory;
     const std::string text = most >> 20 ? fmt::format("{} MiB", most >> 20) : fmt::format("{} bytes", most);
-    return fmt::format("the script needs more than {} of Lua memory; --script-memory sets the limit", text);
+    return fmt::format("the script needs more than {} of Lua memory; {} sets the limit", text,
+                       name_of(Setting::ScriptMemory));
 }
 
 void State::leave_if_broken() const

@@ -1,4 +1,5 @@
 #include "bindings/host/watchdog.h"
+#include "runtime/setting_names.h"
 
 #include <fmt/format.h>
 
@@ -64,9 +65,8 @@ void Watchdog::watch()
             if (const auto late = std::chrono::steady_clock::now() - then; late > step) deadline_ += late;
             continue;
         }
-        const std::string message =
-            fmt::format("{}: the script runs for more than {:g} s; --script-timeout sets the limit",
-                        fmt::join(running_, ", "), limit_);
+        const std::string message = fmt::format("{}: the script runs for more than {:g} s; {} sets the limit",
+                                                fmt::join(running_, ", "), limit_, name_of(Setting::ScriptSeconds));
         if (on_late_(message) == EndProcess) {
             std::fprintf(stderr, "%s\n", message.c_str());
             std::_Exit(1);

@@ -11,6 +11,7 @@
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
 #include "runtime/operators/spawn/parent_paths.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -119,7 +120,8 @@ void EventFile::check() const
     const std::string extension = std::filesystem::path(path_).extension();
     const auto fits = [&](const Format& format) { return holds_events(format) && format.extension == extension; };
     if (std::none_of(formats().begin(), formats().end(), fits))
-        throw Error(fmt::format("--events {}: the events are points; give a file of {}", path_, known));
+        throw Error(
+            fmt::format("{} {}: the events are points; give a file of {}", name_of(Setting::Events), path_, known));
 }
 
 void EventFile::add(const FrameResult& result)

@@ -8,6 +8,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/graph/abi.h"
 #include "runtime/graph/plugin.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -145,6 +146,16 @@ std::string hash_of(const Fingerprint& fingerprint)
     return hash_text(content_hash(text));
 }
 
+std::string name_in_message(const std::string& name)
+{
+    static const std::map<std::string, Setting> settings = {{events_entry, Setting::Events},
+                                                            {part_entry, Setting::Part},
+                                                            {sample_entry, Setting::Sample},
+                                                            {seed_entry, Setting::Seed}};
+    const auto found = settings.find(name);
+    return found == settings.end() ? name : name_of(found->second);
+}
+
 std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& is)
 {
     std::vector<std::string> list;
@@ -162,7 +173,7 @@ std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& 
         else if (name.starts_with(content) || name.starts_with(code))
             list.push_back(fmt::format("{} was {}read", name.substr(name.find(" of ") + 4), now ? "not " : ""));
         else
-            list.push_back(fmt::format("{} was {}, is {}", name, before ? *before : "not there",
+            list.push_back(fmt::format("{} was {}, is {}", name_in_message(name), before ? *before : "not there",
                                        now ? *now : std::string("not there")));
     }
     const bool explained = !list.empty();

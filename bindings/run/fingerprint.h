@@ -22,6 +22,12 @@ Fingerprint fingerprint_of(const Session& session, const Plan& plan, const std::
 std::string hash_of(const Fingerprint& fingerprint);
 
 // "rate was 20000, is 30000"; "the function in line 12 of scene.lua is another one"; empty where nothing differs.
+// Entries for settings, named as the command's options in the files of any program.
+constexpr char seed_entry[] = "--seed", part_entry[] = "--part", sample_entry[] = "--sample",
+               events_entry[] = "--events";
+
+// What a message calls an entry.
+std::string name_in_message(const std::string& name);
 std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& is);
 
 // The contents of the files that a run reads.

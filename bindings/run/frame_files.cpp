@@ -12,6 +12,7 @@
 #include "runtime/io/text_table.h"
 #include "runtime/operators/rasterize.h"
 #include "runtime/picture/picture_memory.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -47,7 +48,9 @@ std::vector<std::filesystem::path> folders_of(const std::vector<std::string>& ou
         folder = folder.has_parent_path() ? folder.parent_path() : std::filesystem::path(".");
         std::error_code error;
         std::filesystem::create_directories(folder, error);
-        if (error) throw Error(fmt::format("-o {}: can't make {}: {}", text, folder.string(), error.message()));
+        if (error)
+            throw Error(fmt::format("{} {}: can't make {}: {}", name_of(Setting::Output), text, folder.string(),
+                                    error.message()));
         folders.push_back(folder);
     }
     return folders;
@@ -67,7 +70,8 @@ std::string FrameFiles::name_in_part(const std::string& pattern) const
 void FrameFiles::check_part(const std::string& pattern) const
 {
     if (!part_ && has_part(pattern))
-        throw Error("{part} stands for a part of the points; give --part, or leave it out");
+        throw Error(
+            fmt::format("{{part}} stands for a part of the points; give {}, or leave it out", name_of(Setting::Part)));
 }
 
 std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
@@ -76,12 +80,11 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
     for (const Target& target : targets_) {
         const std::string& pattern = target.to.pattern;
         if (has_part(pattern))
-            throw Error(fmt::format("-o {}: names the whole, where --parts is given; leave {{part}} out", target.text));
+            throw Error(fmt::format("{} {}: names the whole, where {} is given; leave {{part}} out",
+                                    name_of(Setting::Output), target.text, name_of(Setting::Parts)));
         if (const Format& format = format_of(pattern); !format.read || format.film || format.places_alone)
-            throw Error(
-                fmt::format("-o {}: a {} file of parts can't be put together; write points, or leave --parts "
-                            "out",
-                            target.text, format.extension));
+            throw Error(fmt::format("{} {}: a {} file of parts can't be put together; write points, or leave {} out",
+                                    name_of(Setting::Output), target.text, format.extension, name_of(Setting::Parts)));
         for (const std::string& output : target.outputs) {
             const std::string whole = FramePattern(pattern).of_output(output);
             merges.emplace_back(whole, with_part(whole, "{part}"));
@@ -146,8 +149,8 @@ void FrameFiles::check_film(const Format& format, const std::string& pattern) co
     if (FramePattern(pattern).has_frame())
         throw Error("a film is one file of all frames; leave the frame's number out of its name");
     if (needs_even_edges(format.extension) && (picture_->width % 2 != 0 || picture_->height % 2 != 0))
-        throw Error(fmt::format("a {} film has even edges; give a --size other than {}x{}", format.extension,
-                                picture_->width, picture_->height));
+        throw Error(fmt::format("a {} film has even edges; give a {} other than {}x{}", format.extension,
+                                name_of(Setting::PictureSize), picture_->width, picture_->height));
     require_ffmpeg();
 }
 
@@ -163,7 +166,8 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
         // Each pattern of pictures keeps what it has drawn of the scene.
         if (format.film || format.extension == ".png")
             require_picture_memory(picture_->width, picture_->height, scene_->may_have_colliders(),
-                                   static_cast<double>(++of_pictures), "give a smaller --size");
+                                   static_cast<double>(++of_pictures),
+                                   ("give a smaller " + name_of(Setting::PictureSize)).c_str());
         if (format.film)
             check_film(format, pattern);
         else if (several_frames && !FramePattern(pattern).has_frame())
@@ -200,7 +204,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
                                      Sequence{target.to.pattern, output, of.fps, of.start});
             }
         } catch (const Error& error) {
-            throw Error(fmt::format("-o {}: {}", target.text, error.message()));
+            throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()));
         }
     }
 }
@@ -214,9 +218,10 @@ void FrameFiles::claim(WrittenNames& names, const RunFrames& frames) const
         }
     for (const Target& target : targets_)
         for (const std::string& output : target.outputs) try {
-                names.add(FramePattern(target.to.pattern), output, frames, "-o " + target.text);
+                names.add(FramePattern(target.to.pattern), output, frames,
+                          name_of(Setting::Output) + " " + target.text);
             } catch (const Error& error) {
-                throw Error(fmt::format("-o {}: {}", target.text, error.message()));
+                throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()));
             }
 }
 

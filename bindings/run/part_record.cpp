@@ -10,6 +10,7 @@
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/whole_file.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -92,12 +93,12 @@ std::string difference(const PartRecord& there, const PartRecord& here)
     };
     compare("the number of parts", fmt::format("{}", there.part.count), fmt::format("{}", here.part.count));
     compare("the sample", sample(there), sample(here));
-    compare("-f", frames(there.frames), frames(here.frames));
+    compare(name_of(Setting::Frames), frames(there.frames), frames(here.frames));
     compare("fps", fmt::format("{}", there.fps), fmt::format("{}", here.fps));
     compare("the first frame", fmt::format("{}", there.start), fmt::format("{}", here.start));
     std::map<std::string, std::string> names = there.identity;
     names.insert(here.identity.begin(), here.identity.end());
-    for (const auto& [name, value] : names) compare(name, of(there, name), of(here, name));
+    for (const auto& [name, value] : names) compare(name_in_message(name), of(there, name), of(here, name));
     return fmt::format("{}", fmt::join(found, "; "));
 }
 

@@ -7,6 +7,7 @@
 
 #include "bindings/run/frame_record_archive.h"
 #include "runtime/io/state_file.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -89,8 +90,9 @@ void RunCache::was_read(const fs::path& file)
 void RunCache::refuse(const std::vector<std::string>& differences)
 {
     if (!replaces_)
-        throw Error(fmt::format("--cache {}: it is of another run: {}; give another folder, or --again to begin anew",
-                                folder().string(), list_of(differences)));
+        throw Error(fmt::format("{} {}: it is of another run: {}; give another folder, or {} to begin anew",
+                                name_of(Setting::Cache), folder().string(), list_of(differences),
+                                name_of(Setting::CacheAgain)));
     again_ = true;
 }
 
@@ -192,9 +194,10 @@ void RunCache::go_on_as_before()
     const bool wanted = std::exchange(estimates_errors_, fingerprint_.at(errors_estimated) == "yes");
     if (wanted && !estimates_errors_)
         failures_.push_back(
-            fmt::format("--cache {}: no errors are estimated, as the run that began it has estimated none (--quiet); "
-                        "give --again to estimate them",
-                        folder().string()));
+            fmt::format("{} {}: no errors are estimated, as the run that began it has estimated none ({}); "
+                        "give {} to estimate them",
+                        name_of(Setting::Cache), folder().string(), name_of(Setting::EstimateErrors),
+                        name_of(Setting::CacheAgain)));
 }
 
 void RunCache::begin(const Session& session, const Plan& plan, const RunFrames& frames, const Fingerprint& options,

@@ -13,6 +13,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/merge_parts.h"
 #include "runtime/points/column_files.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -121,8 +122,8 @@ RunParts::RunParts(const std::vector<std::string>& given)
         const fs::path file = part_record_file(pattern);
         std::error_code none;
         if (!fs::exists(file, none)) {
-            problems.push_back(fmt::format(
-                "{} is no complete part: {} is not there, which run --part writes at its end", pattern, file.string()));
+            problems.push_back(fmt::format("{} is no complete part: {} is not there, which run {} writes at its end",
+                                           pattern, file.string(), name_of(Setting::Part)));
             continue;
         }
         PartFiles part{pattern, PartRecord::read(file), {}};
@@ -186,21 +187,21 @@ void RunParts::check_output(const std::string& output) const
 {
     const Format& format = format_of(output);
     if (!format.read || format.film || format.places_alone)
-        throw Error(
-            fmt::format("-o {}: a {} file holds no points; merge to a format that does", output, format.extension));
+        throw Error(fmt::format("{} {}: a {} file holds no points; merge to a format that does",
+                                name_of(Setting::Output), output, format.extension));
     for (const PartFiles& part : parts_)
         if (const Format& own = format_of(part.text); !own.read || own.places_alone)
             throw Error(fmt::format("{}: a {} file holds no points that could be read", part.text, own.extension));
     const FramePattern pattern(output);
     if (parts_.front().frames.size() > 1 && !pattern.has_frame())
-        throw Error(
-            fmt::format("-o {}: several frames go to one file; put the frame's number into its name, as ####", output));
+        throw Error(fmt::format("{} {}: several frames go to one file; put the frame's number into its name, as ####",
+                                name_of(Setting::Output), output));
     std::error_code none;
     for (const PartFiles& part : parts_)
         for (const auto& [frame, path] : part.frames)
             if (fs::equivalent(pattern.expand(frame), path, none))
-                throw Error(
-                    fmt::format("-o {}: would replace {}, a part; give the whole another name", output, path.string()));
+                throw Error(fmt::format("{} {}: would replace {}, a part; give the whole another name",
+                                        name_of(Setting::Output), output, path.string()));
 }
 
 std::uint64_t RunParts::write_frame(int frame, const std::string& output) const

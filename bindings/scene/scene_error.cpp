@@ -3,7 +3,7 @@
 #include <new>
 
 #include "runtime/cancellation.h"
-#include "runtime/of_thread.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -14,8 +14,9 @@ namespace {
 // memory, neither.
 bool is_of_memory(std::string_view message)
 {
-    for (const std::string_view words :
-         {"out of memory", "not enough memory", "C++ exception", "--script-memory sets the limit", "or set --memory"})
+    for (const std::string& words :
+         {std::string("out of memory"), std::string("not enough memory"), std::string("C++ exception"),
+          name_of(Setting::ScriptMemory) + " sets the limit", "or set " + name_of(Setting::Memory)})
         if (message.find(words) != message.npos) return true;
     return false;
 }
@@ -45,9 +46,9 @@ SceneError busy()
         "the scene is in another call: of another thread, or the one that has called back; wait for its end");
 }
 
-SceneError caught_error(SceneError::Kind kind)
 void end_as_cancelled() { throw SceneException(error_of(SceneError::Cancelled, Cancellation::text)); }
 
+SceneError caught_error(SceneError::Kind kind)
 {
     try {
         throw;
@@ -58,9 +59,9 @@ void end_as_cancelled() { throw SceneException(error_of(SceneError::Cancelled, C
         result.file = error.location().file;
         result.line = error.location().line;
         result.node = error.node();
-    } catch (const std::bad_alloc&) {
         result.script_stack = error.trace();
         return result;
+    } catch (const std::bad_alloc&) {
         return error_of(SceneError::OutOfMemory, "out of memory");
     } catch (const std::exception& error) {
         return error_of(SceneError::Unexpected, error.what());

@@ -15,6 +15,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/graph/coupling.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -129,7 +130,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     void note_settings() const
     {
         for (const auto& [name, value] : scene.options.set) record->identity[name] = text_of(value);
-        if (scene.options.seed) record->identity["--seed"] = fmt::format("{}", *scene.options.seed);
+        if (scene.options.seed) record->identity[seed_entry] = fmt::format("{}", *scene.options.seed);
         if (options.text) record->identity["the text of the scene"] = hash_text(content_hash(*options.text));
     }
 
@@ -192,10 +193,11 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
             }
         };
         if (cache.asked())
-            for (const char* name : {"journal", "events", ".lock"}) claim(cache.folder() / name, "--cache");
-        claim(name_in_part(options.statistics, options.part), "--stats");
-        claim(name_in_part(options.profile, options.part), "--profile");
-        claim(events.path(), "--events");
+            for (const char* name : {"journal", "events", ".lock"})
+                claim(cache.folder() / name, name_of(Setting::Cache));
+        claim(name_in_part(options.statistics, options.part), name_of(Setting::Statistics));
+        claim(name_in_part(options.profile, options.part), name_of(Setting::Profile));
+        claim(events.path(), name_of(Setting::Events));
     }
 
     RunFrames range_of(const Plan& plan) const
@@ -203,16 +205,17 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         const std::int64_t start = plan.first_frame();
         if (!options.frames) return {start, start + default_frames - 1};
         if (options.frames->first < start)
-            throw Error(fmt::format("-f: frame {} is before the scene's first, {}", options.frames->first, start));
+            throw Error(fmt::format("{}: frame {} is before the scene's first, {}", name_of(Setting::Frames),
+                                    options.frames->first, start));
         return *options.frames;
     }
 
     // What else changes what a run keeps.
     Fingerprint fingerprint_options() const
     {
-        Fingerprint all = {{"--events", options.events.empty() ? "no" : "yes"}};
-        if (options.part) all["--part"] = name_of(*options.part);
-        if (options.sample) all["--sample"] = fmt::format("{}", *options.sample);
+        Fingerprint all = {{events_entry, options.events.empty() ? "no" : "yes"}};
+        if (options.part) all[part_entry] = name_of(*options.part);
+        if (options.sample) all[sample_entry] = fmt::format("{}", *options.sample);
         return all;
     }
 

@@ -73,7 +73,7 @@ Result<Done> SceneSnapshot::write(const std::string& path, const std::string& ke
 SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
 {
     if (file.header().at("what") != what_it_is)
-        throw Error("it is of a run of the command, which goes on from it by itself: rapid run --cache");
+        throw Error("it is of a run, which goes on from it by itself where it has its cache");
     const CheckedJson& fingerprint = file.header().at("fingerprint");
     require_this_build(fingerprint.at("Rapid").get<std::string>());
     auto data = std::make_shared<Data>();

@@ -28,7 +28,7 @@ struct MergedFiles {
 // format that holds no points; an output that would replace a part. FailedFrame: a file that can't be read or written,
 // a point that belongs to another part; frames before it are written. Busy: another thread merges. OutOfMemory and
 // Unexpected at any time. Meanwhile no scene may run and no frame be read or copied, whose points would lie in those
-// files, too. Messages say "-o" of the output, and --part of a run in parts, as the command does.
+// files, too.
 Result<MergedFiles> merge_files(const std::vector<std::string>& parts, const std::string& output,
                                 const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress = {});
 

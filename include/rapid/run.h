@@ -9,8 +9,6 @@
 //   if (auto ready = run->prepare(); !ready) return fail(ready.error().text());
 //   auto outcome = run->run();
 //   if (!outcome || outcome->error) return fail(outcome ? outcome->error->text() : outcome.error().text());
-//
-// Messages name what is wrong by the options of the command: "-o" is FileOutputs::outputs, "-f" RunOptions::frames.
 #pragma once
 
 #include <cstdint>

@@ -327,8 +327,7 @@ enum class LogLevel { Print = 0, Warning = 1 };
 
 // How a scene is opened and run.
 struct SceneOptions {
-    // Values of the scene's parameters by name, and of its nodes' by NODE.PARAM ("solve.substeps"), as --set gives
-    // them.
+    // Values of the scene's parameters by name, and of its nodes' by NODE.PARAM ("solve.substeps").
     std::vector<std::pair<std::string, SceneValue>> set;
     std::optional<std::uint64_t> seed;  // replaces the seed of each create, but no rapid.param "seed"
 

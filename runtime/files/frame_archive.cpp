@@ -20,6 +20,7 @@
 #include "runtime/files/input_file.h"
 #include "runtime/files/output_file.h"
 #include "runtime/memory_budget.h"
+#include "runtime/setting_names.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -127,7 +128,7 @@ void RecordLog::clear()
 Descriptor FrameArchive::lock(const fs::path& folder, const fs::path& asked, const char* who)
 {
     const auto refuse = [&](const std::string& why) {
-        throw Error(fmt::format("--cache {}: {}", asked.string(), why));
+        throw Error(fmt::format("{} {}: {}", name_of(Setting::Cache), asked.string(), why));
     };
     std::error_code error;
     fs::create_directories(folder, error);

@@ -21,6 +21,7 @@
 #include "runtime/files/file_error.h"
 #include "runtime/files/input_file.h"
 #include "runtime/memory_budget.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -189,8 +190,8 @@ Error beyond_limit(const Limits& limits)
     if (limits.is_of_budget)
         return Error(
             fmt::format("can't be read: its reader takes more than the {} that are left for it; read a smaller file, "
-                        "or set --memory",
-                        memory_text(static_cast<double>(limits.memory))));
+                        "or set {}",
+                        memory_text(static_cast<double>(limits.memory)), name_of(Setting::Memory)));
     return Error(
         fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged", limits.memory >> 20));
 }

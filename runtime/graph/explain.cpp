@@ -7,6 +7,7 @@
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -74,7 +75,8 @@ std::string what_brings_in(const PlannedAttribute& attribute)
     if (attribute.name == "dt") return "a node that bears points within a frame";
     if (attribute.group) {
         const std::string name = attribute.name.substr(group_prefix.size());
-        return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or -o FILE:{0}", name);
+        return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or {1} FILE:{0}", name,
+                           name_of(Setting::Output));
     }
     return usual_way_in(attribute.name);
 }
@@ -136,7 +138,7 @@ std::size_t Explanation::bytes_per_point() const
 
 std::string usual_way_in(const std::string& attribute)
 {
-    return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or -o FILE:{0}", attribute);
+    return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or {1} FILE:{0}", attribute, name_of(Setting::Output));
 }
 
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
@@ -172,9 +174,10 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
         for (const PlannedNode& planned : plan.nodes)
             if (needs(*planned.node, words.stage)) users.push_back(planned.node->name);
         if (words.stage == Stage::Writing)
-            for (const std::string& output : outputs) users.push_back("-o " + output);
-        result.stages.push_back(
-            {words.name, !users.empty(), users.empty() ? words.absent : fmt::format("{}", fmt::join(users, ", "))});
+            for (const std::string& output : outputs) users.push_back(name_of(Setting::Output) + " " + output);
+        result.stages.push_back({words.name, !users.empty(),
+                                 users.empty() ? fmt::format(fmt::runtime(words.absent), name_of(Setting::Output))
+                                               : fmt::format("{}", fmt::join(users, ", "))});
     }
     put_kept_first(result.stages);
 

@@ -6,6 +6,7 @@
 
 #include "runtime/json_text.h"
 #include "runtime/printable.h"
+#include "runtime/setting_names.h"
 
 namespace rapid {
 namespace {
@@ -145,7 +146,9 @@ std::string to_text(const Explanation& plan)
     text += functions.text(" functions of the frame");
     text += " passes over the points\n";
     for (const std::vector<std::string>& pass : plan.passes) text += fmt::format("  {}\n", fmt::join(pass, ", "));
-    if (plan.couplings.empty()) return text + " parts: yes (run --part, --sample)\n" + text_of_half(plan, false);
+    if (plan.couplings.empty())
+        return text + fmt::format(" parts: yes (run {}, {})\n", name_of(Setting::Part), name_of(Setting::Sample)) +
+               text_of_half(plan, false);
     Rows couplings;
     for (const auto& coupling : plan.couplings) couplings.add(coupling.name, "", coupling.what);
     return text + couplings.text(" parts: no, because") + text_of_half(plan, false);

@@ -101,7 +101,7 @@ TEST_CASE("a reader takes no more than half of what the budget leaves, and may t
         CHECK(refusal_of(32 * mebibyte).empty());
         CHECK(refusal_of(96 * mebibyte) ==
               "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or set "
-              "--memory");
+              "memory");
     }
     const std::uint64_t used = memory_budget() - free_memory();
     const MemoryBudget budget(used + 512 * mebibyte);

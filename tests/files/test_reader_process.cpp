@@ -79,7 +79,7 @@ TEST_CASE("a reader process keeps to the budget of the process that it serves", 
         set_memory_budget(1);
         expect(error_of([&] { reader(file, "much"); }) ==
                    "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or "
-                   "set --memory",
+                   "set memory",
                2);
         expect(reader(file, "parent") > 0, 3);
     });

@@ -70,10 +70,11 @@ const std::map<std::string, std::set<std::string>> below = {
 // What files of the command include of the runtime besides the promised headers: small tools that know nothing of
 // points and scenes. All of runtime/files is of this kind.
 const std::set<std::string> small_tools = {
-    "runtime/cancellation.h",  "runtime/checked_json.h",       "runtime/error.h",           "runtime/first_error.h",
-    "runtime/memory_budget.h", "runtime/memory_watch.h",       "runtime/path_list.h",       "runtime/printable.h",
-    "runtime/picture/tone.h",  "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/stopwatch.h",
-    "runtime/threads.h"};
+    "runtime/cancellation.h",       "runtime/checked_json.h",    "runtime/error.h",
+    "runtime/first_error.h",        "runtime/memory_budget.h",   "runtime/memory_watch.h",
+    "runtime/path_list.h",          "runtime/printable.h",       "runtime/picture/tone.h",
+    "runtime/report/number_text.h", "runtime/report/progress.h", "runtime/setting_names.h",
+    "runtime/stopwatch.h",          "runtime/threads.h"};
 
 // What they include besides these of the library's inside: each is for them alone, and no program of others needs it.
 const std::set<std::string> for_our_programs = {"bindings/host/graph_parameter.h", "bindings/run/study_scene.h",
@@ -237,6 +238,27 @@ TEST_CASE("a command is a program like others", "[layers]")
         INFO(file << " includes more of Rapid than include/rapid, small tools and what is there for our programs");
         CHECK_FALSE((fs::path(file).extension() == ".cpp" && knows_inside(file)));
     }
+}
+
+TEST_CASE("the library does not speak of the command's options", "[layers]")
+{
+    // What files of runs call their entries, and arguments of ffmpeg.
+    const std::set<std::string> others = {"bindings/run/fingerprint.h", "runtime/io/film.cpp"};
+    const std::regex text(R"re("((?:[^"\\]|\\.)*)")re"), option(R"re((^|[^-\w])(--[a-z]{2,}|-[ofj](?=[ :]|$)))re");
+    const fs::path root = RAPID_SOURCE_DIR;
+    for (const char* folder : {"runtime", "bindings/host", "bindings/run", "bindings/scene", "bindings/c"})
+        for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+            const std::string file = fs::relative(entry.path(), root).string();
+            if (!entry.is_regular_file() || others.count(file) == 1) continue;
+            std::ifstream in(entry.path());
+            for (std::string line; std::getline(in, line);) {
+                if (line.find_first_not_of(' ') == line.find("//")) continue;
+                for (std::sregex_iterator found(line.begin(), line.end(), text), end; found != end; ++found) {
+                    CAPTURE(file, line);
+                    CHECK_FALSE(std::regex_search((*found)[1].first, (*found)[1].second, option));
+                }
+            }
+        }
 }
 
 TEST_CASE("only shapes and formats know OpenVDB", "[layers]")

@@ -546,7 +546,7 @@ TEST_CASE("a scene whose frames take more memory than it has is an error, and go
     options.set = {{"large", 1e6}};
     Scene scene = opened(growing, options);
     const SceneError error = scene.advance_to(9).error();
-    CHECK_THAT(error.message, Contains("the run takes") && Contains("or set --memory"));
+    CHECK_THAT(error.message, Contains("the run takes") && Contains("or set memory"));
     CHECK(error.kind == SceneError::OutOfMemory);
     CHECK(error.node == "d");
     good(scene.set("large", 1.0));

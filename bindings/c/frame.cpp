@@ -27,6 +27,37 @@ const char* text_of(const rapid_error* error, const auto& field)
     return open ? field(*open).c_str() : "";
 }
 
+// Gives a text of the frame, which belongs to it until the next of its kind.
+int text_into(rapid_frame* frame, const char* kind, const char** text, const char* name, rapid_error** error,
+              const auto& make)
+{
+    return guarded(error, [&] {
+        not_null(text, name) = nullptr;
+        const auto open = open_frame(frame);
+        std::string made = make(std::as_const(open->frame));
+        const std::lock_guard lock(open->mutex);
+        // What was given before stays valid where it is the same.
+        std::string& kept = open->texts[kind];
+        if (kept != made) kept = std::move(made);
+        *text = kept.c_str();
+    });
+}
+
+int picture_into(rapid_frame* frame, const void** png, size_t* bytes, rapid_error** error, const auto& draw)
+{
+    return guarded(error, [&] {
+        not_null(png, "png") = nullptr;
+        not_null(bytes, "bytes") = 0;
+        const auto open = open_frame(frame);
+        std::string picture = draw(std::as_const(open->frame));
+        const std::lock_guard lock(open->mutex);
+        std::string& kept = open->texts["picture"];
+        kept = std::move(picture);
+        *png = kept.data();
+        *bytes = kept.size();
+    });
+}
+
 }  // namespace
 
 int tell(rapid_error** to, SceneError error) noexcept
@@ -43,9 +74,24 @@ int tell(rapid_error** to, SceneError error) noexcept
     return status;
 }
 
+PictureCamera camera_of(const rapid_camera* given)
+{
+    PictureCamera camera;
+    if (!given) return camera;
+    const auto place_of = [](const double* from) {
+        std::array<double, 3> place{};
+        std::copy_n(from, 3, place.begin());
+        return place;
+    };
+    if (given->position) camera.position = place_of(given->position);
+    if (given->target) camera.target = place_of(given->target);
+    if (given->fov != 0) camera.fov = given->fov;
+    return camera;
+}
+
 rapid_frame* new_frame(SceneFrame frame)
 {
-    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}, {}, {}, {}, {}, {}});
+    auto object = std::shared_ptr<OpenFrame>(new OpenFrame{std::move(frame), {}, {}, {}});
     return static_cast<rapid_frame*>(Frames::add(std::move(object)));
 }
 
@@ -55,7 +101,7 @@ using namespace rapid;
 
 extern "C" {
 
-const char* rapid_version(void) { return RAPID_VERSION; }
+const char* rapid_version(void) { return version().data(); }
 
 const char* rapid_error_message(const rapid_error* error)
 {
@@ -77,7 +123,7 @@ const char* rapid_error_text(const rapid_error* error)
     return text_of(
         error, [](const OpenError& open) -> auto& { return open.text; });
 }
-const char* rapid_error_stack(const rapid_error* error)
+const char* rapid_error_script_stack(const rapid_error* error)
 {
     return text_of(
         error, [](const OpenError& open) -> auto& { return open.error.script_stack; });
@@ -87,12 +133,12 @@ int rapid_error_line(const rapid_error* error)
     const auto open = Errors::get(error);
     return open ? open->error.line : 0;
 }
-int rapid_error_status(const rapid_error* error)
+int rapid_error_kind(const rapid_error* error)
 {
     const auto open = Errors::get(error);
     return open ? static_cast<int>(open->error.kind) : RAPID_OK;
 }
-void rapid_error_free(rapid_error* error) { Errors::remove(error); }
+void rapid_error_release(rapid_error* error) { Errors::remove(error); }
 
 int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, rapid_error** error)
 {
@@ -102,58 +148,68 @@ int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, r
     });
 }
 
-int rapid_frame_names(rapid_frame* frame, int what, const char** lines, rapid_error** error)
+int rapid_frame_outputs(rapid_frame* frame, const char** lines, rapid_error** error)
+{
+    return text_into(frame, "outputs", lines, "lines", error, [](auto& of) { return joined(of.outputs()); });
+}
+
+int rapid_frame_columns(rapid_frame* frame, const char** lines, rapid_error** error)
+{
+    return text_into(frame, "columns", lines, "lines", error, [](auto& of) { return joined(of.columns()); });
+}
+
+int rapid_frame_groups(rapid_frame* frame, const char** lines, rapid_error** error)
+{
+    return text_into(frame, "groups", lines, "lines", error, [](auto& of) { return joined(of.groups()); });
+}
+
+int rapid_frame_details(rapid_frame* frame, const char** lines, rapid_error** error)
+{
+    return text_into(frame, "details", lines, "lines", error, [](auto& of) { return joined(of.details()); });
+}
+
+int rapid_frame_warnings(rapid_frame* frame, const char** lines, rapid_error** error)
+{
+    return text_into(frame, "warnings", lines, "lines", error, [](auto& of) { return joined(of.warnings()); });
+}
+
+int64_t rapid_frame_number(rapid_frame* frame)
+{
+    return gotten([&] { return open_frame(frame)->frame.number(); });
+}
+double rapid_frame_time(rapid_frame* frame)
+{
+    return gotten([&] { return open_frame(frame)->frame.time(); });
+}
+double rapid_frame_fps(rapid_frame* frame)
+{
+    return gotten([&] { return open_frame(frame)->frame.fps(); });
+}
+size_t rapid_frame_size(rapid_frame* frame)
+{
+    return gotten([&] { return open_frame(frame)->frame.size(); });
+}
+
+int rapid_frame_statistics(rapid_frame* frame, rapid_statistics* statistics, rapid_error** error)
 {
     return guarded(error, [&] {
-        not_null(lines, "lines") = nullptr;
-        const auto open = open_frame(frame);
-        if (what < RAPID_OUTPUTS || what > RAPID_WARNINGS)
-            refuse(fmt::format(
-                "what = {}; it must be one of RAPID_OUTPUTS, RAPID_COLUMNS, RAPID_GROUPS, RAPID_WARNINGS", what));
-        const SceneFrame& of = open->frame;
-        const auto names = what == RAPID_OUTPUTS   ? of.outputs()
-                           : what == RAPID_COLUMNS ? of.columns()
-                           : what == RAPID_GROUPS  ? of.groups()
-                                                   : of.warnings();
-        const std::lock_guard lock(open->mutex);
-        if (open->names[what].empty()) open->names[what] = fmt::format("{}", fmt::join(names, "\n"));
-        *lines = open->names[what].c_str();
+        const FrameStatisticsSummary all = open_frame(frame)->frame.statistics();
+        give(statistics,
+             {0, all.points, all.born, all.died, all.collisions, all.substeps, all.has_errors, all.error_p50,
+              all.error_p95, all.error_max, all.penetration_max, all.constraint_residual_max, all.seconds,
+              all.script_seconds, all.solve_seconds},
+             "statistics");
     });
 }
 
-int rapid_frame_get_info(rapid_frame* frame, rapid_frame_info* info, rapid_error** error)
+int rapid_frame_statistics_json(rapid_frame* frame, const char** json, rapid_error** error)
 {
-    return guarded(error, [&] {
-        const auto open = open_frame(frame);
-        const FrameStatisticsSummary all = open->frame.statistics();
-        give(info,
-             {0, open->frame.number(), open->frame.time(), open->frame.fps(), open->frame.size(), all.born, all.died,
-              all.collisions, all.substeps, all.has_errors, all.error_p50, all.error_p95, all.error_max,
-              all.penetration_max, all.constraint_residual_max, all.seconds, all.script_seconds, all.solve_seconds},
-             "info");
-    });
+    return text_into(frame, "statistics", json, "json", error, [](auto& of) { return of.statistics_json(); });
 }
 
-int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** error)
+int rapid_frame_profile_json(rapid_frame* frame, const char** json, rapid_error** error)
 {
-    return guarded(error, [&] {
-        not_null(json, "json") = nullptr;
-        const auto open = open_frame(frame);
-        const std::lock_guard lock(open->mutex);
-        if (open->statistics.empty()) open->statistics = open->frame.statistics_json();
-        *json = open->statistics.c_str();
-    });
-}
-
-int rapid_frame_profile(rapid_frame* frame, const char** json, rapid_error** error)
-{
-    return guarded(error, [&] {
-        not_null(json, "json") = nullptr;
-        const auto open = open_frame(frame);
-        const std::lock_guard lock(open->mutex);
-        if (open->profile.empty()) open->profile = open->frame.profile_json();
-        *json = open->profile.c_str();
-    });
+    return text_into(frame, "profile", json, "json", error, [](auto& of) { return of.profile_json(); });
 }
 
 int rapid_frame_column(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error)
@@ -171,7 +227,7 @@ int rapid_frame_expanded(rapid_frame* frame, const char* name, rapid_column* col
     return column_into(frame, name, column, error, [](auto& of, const char* which) { return of.expanded(which); });
 }
 
-int rapid_token_text(uint32_t token, const char** text, rapid_error** error)
+int rapid_frame_text_of(uint32_t token, const char** text, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(text, "text") = nullptr;
@@ -179,7 +235,7 @@ int rapid_token_text(uint32_t token, const char** text, rapid_error** error)
     });
 }
 
-int rapid_text_token(const char* text, uint32_t* token, rapid_error** error)
+int rapid_frame_token_of(const char* text, uint32_t* token, rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(token, "token") = 0;
@@ -191,11 +247,20 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
 {
     return guarded(error, [&] {
         const auto open = open_frame(frame);
-        const std::string wanted = &not_null(name, "name");
-        const std::map<std::string, SceneValue> details = open->frame.details();
-        const auto found = details.find(wanted);
-        if (found == details.end()) refuse(fmt::format("the frame has no detail value \"{}\"", wanted));
-        not_null(value, "value") = value_in_c(found->second);  // a number or three: no text
+        // A number or three: no text.
+        not_null(value, "value") = value_in_c(open->frame.detail(&not_null(name, "name")).value());
+    });
+}
+
+int rapid_frame_places(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* places, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_frame(frame);
+        if (count == 0) return;
+        not_null(ids, "ids");
+        not_null(places, "places");
+        const std::vector<std::uint32_t> found = open->frame.places({ids, ids + count}).value();
+        std::copy(found.begin(), found.end(), places);
     });
 }
 
@@ -214,27 +279,33 @@ int rapid_frame_read(const char* path, rapid_frame** frame, rapid_error** error)
 
 int rapid_frame_describe(rapid_frame* frame, const char** json, rapid_error** error)
 {
-    return guarded(error, [&] {
-        not_null(json, "json") = nullptr;
-        const auto open = open_frame(frame);
-        SceneReport report = open->frame.describe().value();
-        const std::lock_guard lock(open->mutex);
-        open->description = std::move(report.json);
-        *json = open->description.c_str();
-    });
+    return text_into(frame, "description", json, "json", error, [](auto& of) { return of.describe().value().json; });
 }
 
 int rapid_frame_compare(rapid_frame* frame, rapid_frame* with, double tolerance, int* same, const char** json,
                         rapid_error** error)
 {
-    return guarded(error, [&] {
-        if (json) *json = nullptr;
-        const auto open = open_frame(frame);
-        FrameComparison found = open->frame.compare(open_frame(with)->frame, tolerance).value();
+    const char* unread = nullptr;
+    return text_into(frame, "comparison", json ? json : &unread, "json", error, [&](auto& of) {
+        FrameComparison found = of.compare(open_frame(with)->frame, tolerance).value();
         if (same) *same = found.same;
-        const std::lock_guard lock(open->mutex);
-        open->comparison = std::move(found.report.json);
-        if (json) *json = open->comparison.c_str();
+        return std::move(found.report.json);
+    });
+}
+
+int rapid_frame_picture(rapid_frame* frame, rapid_shapes* shapes, const rapid_camera* camera, int width, int height,
+                        const void** png, size_t* bytes, rapid_error** error)
+{
+    return picture_into(frame, png, bytes, error, [&](auto& of) {
+        return of.picture(open_shapes(shapes)->shapes, camera_of(camera), {width, height}).value();
+    });
+}
+
+int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
+                        rapid_error** error)
+{
+    return picture_into(frame, png, bytes, error, [&](auto& of) {
+        return SceneCall(scene).scene().picture(of, {width, height}).value();
     });
 }
 
@@ -243,6 +314,71 @@ int rapid_frame_release(rapid_frame* frame, rapid_error** error)
     return guarded(error, [&] {
         open_frame(frame);
         Frames::remove(frame);
+    });
+}
+
+int rapid_scene_shapes(rapid_scene* scene, int64_t number, rapid_shapes** shapes, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(shapes, "shapes") = nullptr;
+        auto object = std::make_shared<OpenShapes>();
+        object->shapes = SceneCall(scene).scene().shapes(number).value();
+        object->meshes = object->shapes.meshes();
+        object->planes = object->shapes.planes();
+        object->warnings = joined(object->shapes.warnings());
+        *shapes = static_cast<rapid_shapes*>(AllShapes::add(std::move(object)));
+    });
+}
+
+size_t rapid_shapes_mesh_count(rapid_shapes* shapes)
+{
+    return gotten([&] { return open_shapes(shapes)->meshes.size(); });
+}
+
+int rapid_shapes_mesh(rapid_shapes* shapes, size_t place, rapid_mesh* mesh, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_shapes(shapes);
+        const ShapeMesh& found = at_place(open->meshes, place, "the shapes have", "meshes");
+        give(mesh,
+             {0, static_cast<int>(found.role), found.corner_count, found.positions, found.triangle_count,
+              found.triangles},
+             "mesh");
+    });
+}
+
+size_t rapid_shapes_plane_count(rapid_shapes* shapes)
+{
+    return gotten([&] { return open_shapes(shapes)->planes.size(); });
+}
+
+int rapid_shapes_plane(rapid_shapes* shapes, size_t place, rapid_plane* plane, rapid_error** error)
+{
+    return guarded(error, [&] {
+        const auto open = open_shapes(shapes);
+        const ShapePlane& found = at_place(open->planes, place, "the shapes have", "planes");
+        give(plane, {0, {found.normal[0], found.normal[1], found.normal[2]}, found.offset}, "plane");
+    });
+}
+
+int rapid_shapes_has_camera(rapid_shapes* shapes)
+{
+    return gotten([&] { return static_cast<int>(open_shapes(shapes)->shapes.has_camera()); });
+}
+
+int rapid_shapes_warnings(rapid_shapes* shapes, const char** lines, rapid_error** error)
+{
+    return guarded(error, [&] {
+        not_null(lines, "lines") = nullptr;
+        *lines = open_shapes(shapes)->warnings.c_str();
+    });
+}
+
+int rapid_shapes_release(rapid_shapes* shapes, rapid_error** error)
+{
+    return guarded(error, [&] {
+        open_shapes(shapes);
+        AllShapes::remove(shapes);
     });
 }
 

@@ -14,6 +14,7 @@
 #include "bindings/scene/scene_error.h"
 #include "include/rapid/rapid.h"
 #include "include/rapid/scene.h"
+#include "include/rapid/shapes.h"
 
 namespace rapid {
 
@@ -25,9 +26,15 @@ struct OpenScene {
 };
 struct OpenFrame {
     SceneFrame frame;
-    std::mutex mutex;  // of the texts
-    std::string names[4], statistics, profile, description, comparison, picture;
+    std::mutex mutex;                          // of the texts
+    std::map<std::string, std::string> texts;  // by what they are of
     std::map<std::string, SceneValue> details;
+};
+struct OpenShapes {
+    SceneShapes shapes;
+    std::vector<ShapeMesh> meshes;
+    std::vector<ShapePlane> planes;
+    std::string warnings;
 };
 struct OpenError {
     SceneError error;
@@ -62,6 +69,7 @@ using Frames = Handles<OpenFrame, 2>;
 using Snapshots = Handles<SceneSnapshot, 3>;
 using Errors = Handles<OpenError, 4>;
 using AllOffers = Handles<OpenOffers, 5>;
+using AllShapes = Handles<OpenShapes, 6>;
 
 // Puts the error into *to, and returns its status.
 int tell(rapid_error** to, SceneError error) noexcept;
@@ -80,6 +88,17 @@ int guarded(rapid_error** error, const F& f) noexcept
         } catch (...) {
             return RAPID_OUT_OF_MEMORY;  // not even its text can be held
         }
+    }
+}
+
+// What a getter gives: f(), or nothing of a handle that is not open, and of a scene that is in another call.
+template <class F>
+auto gotten(const F& f) noexcept -> decltype(f())
+{
+    try {
+        return f();
+    } catch (...) {
+        return {};
     }
 }
 
@@ -113,6 +132,7 @@ private:
 };
 inline auto open_offers(rapid_offers* handle) { return open<AllOffers>(handle, "offers"); }
 inline auto open_frame(rapid_frame* handle) { return open<Frames>(handle, "frame"); }
+inline auto open_shapes(rapid_shapes* handle) { return open<AllShapes>(handle, "shapes"); }
 inline auto open_snapshot(rapid_snapshot* handle) { return open<Snapshots>(handle, "snapshot"); }
 
 template <class T>
@@ -122,11 +142,10 @@ T& not_null(T* pointer, const char* name)
     return *pointer;
 }
 
-// A struct of the caller's, whose size says how much he knows of it; the rest is zero.
+// A struct of the caller's, whose size says how much of it he knows; the rest is as it is in `known`.
 template <class T>
-T known_part(const T* given, const char* name)
+T known_part(const T* given, const char* name, T known = {})
 {
-    T known{};
     const std::size_t size = not_null(given, name).size;
     if (size < sizeof(std::size_t) || size > (std::size_t{1} << 16))
         refuse(fmt::format("{0}->size = {1}; it must be sizeof(*{0})", name, size));
@@ -151,6 +170,20 @@ void give(T* to, T from, const char* name)
     std::memcpy(static_cast<void*>(to), &from, std::min(size, sizeof(T)));
     if (size > sizeof(T)) std::memset(reinterpret_cast<char*>(to) + sizeof(T), 0, size - sizeof(T));
 }
+
+template <class T>
+const T& at_place(const std::vector<T>& all, std::size_t place, const char* whose, const char* what)
+{
+    if (place >= all.size()) refuse(fmt::format("place = {}; {} {} {}", place, whose, all.size(), what));
+    return all[place];
+}
+
+// A line each.
+inline std::string joined(const std::vector<std::string>& lines) { return fmt::format("{}", fmt::join(lines, "\n")); }
+
+SceneOptions options_of(const rapid_options* given);
+// What a program's pointer to a camera says; null: nothing.
+PictureCamera camera_of(const rapid_camera* given);
 
 // text: lives as long as the handle.
 rapid_value value_in_c(const SceneValue& value);

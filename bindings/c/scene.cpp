@@ -19,50 +19,6 @@ std::vector<std::pair<std::string, SceneValue>> settings_of(const rapid_setting*
     return result;
 }
 
-SceneOptions options_of(const rapid_options* given)
-{
-    const rapid_options known = given ? known_part(given, "options") : rapid_options RAPID_OPTIONS;
-    SceneOptions options;
-    options.set = settings_of(known.settings, known.setting_count);
-    if (known.seed) options.seed = *known.seed;
-    if (known.path_count > 0) not_null(known.paths, "options->paths");
-    for (std::size_t i = 0; i < known.path_count; ++i)
-        options.paths.emplace_back(&not_null(known.paths[i], "one of options->paths"));
-    options.threads = known.threads;
-    if (known.script_seconds != 0) options.script_seconds = known.script_seconds;
-    if (known.script_memory != 0) options.script_memory = known.script_memory;
-    options.memory = known.memory;
-    options.estimate_errors = !known.no_errors;
-    options.keep_all = known.keep_all != 0;
-    if (known.offers) {
-        const auto offers = open_offers(known.offers);
-        const std::lock_guard lock(offers->mutex);
-        options.objects = offers->objects;
-        options.nodes = offers->nodes;
-        options.guard_callbacks = offers->guard;
-    }
-    void* const user = known.user;
-    if (known.log)
-        options.log = [log = known.log, user](LogLevel level, const std::string& text) {
-            log(user, static_cast<int>(level), text.c_str());
-        };
-    if (known.progress)
-        options.progress = [progress = known.progress, user](std::int64_t frame, std::int64_t last) {
-            return progress(user, frame, last) != 0;
-        };
-    if (known.find_module)
-        options.find_module = [find = known.find_module, user](const std::string& name) -> std::optional<std::string> {
-            const char* text = find(user, name.c_str());
-            return text ? std::optional<std::string>(text) : std::nullopt;
-        };
-    if (known.find_file)
-        options.find_file = [find = known.find_file, user](const std::string& path) {
-            const char* found = find(user, path.c_str());
-            return std::string(found ? found : "");
-        };
-    return options;
-}
-
 int open_into(rapid_scene** scene, rapid_error** error, const auto& open)
 {
     return guarded(error, [&] {
@@ -101,9 +57,51 @@ std::string in_json(const SceneNodeType& type)
                        fmt::join(parameters, ","));
 }
 
-std::string joined(const std::vector<std::string>& lines) { return fmt::format("{}", fmt::join(lines, "\n")); }
-
 }  // namespace
+
+SceneOptions options_of(const rapid_options* given)
+{
+    const rapid_options known = given ? known_part(given, "options", rapid_default_options()) : rapid_default_options();
+    SceneOptions options;
+    options.set = settings_of(known.set, known.set_count);
+    if (known.seed) options.seed = *known.seed;
+    if (known.path_count > 0) not_null(known.paths, "options->paths");
+    for (std::size_t i = 0; i < known.path_count; ++i)
+        options.paths.emplace_back(&not_null(known.paths[i], "one of options->paths"));
+    options.threads = known.threads;
+    options.script_seconds = known.script_seconds;
+    options.script_memory = known.script_memory;
+    options.memory = known.memory;
+    options.estimate_errors = known.estimate_errors != 0;
+    options.keep_all = known.keep_all != 0;
+    if (known.offers) {
+        const auto offers = open_offers(known.offers);
+        const std::lock_guard lock(offers->mutex);
+        options.objects = offers->objects;
+        options.nodes = offers->nodes;
+        options.guard_callbacks = offers->guard;
+    }
+    void* const user = known.user;
+    if (known.log)
+        options.log = [log = known.log, user](LogLevel level, const std::string& text) {
+            log(user, static_cast<int>(level), text.c_str());
+        };
+    if (known.progress)
+        options.progress = [progress = known.progress, user](std::int64_t frame, std::int64_t last) {
+            return progress(user, frame, last) != 0;
+        };
+    if (known.find_module)
+        options.find_module = [find = known.find_module, user](const std::string& name) -> std::optional<std::string> {
+            const char* text = find(user, name.c_str());
+            return text ? std::optional<std::string>(text) : std::nullopt;
+        };
+    if (known.find_file)
+        options.find_file = [find = known.find_file, user](const std::string& path) {
+            const char* found = find(user, path.c_str());
+            return std::string(found ? found : "");
+        };
+    return options;
+}
 
 rapid_value value_in_c(const SceneValue& value)
 {
@@ -148,7 +146,7 @@ using namespace rapid;
 
 extern "C" {
 
-int rapid_load_plugin(const char* file, rapid_error** error)
+int rapid_scene_load_plugin(const char* file, rapid_error** error)
 {
     return guarded(error, [&] { Scene::load_plugin(&not_null(file, "file")).value(); });
 }
@@ -166,7 +164,7 @@ int rapid_scene_open_text(const char* name, const char* text, const rapid_option
     });
 }
 
-int rapid_scene_close(rapid_scene* scene, rapid_error** error)
+int rapid_scene_release(rapid_scene* scene, rapid_error** error)
 {
     return guarded(error, [&] {
         open_scene(scene);
@@ -174,18 +172,16 @@ int rapid_scene_close(rapid_scene* scene, rapid_error** error)
     });
 }
 
-int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error)
+size_t rapid_scene_parameter_count(rapid_scene* scene)
 {
-    return guarded(error, [&] { not_null(count, "count") = SceneCall(scene).scene().parameters().size(); });
+    return gotten([&] { return SceneCall(scene).scene().parameters().size(); });
 }
 
 int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error)
 {
     return guarded(error, [&] {
         const SceneCall open(scene);
-        const auto& all = open.scene().parameters();
-        if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} parameters", place, all.size()));
-        const SceneParameter& found = all[place];
+        const SceneParameter& found = at_place(open.scene().parameters(), place, "the scene has", "parameters");
         give(parameter, {0, found.name.c_str(), found.doc.c_str(), value_in_c(found.value), value_in_c(found.fallback)},
              "parameter");
     });
@@ -196,18 +192,16 @@ int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t co
     return guarded(error, [&] { SceneCall(scene).scene().set(settings_of(settings, count)).value(); });
 }
 
-int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error)
+size_t rapid_scene_node_count(rapid_scene* scene)
 {
-    return guarded(error, [&] { not_null(count, "count") = SceneCall(scene).scene().nodes().size(); });
+    return gotten([&] { return SceneCall(scene).scene().nodes().size(); });
 }
 
 int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error)
 {
     return guarded(error, [&] {
         const SceneCall open(scene);
-        const auto& all = open.scene().nodes();
-        if (place >= all.size()) refuse(fmt::format("place = {}; the scene has {} nodes", place, all.size()));
-        const SceneNode& found = all[place];
+        const SceneNode& found = at_place(open.scene().nodes(), place, "the scene has", "nodes");
         give(node, {0, found.name.c_str(), found.type.c_str(), found.file.c_str(), found.line}, "node");
     });
 }
@@ -295,14 +289,19 @@ int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** er
     });
 }
 
-int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
+double rapid_scene_fps(rapid_scene* scene)
 {
-    return guarded(error, [&] { not_null(frame, "frame") = SceneCall(scene).scene().first_frame(); });
+    return gotten([&] { return SceneCall(scene).scene().fps(); });
 }
 
-int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error)
+int64_t rapid_scene_first_frame(rapid_scene* scene)
 {
-    return guarded(error, [&] { not_null(frame, "frame") = SceneCall(scene).scene().next_frame(); });
+    return gotten([&] { return SceneCall(scene).scene().first_frame(); });
+}
+
+int64_t rapid_scene_next_frame(rapid_scene* scene)
+{
+    return gotten([&] { return SceneCall(scene).scene().next_frame(); });
 }
 
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error)
@@ -339,14 +338,14 @@ int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_erro
     return guarded(error, [&] { SceneCall(scene).scene().restore(*open_snapshot(snapshot)).value(); });
 }
 
-int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error)
+int64_t rapid_snapshot_frame(rapid_snapshot* snapshot)
 {
-    return guarded(error, [&] { not_null(frame, "frame") = open_snapshot(snapshot)->frame(); });
+    return gotten([&] { return open_snapshot(snapshot)->frame(); });
 }
 
-int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error)
+uint64_t rapid_snapshot_size(rapid_snapshot* snapshot)
 {
-    return guarded(error, [&] { not_null(bytes, "bytes") = open_snapshot(snapshot)->size(); });
+    return gotten([&] { return std::uint64_t{open_snapshot(snapshot)->size()}; });
 }
 
 int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error)
@@ -368,22 +367,6 @@ int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error)
     return guarded(error, [&] {
         open_snapshot(snapshot);
         Snapshots::remove(snapshot);
-    });
-}
-
-int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
-                        rapid_error** error)
-{
-    return guarded(error, [&] {
-        not_null(png, "png") = nullptr;
-        not_null(bytes, "bytes") = 0;
-        const SceneCall open(scene);
-        const auto of = open_frame(frame);
-        std::string picture = open.scene().picture(of->frame, {width, height}).value();
-        const std::lock_guard lock(of->mutex);
-        of->picture = std::move(picture);
-        *png = of->picture.data();
-        *bytes = of->picture.size();
     });
 }
 

@@ -26,7 +26,7 @@ static void check(int status, rapid_error** error)
 {
     if (status == RAPID_OK) return;
     fprintf(stderr, "%s\n", rapid_error_text(*error));
-    rapid_error_free(*error);
+    rapid_error_release(*error);
     exit(1);
 }
 
@@ -44,13 +44,13 @@ int main(int count, char** arguments)
     const rapid_shape shape = {sizeof shape, {-0.7, 0, -0.7}, {0.7, 1.4, 0.7}, ball, NULL, 1, 0};
     const rapid_setting settings[] = {{"rate", {RAPID_NUMBER, {5000, 0, 0}, NULL}},
                                       {"collide1.shape", {RAPID_TEXT, {0, 0, 0}, "host:ball"}}};
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
 
     check(rapid_offers_new(&offers, &error), &error);
     check(rapid_offers_shape(offers, "ball", &shape, &error), &error);
     options.offers = offers;
-    options.settings = settings;
-    options.setting_count = 2;
+    options.set = settings;
+    options.set_count = 2;
     options.log = warn;
     check(rapid_scene_open(count > 1 ? arguments[1] : "graphs/first.lua", &options, &scene, &error), &error);
 
@@ -71,6 +71,6 @@ int main(int count, char** arguments)
         check(rapid_frame_release(frame, &error), &error);
     }
     rapid_offers_release(offers, NULL);
-    check(rapid_scene_close(scene, &error), &error);
+    check(rapid_scene_release(scene, &error), &error);
     return 0;
 }

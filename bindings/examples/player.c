@@ -14,7 +14,7 @@ static void check(int status, rapid_error** error)
 {
     if (status == RAPID_OK) return;
     fprintf(stderr, "%s\n", rapid_error_text(*error));
-    rapid_error_free(*error);
+    rapid_error_release(*error);
     exit(1);
 }
 
@@ -61,6 +61,6 @@ int main(int count, char** arguments)
         write(number);
         check(rapid_frame_release(frame, &error), &error);
     }
-    check(rapid_scene_close(scene, &error), &error);
+    check(rapid_scene_release(scene, &error), &error);
     return 0;
 }

@@ -31,6 +31,8 @@ SceneError error_of(SceneError::Kind kind, std::string message)
 
 }  // namespace
 
+std::string_view version() { return RAPID_VERSION; }
+
 std::string SceneError::text() const
 {
     Error error(message);

@@ -186,11 +186,14 @@ SceneValue value_of(const DetailValue& detail)
     return std::array<double, 3>{vector[0], vector[1], vector[2]};
 }
 
-std::map<std::string, SceneValue> SceneFrame::details() const
+std::vector<std::string> SceneFrame::details() const { return keys_of(data_->result.outputs.at(output_).details); }
+
+Result<SceneValue> SceneFrame::detail(std::string_view name) const
 {
-    std::map<std::string, SceneValue> details;
-    for (const auto& [name, value] : data_->result.outputs.at(output_).details) details[name] = value_of(value);
-    return details;
+    const auto& all = data_->result.outputs.at(output_).details;
+    const auto found = all.find(std::string(name));
+    if (found == all.end()) return no_such("detail value", name, details());
+    return value_of(found->second);
 }
 
 FrameStatisticsSummary SceneFrame::statistics() const

@@ -1,17 +1,21 @@
 /* Rapid in C, and by it in any other language: scenes in Lua are opened, advanced, and read without a copy.
  * docs/host.md is the guide; rapid/scene.h is the same in C++, and says more of each function.
  *
- * Every function returns RAPID_OK or what went wrong, and says more in *error where `error` is not NULL: an object of
- * its own, which the caller frees with rapid_error_free(). Behind RAPID_OK *error is NULL. No exception leaves a
- * function, and none ends the program.
+ * Names are rapid_SUBJECT_VERB, and those of the members of classes in C++ and Python (docs/host.md has the table).
+ * A function that can fail returns RAPID_OK or what went wrong, and says more in *error where `error` is not NULL: an
+ * object of its own, which the caller frees with rapid_error_release(). Behind RAPID_OK *error is NULL. No exception
+ * leaves a function, and none ends the program.
  *
  * Handles (rapid_scene and the other types without a definition) are numbers in the form of pointers: one that is NULL,
- * closed already, or of another type is an error, RAPID_WRONG_CALL. Texts are UTF-8 and end with a zero; those that are
- * returned belong to the handle they come from.
+ * released already, or of another type is an error, RAPID_WRONG_CALL. Getters that can't fail return their value: 0, ""
+ * or NULL of such a handle, and of a scene that is in another call. Each handle that a function gives is to be released
+ * by rapid_SUBJECT_release(). Texts are UTF-8 and end with a zero; those that are returned belong to the handle they
+ * come from.
  *
- * Structs of options begin with their size, which tells a newer library what an older program knows:
+ * Structs begin with their size, which tells a newer library what an older program knows:
  *
- *     rapid_options options = RAPID_OPTIONS;
+ *     rapid_options options = rapid_default_options();
+ *     rapid_column P = {sizeof P};
  *
  * Threads: a scene is used by one thread at a time, which may be another at each call; a second call meanwhile is
  * RAPID_BUSY. rapid_scene_cancel() is for any thread at any time, as are all functions of frames and snapshots.
@@ -23,6 +27,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #if defined(__cplusplus)
 extern "C" {
@@ -50,15 +55,13 @@ typedef struct rapid_scene rapid_scene;
 typedef struct rapid_frame rapid_frame;
 typedef struct rapid_snapshot rapid_snapshot;
 typedef struct rapid_offers rapid_offers;
+typedef struct rapid_shapes rapid_shapes;
+typedef struct rapid_run rapid_run;
 
 /* "1.0.0", of the library. */
 const char* rapid_version(void);
 
-/* Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes that
- * are opened later, in the whole process. Not while another thread opens a scene. */
-int rapid_load_plugin(const char* file, rapid_error** error);
-
-/* ---- Errors. All take NULL, for which they return "" and 0. */
+/* ---- Errors. */
 
 const char* rapid_error_message(const rapid_error* error); /* what is wrong; what would be right */
 const char* rapid_error_file(const rapid_error* error);    /* "" where there is none */
@@ -66,9 +69,9 @@ int rapid_error_line(const rapid_error* error);            /* from 1; 0 where th
 const char* rapid_error_node(const rapid_error* error);    /* "" where there is none */
 const char* rapid_error_text(const rapid_error* error);    /* FILE:LINE: node "NAME": MESSAGE, of what is known */
 /* The calls of the script in which it was raised, a line each, the innermost first; "" where it was in no script. */
-const char* rapid_error_stack(const rapid_error* error);
-int rapid_error_status(const rapid_error* error);
-void rapid_error_free(rapid_error* error);
+const char* rapid_error_script_stack(const rapid_error* error);
+int rapid_error_kind(const rapid_error* error); /* RAPID_WRONG_CALL, ... */
+void rapid_error_release(rapid_error* error);
 
 /* ---- Values. */
 
@@ -90,7 +93,7 @@ enum {
     RAPID_INT64 = 3,
     RAPID_QUAT = 4,
     RAPID_UINT8 = 5,
-    RAPID_STRING = 6 /* tokens of texts: rapid_token_text() */
+    RAPID_STRING = 6 /* tokens of texts: rapid_frame_text_of() */
 };
 
 /* Values of one attribute, or members of a group (RAPID_UINT8, 0 or 1): shape [count][components], packed within a
@@ -105,11 +108,6 @@ typedef struct rapid_column {
     const void* data;  /* of float, int32_t, int64_t, uint8_t; of RAPID_STRING uint32_t, tokens */
 } rapid_column;
 
-/* Texts of attributes are held as tokens: equal texts have equal ones in a process, in no order, and 0 is the empty
- * text. Tokens and their texts stay valid. From any thread. */
-int rapid_token_text(uint32_t token, const char** text, rapid_error** error);
-int rapid_text_token(const char* text, uint32_t* token, rapid_error** error);
-
 /* ---- Scenes. */
 
 /* Levels of a text for `log`. */
@@ -121,21 +119,21 @@ typedef struct rapid_setting {
     rapid_value value; /* of the parameter's type */
 } rapid_setting;
 
-/* How a scene is opened and run. */
+/* How a scene is opened and run: by rapid_default_options(), with what is to be different. */
 typedef struct rapid_options {
-    size_t size;                   /* sizeof(rapid_options) */
-    const rapid_setting* settings; /* as --set gives them */
-    size_t setting_count;          /* of `settings` */
-    const uint64_t* seed;          /* replaces the seed of each create, but no rapid.param "seed"; NULL: theirs */
-    const char* const* paths;      /* folders where modules and nodes in Lua are looked for */
-    size_t path_count;             /* of `paths` */
-    int threads;                   /* 0: those of the caller's TBB arena; n: n of its own */
-    double script_seconds;         /* that scripts may take for each frame and for opening; 0: 600 */
-    uint64_t script_memory;        /* bytes of Lua memory for each thread; 0: 1 GiB */
-    uint64_t memory;               /* bytes that the process may have in all; 0: what is free */
-    int no_errors;                 /* 1: no errors are estimated */
-    int keep_all;                  /* 1: no attribute is left out */
-    void* user;                    /* is handed to the callbacks */
+    size_t size;              /* sizeof(rapid_options) */
+    const rapid_setting* set; /* values of parameters, by name or NODE.PARAM */
+    size_t set_count;         /* of `set` */
+    const uint64_t* seed;     /* replaces the seed of each create, but no rapid.param "seed"; NULL: theirs */
+    const char* const* paths; /* folders where modules and nodes in Lua are looked for */
+    size_t path_count;        /* of `paths` */
+    int threads;              /* 0: those of the caller's TBB arena; n: n of its own */
+    double script_seconds;    /* that scripts may take for each frame and for opening [600] */
+    uint64_t script_memory;   /* bytes of Lua memory for each thread [1 GiB] */
+    uint64_t memory;          /* bytes that the process may have in all; 0: what is free */
+    int estimate_errors;      /* 0: none in the statistics [1] */
+    int keep_all;             /* 1: no attribute is left out */
+    void* user;               /* is handed to the callbacks */
     /* What scripts print, and what Rapid warns of. */
     void (*log)(void* user, int level, const char* text);
     /* Of each frame that rapid_scene_advance_to() has done; 0 ends it with RAPID_CANCELLED. */
@@ -148,10 +146,17 @@ typedef struct rapid_options {
     rapid_offers* offers; /* what the program offers the scene; NULL: nothing */
 } rapid_options;
 
-#define RAPID_OPTIONS                                                                                       \
-    {                                                                                                       \
-        sizeof(rapid_options), NULL, 0, NULL, NULL, 0, 0, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL, NULL, NULL \
-    }
+/* The usual options: those in brackets above, and else zeros. */
+static inline rapid_options rapid_default_options(void)
+{
+    rapid_options options;
+    memset(&options, 0, sizeof options);
+    options.size = sizeof options;
+    options.script_seconds = 600;
+    options.script_memory = (uint64_t)1 << 30;
+    options.estimate_errors = 1;
+    return options;
+}
 
 /* Opens the scene of a file, or of a text with a name for messages. options: NULL for the usual ones. *scene is NULL
  * where it fails. */
@@ -159,7 +164,11 @@ int rapid_scene_open(const char* file, const rapid_options* options, rapid_scene
 int rapid_scene_open_text(const char* name, const char* text, const rapid_options* options, rapid_scene** scene,
                           rapid_error** error);
 /* Frames and snapshots of the scene stay. A call that is running goes on to its end. */
-int rapid_scene_close(rapid_scene* scene, rapid_error** error);
+int rapid_scene_release(rapid_scene* scene, rapid_error** error);
+
+/* Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes that
+ * are opened later, in the whole process. Not while another thread opens a scene. */
+int rapid_scene_load_plugin(const char* file, rapid_error** error);
 
 /* A rapid.param of the scene. */
 typedef struct rapid_parameter {
@@ -171,8 +180,8 @@ typedef struct rapid_parameter {
 } rapid_parameter;
 
 /* In the order in which the scene declares them. */
-int rapid_scene_parameter_count(rapid_scene* scene, size_t* count, rapid_error** error);
-/* Its texts stay valid until the scene is set or closed. */
+size_t rapid_scene_parameter_count(rapid_scene* scene);
+/* Its texts stay valid until the scene is set or released. */
 int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error);
 /* Gives parameters values, runs the scene's file again, and goes to the start. After an error the scene is as it was.
  */
@@ -187,8 +196,8 @@ typedef struct rapid_node {
     int line;         /* of the file, from 1 */
 } rapid_node;
 
-/* In the order in which the scene makes them; their texts stay valid until the scene is set or closed. */
-int rapid_scene_node_count(rapid_scene* scene, size_t* count, rapid_error** error);
+/* In the order in which the scene makes them; their texts stay valid until the scene is set or released. */
+size_t rapid_scene_node_count(rapid_scene* scene);
 int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error);
 /* All types that a scene of this program may use, as JSON: [{"name", "doc", "parameters": [{"name", "type", "unit",
  * "doc", "default", "required"}]}]. Belongs to the scene, until the next call of this function. */
@@ -196,9 +205,11 @@ int rapid_scene_node_types(rapid_scene* scene, const char** json, rapid_error** 
 /* Of opening, a line each. Belongs to the scene, until the next call of this function. */
 int rapid_scene_warnings(rapid_scene* scene, const char** text, rapid_error** error);
 
+/* Frames a second of the first create of the plan. */
+double rapid_scene_fps(rapid_scene* scene);
 /* The number of the scene's first frame, and of the one that rapid_scene_advance() computes. */
-int rapid_scene_first_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
-int rapid_scene_next_frame(rapid_scene* scene, int64_t* frame, rapid_error** error);
+int64_t rapid_scene_first_frame(rapid_scene* scene);
+int64_t rapid_scene_next_frame(rapid_scene* scene);
 /* Computes the next frame, or all up to one. *frame is to be released; frame == NULL: nobody reads it. After an error
  * the scene has no next frame until it is restarted, restored or set. */
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error);
@@ -213,8 +224,8 @@ int rapid_scene_cancel(rapid_scene* scene, rapid_error** error);
  * the save. */
 int rapid_scene_save(rapid_scene* scene, rapid_snapshot** snapshot, rapid_error** error);
 int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_error** error);
-int rapid_snapshot_frame(rapid_snapshot* snapshot, int64_t* frame, rapid_error** error);
-int rapid_snapshot_bytes(rapid_snapshot* snapshot, uint64_t* bytes, rapid_error** error);
+int64_t rapid_snapshot_frame(rapid_snapshot* snapshot); /* the last one computed before it was taken */
+uint64_t rapid_snapshot_size(rapid_snapshot* snapshot); /* bytes */
 /* Writes a file, which has its name when it is complete, or reads one, which this build of Rapid has written. *snapshot
  * is to be released. */
 int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error);
@@ -251,7 +262,8 @@ int rapid_scene_trace(rapid_scene* scene, const int64_t* ids, size_t count, cons
 int rapid_offers_new(rapid_offers** offers, rapid_error** error);
 /* 1: callbacks that write past the ends of their arrays are found. Before anything is offered. */
 int rapid_offers_guard(rapid_offers* offers, int guard, rapid_error** error);
-/* Calls release(user) once, from any thread, when the offers are released and no scene uses their callbacks any more. */
+/* Calls release(user) once, from any thread, when the offers are released and no scene uses their callbacks any more.
+ */
 int rapid_offers_on_release(rapid_offers* offers, void (*release)(void* user), void* user, rapid_error** error);
 /* positions: shape [count][3], m; triangles: shape [triangle_count][3], counter-clockwise seen from outside. */
 int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* positions, size_t count,
@@ -341,18 +353,24 @@ int rapid_offers_release(rapid_offers* offers, rapid_error** error);
 
 /* The other outputs of the frame are frames of their own, which share its memory. *frame is to be released. */
 int rapid_frame_output(rapid_frame* of, const char* name, rapid_frame** frame, rapid_error** error);
-/* Lists of a frame. */
-enum { RAPID_OUTPUTS = 0, RAPID_COLUMNS = 1, RAPID_GROUPS = 2, RAPID_WARNINGS = 3 };
-/* Names, a line each: what = RAPID_OUTPUTS, ... *lines belongs to the frame. */
-int rapid_frame_names(rapid_frame* frame, int what, const char** lines, rapid_error** error);
+/* Names, a line each, which belong to the frame: of the outputs of its scene; of the columns, groups and detail values
+ * of this output. */
+int rapid_frame_outputs(rapid_frame* frame, const char** lines, rapid_error** error);
+int rapid_frame_columns(rapid_frame* frame, const char** lines, rapid_error** error);
+int rapid_frame_groups(rapid_frame* frame, const char** lines, rapid_error** error);
+int rapid_frame_details(rapid_frame* frame, const char** lines, rapid_error** error);
+/* What nodes warned of in this frame, a line each. */
+int rapid_frame_warnings(rapid_frame* frame, const char** lines, rapid_error** error);
 
-/* The figures of a frame that are asked for most; rapid_frame_statistics() has all. */
-typedef struct rapid_frame_info {
-    size_t size;                                   /* sizeof(rapid_frame_info), set by the caller */
-    int64_t number;                                /* of the frame */
-    double time;                                   /* s since the start */
-    double fps;                                    /* of the output's simulation */
-    size_t points;                                 /* of this output */
+int64_t rapid_frame_number(rapid_frame* frame);
+double rapid_frame_time(rapid_frame* frame); /* s since the start of the output's simulation */
+double rapid_frame_fps(rapid_frame* frame);  /* of the output's simulation */
+size_t rapid_frame_size(rapid_frame* frame); /* points of this output */
+
+/* The figures of a frame that are asked for most; rapid_frame_statistics_json() has all. */
+typedef struct rapid_statistics {
+    size_t size;                                   /* sizeof(rapid_statistics), set by the caller */
+    uint64_t points;                               /* of all outputs */
     uint64_t born, died, collisions;               /* in this frame */
     int substeps;                                  /* the most that a Solve took */
     int has_errors;                                /* whether the next three were estimated */
@@ -360,28 +378,34 @@ typedef struct rapid_frame_info {
     double penetration_max;                        /* m */
     double constraint_residual_max;                /* m */
     double seconds, script_seconds, solve_seconds; /* wall time: in all, and of parts */
-} rapid_frame_info;
-/* Of this output; times and errors are those of the whole frame. */
-int rapid_frame_get_info(rapid_frame* frame, rapid_frame_info* info, rapid_error** error);
+} rapid_statistics;
+int rapid_frame_statistics(rapid_frame* frame, rapid_statistics* statistics, rapid_error** error);
 /* The frame's object in the file of `rapid run --stats`. */
-int rapid_frame_statistics(rapid_frame* frame, const char** json, rapid_error** error);
+int rapid_frame_statistics_json(rapid_frame* frame, const char** json, rapid_error** error);
 
 /* Where its time went: a list, a member for each pass over the points, in order: "nodes", "stage" ("graph", "script",
  * "solve"), "begin" and "seconds" since the frame's beginning, "points" and "bytes" of the result. */
-int rapid_frame_profile(rapid_frame* frame, const char** json, rapid_error** error);
+int rapid_frame_profile_json(rapid_frame* frame, const char** json, rapid_error** error);
+
+/* Texts of attributes are held as tokens: equal texts have equal ones in a process, in no order, and 0 is the empty
+ * text. Tokens and their texts stay valid. From any thread. */
+int rapid_frame_text_of(uint32_t token, const char** text, rapid_error** error);
+int rapid_frame_token_of(const char* text, uint32_t* token, rapid_error** error);
 
 /* An attribute, or a group; its memory belongs to the frame. Takes some nanoseconds, however many points there are. */
 int rapid_frame_column(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
 int rapid_frame_group(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
 /* As rapid_frame_column(); values that all points share are written out once, so that stride is never 0. */
 int rapid_frame_expanded(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
+/* Where the points of these ids are in the columns, shape [count]; UINT32_MAX of an id that no point has. */
+int rapid_frame_places(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* places, rapid_error** error);
 /* A value of the whole set (:detail). */
 int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value, rapid_error** error);
 
 /* Writes a file of a format that Rapid knows, by the extension. */
 int rapid_frame_write(rapid_frame* frame, const char* path, rapid_error** error);
-/* The points of such a file as a frame, of number and time 0; of what the file holds besides there are RAPID_WARNINGS.
- * *frame is to be released. */
+/* The points of such a file as a frame, of number and time 0; of what the file holds besides there are
+ * rapid_frame_warnings(). *frame is to be released. */
 int rapid_frame_read(const char* path, rapid_frame** frame, rapid_error** error);
 /* How many points there are, their bounds, the range of each attribute, the groups: an object, as that of
  * `rapid info --json`. It belongs to the frame, until it is described again. */
@@ -391,10 +415,152 @@ int rapid_frame_describe(rapid_frame* frame, const char** json, rapid_error** er
  * `rapid diff --json`, and belongs to `frame`, until it is compared again. Either may be NULL. */
 int rapid_frame_compare(rapid_frame* frame, rapid_frame* with, double tolerance, int* same, const char** json,
                         rapid_error** error);
-/* A picture with the shapes of its scene, as the bytes of a .png; they belong to the frame until the next picture. */
+int rapid_frame_release(rapid_frame* frame, rapid_error** error);
+
+/* ---- Shapes of a scene in a frame: what its points collide with and are born from, and how its pictures look. What
+ * they point to stays valid until they are released. From any thread. */
+
+/* *shapes is to be released. The frame need not be computed. */
+int rapid_scene_shapes(rapid_scene* scene, int64_t number, rapid_shapes** shapes, rapid_error** error);
+
+/* What a shape is to the points. */
+enum { RAPID_COLLIDER = 0, RAPID_EMITTER = 1 };
+
+/* A triangle mesh in world space: one of the scene, or the surface of a level set. A shape that rests has the same
+ * arrays in all frames. */
+typedef struct rapid_mesh {
+    size_t size;              /* sizeof(rapid_mesh), set by the caller */
+    int role;                 /* RAPID_COLLIDER, ... */
+    size_t corner_count;      /* of positions */
+    const float* positions;   /* shape [corner_count][3], m */
+    size_t triangle_count;    /* of triangles */
+    const int32_t* triangles; /* shape [triangle_count][3], counter-clockwise seen from outside; from 0 */
+} rapid_mesh;
+
+/* An infinite plane. */
+typedef struct rapid_plane {
+    size_t size;      /* sizeof(rapid_plane), set by the caller */
+    double normal[3]; /* of length 1, out of the shape */
+    double offset;    /* m; its points have normal . x = offset */
+} rapid_plane;
+
+/* In the order of the nodes; infinite shapes other than planes are in neither. */
+size_t rapid_shapes_mesh_count(rapid_shapes* shapes);
+int rapid_shapes_mesh(rapid_shapes* shapes, size_t place, rapid_mesh* mesh, rapid_error** error);
+size_t rapid_shapes_plane_count(rapid_shapes* shapes);
+int rapid_shapes_plane(rapid_shapes* shapes, size_t place, rapid_plane* plane, rapid_error** error);
+/* 1: the scene says from where its pictures are seen. */
+int rapid_shapes_has_camera(rapid_shapes* shapes);
+/* What was warned of when they were made, such as a mesh with holes, a line each. */
+int rapid_shapes_warnings(rapid_shapes* shapes, const char** lines, rapid_error** error);
+int rapid_shapes_release(rapid_shapes* shapes, rapid_error** error);
+
+/* From where a picture is seen; what is NULL or 0 is fitted. */
+typedef struct rapid_camera {
+    const double* position; /* shape [3], m */
+    const double* target;   /* shape [3], m */
+    double fov;             /* degrees, from the lower to the upper edge; below 180 */
+} rapid_camera;
+
+/* The bytes of a .png of a frame among shapes. camera: NULL for all fitted. They belong to the frame until the next
+ * picture. */
+int rapid_frame_picture(rapid_frame* frame, rapid_shapes* shapes, const rapid_camera* camera, int width, int height,
+                        const void** png, size_t* bytes, rapid_error** error);
+/* The same with the shapes of the frame in its scene. */
 int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int height, const void** png, size_t* bytes,
                         rapid_error** error);
-int rapid_frame_release(rapid_frame* frame, rapid_error** error);
+
+/* ---- Runs that write files, as `rapid run` does. */
+
+/* Frames from the first one to the last, each step-th. */
+typedef struct rapid_frames {
+    int64_t first, last, step;
+} rapid_frames;
+
+/* How a run ended. */
+enum { RAPID_COMPLETE = 0, RAPID_ENDED = 1, RAPID_FAILED = 2 };
+
+/* What a run writes: by rapid_default_run_options(), with what is to be different. */
+typedef struct rapid_run_options {
+    size_t size;                /* sizeof(rapid_run_options) */
+    const char* text;           /* of the scene, whose file is then a name for messages; NULL: the file's */
+    const rapid_frames* frames; /* that are written; NULL: 48 from the first */
+    /* PATTERN or PATTERN:ATTRIBUTE,ATTRIBUTE: #### is the frame's number, {output} the name of an output of the scene,
+     * the extension chooses the format (docs/cli.md). */
+    const char* const* outputs;
+    size_t output_count;    /* of `outputs` */
+    int width, height;      /* of pictures [1280 x 720] */
+    rapid_camera camera;    /* of pictures */
+    const char* statistics; /* a file of JSON; NULL: none, as of those below */
+    const char* profile;    /* a trace in Chrome's format */
+    const char* events;     /* births, contacts and deaths as points */
+    const char* cache;      /* a folder from which a run goes on where an earlier one ended */
+    int64_t cache_every;    /* a snapshot after each n-th frame, and after the last; 0: none [10] */
+    int cache_again;        /* 1: computes and writes all frames, whatever the cache holds */
+    int cache_replace;      /* 1: the cache of another run is replaced, and no error */
+    int part, part_count;   /* one of the subsets of the points, from 1; 0: all */
+    double sample;          /* the fraction of the points, above 0 and at most 1 [1] */
+    void* user;             /* is handed to the callbacks, which may be NULL, on the thread of the call */
+    /* A frame is done; is_known: of a cache, it was not computed again. */
+    void (*frame)(void* user, int64_t number, uint64_t points, double seconds, int is_known);
+    void (*line)(void* user, const char* text);    /* which files are written, what a cache has */
+    void (*warning)(void* user, const char* text); /* each once; of a frame with its number */
+} rapid_run_options;
+
+/* The usual options: those in brackets above, and else zeros. */
+static inline rapid_run_options rapid_default_run_options(void)
+{
+    rapid_run_options options;
+    memset(&options, 0, sizeof options);
+    options.size = sizeof options;
+    options.width = 1280;
+    options.height = 720;
+    options.cache_every = 10;
+    options.sample = 1;
+    return options;
+}
+
+/* What a run has come to. */
+typedef struct rapid_outcome {
+    size_t size;           /* sizeof(rapid_outcome), set by the caller */
+    int ending;            /* RAPID_COMPLETE; RAPID_ENDED by rapid_run_end_after_frame(); RAPID_FAILED in a frame */
+    int64_t last_frame;    /* that was computed or known */
+    const char* unwritten; /* statistics or a profile that could not be written, and why, a line each */
+    const char* summary;   /* of RAPID_COMPLETE: points, seconds, errors */
+} rapid_outcome;
+
+/* Nothing is opened yet. A run is used by one thread at a time, but for rapid_run_end_after_frame() and
+ * rapid_run_cancel(). options: NULL for the usual ones. *run is to be released. */
+int rapid_run_make(const char* file, const rapid_options* scene, const rapid_run_options* options, rapid_run** run,
+                   rapid_error** error);
+/* Opens and plans the scene, and finds what is wrong with the names of files; once. */
+int rapid_run_prepare(rapid_run* run, rapid_error** error);
+int64_t rapid_run_first_frame(rapid_run* run); /* of the scene, behind rapid_run_prepare() */
+/* Those that are written, behind rapid_run_prepare(). */
+int rapid_run_frames(rapid_run* run, rapid_frames* frames, rapid_error** error);
+/* Computes and writes the frames; once. *outcome, whose texts belong to the run, is also there behind the error of a
+ * frame. */
+int rapid_run_run(rapid_run* run, rapid_outcome* outcome, rapid_error** error);
+/* Ends the run behind the frame that is being computed, with a snapshot where it has a cache; or at once. From any
+ * thread. */
+int rapid_run_end_after_frame(rapid_run* run, rapid_error** error);
+int rapid_run_cancel(rapid_run* run, rapid_error** error);
+/* A call that is running goes on to its end. */
+int rapid_run_release(rapid_run* run, rapid_error** error);
+
+/* What rapid_merge_files() has written. */
+typedef struct rapid_merged {
+    size_t size;          /* sizeof(rapid_merged), set by the caller */
+    size_t parts, frames; /* that were read, of each part; that were written */
+    uint64_t points;      /* of all frames */
+} rapid_merged;
+
+/* Puts the files of the parts of a run together, as the whole run would have written them (docs/scale.md). parts:
+ * patterns of the files of each part, shape [count]; {part} stands for all parts. progress, which may be NULL, is told
+ * of each frame; 0 ends it with RAPID_CANCELLED. *merged: may be NULL. Meanwhile no scene may run. */
+int rapid_merge_files(const char* const* parts, size_t count, const char* output,
+                      int (*progress)(void* user, int64_t frame, uint64_t points), void* user, rapid_merged* merged,
+                      rapid_error** error);
 
 #if defined(__cplusplus)
 }

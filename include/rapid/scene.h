@@ -35,6 +35,8 @@
 
 namespace rapid {
 
+std::string_view version();  // "1.0.0", of the library
+
 // What went wrong. The numbers are those of the statuses of rapid.h.
 struct SceneError {
     // What is to be done about it.
@@ -239,8 +241,9 @@ public:
     // That the columns and groups of all outputs take; those that are shared with other frames count in each.
     std::size_t bytes() const;
 
-    // Values of the whole set by name (:detail): a number or three.
-    std::map<std::string, SceneValue> details() const;
+    std::vector<std::string> details() const;  // names of values of the whole set (:detail), in order
+    // Such a value: a number or three. Error: no such detail value, with the nearest name.
+    Result<SceneValue> detail(std::string_view name) const;
 
     // The figures that are asked for most.
     FrameStatisticsSummary statistics() const;

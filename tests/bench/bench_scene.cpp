@@ -42,7 +42,7 @@ double resident_mebibytes()
 
 void open(benchmark::State& state)
 {
-    for (auto _ : state) rapid_scene_close(opened(one_point), nullptr);
+    for (auto _ : state) rapid_scene_release(opened(one_point), nullptr);
 }
 BENCHMARK(open)->Unit(benchmark::kMillisecond);
 
@@ -54,7 +54,7 @@ void advance(benchmark::State& state)
         rapid_scene_advance(scene, &frame, nullptr);
         rapid_frame_release(frame, nullptr);
     }
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 }
 BENCHMARK(advance)->Unit(benchmark::kMicrosecond);
 
@@ -71,14 +71,14 @@ void column(benchmark::State& state)
     }
     state.counters["points"] = static_cast<double>(P.count);
     rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 }
 BENCHMARK(column)->Unit(benchmark::kMicrosecond);
 
 void open_many(benchmark::State& state)
 {
     const auto open_and_close = [](int count) {
-        for (int i = 0; i < count; ++i) rapid_scene_close(opened(one_point), nullptr);
+        for (int i = 0; i < count; ++i) rapid_scene_release(opened(one_point), nullptr);
     };
     const auto many = static_cast<int>(state.range(0));
     double growth = 0;

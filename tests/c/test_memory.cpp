@@ -46,8 +46,8 @@ int open_scene(std::string& message)
     const int status = rapid_scene_open_text("scene.lua", "return require(\"rapid\").create {}:gravity {}:solve {}",
                                              nullptr, &scene, &error);
     if (error) message = rapid_error_message(error);
-    rapid_error_free(error);
-    if (scene) rapid_scene_close(scene, nullptr);
+    rapid_error_release(error);
+    if (scene) rapid_scene_release(scene, nullptr);
     return status;
 }
 

@@ -32,7 +32,7 @@ Answer answer(const Function& call)
     rapid_error* error = nullptr;
     const int status = call(&error);
     const Answer result{status, rapid_error_text(error)};
-    rapid_error_free(error);
+    rapid_error_release(error);
     return result;
 }
 
@@ -59,12 +59,12 @@ Hostile hostile_offer(rapid_scene* scene, Function call)
 }
 
 // Calls that open a scene.
-Hostile hostile_text(const char* text, const rapid_options& options = RAPID_OPTIONS)
+Hostile hostile_text(const char* text, const rapid_options& options = rapid_default_options())
 {
     return hostile_call([=](rapid_error** e) {
         rapid_scene* scene = nullptr;
         const int status = rapid_scene_open_text("hostile.lua", text, &options, &scene, e);
-        if (scene) rapid_scene_close(scene, nullptr);
+        if (scene) rapid_scene_release(scene, nullptr);
         return scene && status != RAPID_OK ? static_cast<int>(RAPID_OK) : status;  // a scene in spite of an error
     });
 }
@@ -80,7 +80,7 @@ struct CFace {
     CFace& operator=(const CFace&) = delete;
     ~CFace()
     {
-        for (rapid_scene* scene : scenes_) rapid_scene_close(scene, nullptr);
+        for (rapid_scene* scene : scenes_) rapid_scene_release(scene, nullptr);
         for (rapid_frame* frame : frames_) rapid_frame_release(frame, nullptr);
         for (rapid_snapshot* snapshot : snapshots_) rapid_snapshot_release(snapshot, nullptr);
     }
@@ -95,7 +95,7 @@ struct CFace {
     }
     Answer close(Scene scene)
     {
-        return answer([&](rapid_error** e) { return rapid_scene_close(scene, e); });
+        return answer([&](rapid_error** e) { return rapid_scene_release(scene, e); });
     }
     Answer advance(Scene scene, Frame& frame)
     {
@@ -152,13 +152,13 @@ struct CFace {
             int same = 0;
             if (frame)
                 for (const int status :
-                     {rapid_frame_describe(*frame, &text, e), rapid_frame_statistics(*frame, &text, e),
-                      rapid_frame_names(*frame, RAPID_COLUMNS, &text, e),
-                      rapid_frame_compare(*frame, *frame, 0, &same, nullptr, e)})
+                     {rapid_frame_describe(*frame, &text, e), rapid_frame_statistics_json(*frame, &text, e),
+                      rapid_frame_columns(*frame, &text, e), rapid_frame_compare(*frame, *frame, 0, &same, nullptr, e)})
                     if (status != RAPID_OK) return status;
             test::require(!frame || same == 1, "a frame is not the same as itself");
             if (const int status = rapid_scene_explain(scene, &text, e); status != RAPID_OK) return status;
-            return rapid_scene_next_frame(scene, &next, e);
+            next = rapid_scene_next_frame(scene);
+            return RAPID_OK;
         });
     }
 
@@ -194,15 +194,10 @@ private:
                                   snapshots_.empty() ? nullptr : static_cast<void*>(snapshots_[0])}) {
             auto* const scene = static_cast<rapid_scene*>(wrong);
             all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_advance(scene, nullptr, e); }));
-            all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_close(scene, e); }));
-            all.push_back(hostile_call([=](rapid_error** e) {
-                std::int64_t next = 0;
-                return rapid_scene_next_frame(scene, &next, e);
-            }));
+            all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_release(scene, e); }));
         }
         all.push_back(hostile_call(
             [=](rapid_error** e) { return rapid_frame_release(reinterpret_cast<rapid_frame*>(open), e); }));
-        all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_next_frame(open, nullptr, e); }));
         all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_save(open, nullptr, e); }));
         all.push_back(hostile_call([=](rapid_error** e) { return rapid_scene_restore(open, nullptr, e); }));
         return all;
@@ -214,16 +209,16 @@ private:
                                  "return require 'rapid'.create { 3 }", "local function f() return f() + 1 end f()",
                                  "return ('x'):rep(1e15)", "return (((", "error(('x'):rep(1e7))"})
             all.push_back(hostile_text(text));
-        rapid_options options = RAPID_OPTIONS;
+        rapid_options options = rapid_default_options();
         options.size = 0;
         all.push_back(hostile_text(test::falling_scene, options));
-        options = RAPID_OPTIONS;
-        options.setting_count = 7;
+        options = rapid_default_options();
+        options.set_count = 7;
         all.push_back(hostile_text(test::falling_scene, options));
-        options = RAPID_OPTIONS;
+        options = rapid_default_options();
         options.threads = -1;
         all.push_back(hostile_text(test::falling_scene, options));
-        options = RAPID_OPTIONS;
+        options = rapid_default_options();
         options.script_seconds = nan;
         all.push_back(hostile_text(test::falling_scene, options));
         for (const char* path : {static_cast<const char*>(nullptr), "", "/", "/dev/zero", "/none.lua"}) {
@@ -242,11 +237,11 @@ private:
         }
         all.push_back(hostile_call([](rapid_error** e) {
             const char* text = nullptr;
-            return rapid_token_text(0xffffffff, &text, e);
+            return rapid_frame_text_of(0xffffffff, &text, e);
         }));
         all.push_back(hostile_call([](rapid_error** e) {
             std::uint32_t token = 0;
-            return rapid_text_token("\xff", &token, e);
+            return rapid_frame_token_of("\xff", &token, e);
         }));
     }
 
@@ -350,10 +345,6 @@ private:
         all.push_back(hostile_call([=](rapid_error** e) {
             rapid_frame* output = nullptr;
             return rapid_frame_output(frame, "none", &output, e);
-        }));
-        all.push_back(hostile_call([=](rapid_error** e) {
-            const char* lines = nullptr;
-            return rapid_frame_names(frame, 99, &lines, e);
         }));
         for (const char* path : {static_cast<const char*>(nullptr), "", "x", "x.none", "/dev/full/x.csv", "/dev/full"})
             all.push_back(hostile_call([=](rapid_error** e) { return rapid_frame_write(frame, path, e); }));

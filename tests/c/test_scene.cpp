@@ -1,6 +1,7 @@
 // The C interface: what wrong calls get, and that handles know what they are of. What scenes do is in test_scene.cpp.
 #include <atomic>
 #include <cstring>
+#include <fstream>
 #include <thread>
 
 #include "include/rapid/rapid.h"
@@ -32,7 +33,7 @@ public:
     Told() = default;
     Told(const Told&) = delete;
     Told& operator=(const Told&) = delete;
-    ~Told() { rapid_error_free(error_); }
+    ~Told() { rapid_error_release(error_); }
     operator rapid_error**() { return &error_; }
     std::string message() const { return rapid_error_message(error_); }
     const rapid_error* get() const { return error_; }
@@ -56,11 +57,12 @@ TEST_CASE("a scene runs in C", "[c]")
     rapid_scene* scene = opened();
     rapid_frame* frame = nullptr;
     REQUIRE(rapid_scene_advance_to(scene, 25, &frame, nullptr) == RAPID_OK);
-    auto info = sized<rapid_frame_info>();
-    REQUIRE(rapid_frame_get_info(frame, &info, nullptr) == RAPID_OK);
-    CHECK(info.number == 25);
-    CHECK(info.points == 16);
-    CHECK(info.time == Approx(1));
+    auto statistics = sized<rapid_statistics>();
+    REQUIRE(rapid_frame_statistics(frame, &statistics, nullptr) == RAPID_OK);
+    CHECK(statistics.points == 16);
+    CHECK(rapid_frame_size(frame) == 16);
+    CHECK(rapid_frame_number(frame) == 25);
+    CHECK(rapid_frame_time(frame) == Approx(1));
     auto P = sized<rapid_column>(), heat = sized<rapid_column>();
     REQUIRE(rapid_frame_column(frame, "P", &P, nullptr) == RAPID_OK);
     REQUIRE(rapid_frame_column(frame, "heat", &heat, nullptr) == RAPID_OK);
@@ -74,9 +76,9 @@ TEST_CASE("a scene runs in C", "[c]")
     REQUIRE(rapid_frame_expanded(frame, "heat", &heat, nullptr) == RAPID_OK);
     CHECK(heat.stride == 4);
     const char* names = nullptr;
-    REQUIRE(rapid_frame_names(frame, RAPID_COLUMNS, &names, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_columns(frame, &names, nullptr) == RAPID_OK);
     CHECK(std::string(names) == "P\nheat\nid\nv");
-    REQUIRE(rapid_scene_close(scene, nullptr) == RAPID_OK);
+    REQUIRE(rapid_scene_release(scene, nullptr) == RAPID_OK);
     CHECK(static_cast<const float*>(P.data)[1] == Approx(10 - 9.81 / 2).epsilon(1e-5));
     REQUIRE(rapid_frame_release(frame, nullptr) == RAPID_OK);
 }
@@ -120,7 +122,7 @@ TEST_CASE("what is offered in C is taken", "[c]")
     };
     REQUIRE(rapid_offers_node(offers, &grow, nullptr) == RAPID_OK);
 
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
     options.offers = offers;
     rapid_scene* scene = nullptr;
     REQUIRE(rapid_scene_open_text("offered.lua",
@@ -138,14 +140,14 @@ TEST_CASE("what is offered in C is taken", "[c]")
     CHECK(rapid_scene_advance(scene, nullptr, told) == RAPID_FAILED_FRAME);
     CHECK_THAT(told.message(), Contains("it returned 7"));
     rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 }
 
 TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
 {
     const float P[] = {0, 0, 0, 1, 0, 0};
     std::uint32_t tokens[] = {0, 0};
-    REQUIRE(rapid_text_token("leaf", &tokens[1], nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_token_of("leaf", &tokens[1], nullptr) == RAPID_OK);
     rapid_column columns[] = {sized<rapid_column>(), sized<rapid_column>()};
     columns[0].name = "P";
     columns[0].type = RAPID_FLOAT_VEC3;
@@ -156,7 +158,7 @@ TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
     rapid_offers* offers = nullptr;
     REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
     REQUIRE(rapid_offers_points(offers, "two", 2, columns, 2, nullptr) == RAPID_OK);
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
     options.offers = offers;
     rapid_scene* scene = nullptr;
     const char* text =
@@ -170,12 +172,12 @@ TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
     REQUIRE((names.type == RAPID_STRING && names.components == 1 && names.count == 2 && names.stride == 4));
     const auto* found = static_cast<const std::uint32_t*>(names.data);
     const char* name = nullptr;
-    REQUIRE(rapid_token_text(found[0], &name, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_text_of(found[0], &name, nullptr) == RAPID_OK);
     CHECK(std::string(name) == "");
-    REQUIRE(rapid_token_text(found[1], &name, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_text_of(found[1], &name, nullptr) == RAPID_OK);
     CHECK(std::string(name) == "fallen leaf");
     rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
     rapid_offers_release(offers, nullptr);
 }
 
@@ -199,7 +201,7 @@ TEST_CASE("points are written, read, described and compared in C", "[c]")
     CHECK(same == 0);
     CHECK_THAT(json, StartsWith("{\"same\":false,"));
     for (rapid_frame* frame : {first, second, read}) rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 }
 
 TEST_CASE("wrong offers in C are errors by name", "[c]")
@@ -270,7 +272,7 @@ TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
     REQUIRE(rapid_scene_offer(scene, replacing, nullptr) == RAPID_OK);
     CHECK(rapid_offers_release(replacing, nullptr) == RAPID_OK);
     rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
     CHECK(first == 1);
     CHECK(second == 1);
     CHECK(unused == 1);
@@ -286,11 +288,11 @@ TEST_CASE("an error in C has message, file, line and node", "[c]")
     CHECK(scene == nullptr);
     CHECK(std::string(rapid_error_file(told.get())) == "wrong.lua");
     CHECK(rapid_error_line(told.get()) == 2);
-    CHECK(rapid_error_status(told.get()) == RAPID_WRONG_SCENE);
+    CHECK(rapid_error_kind(told.get()) == RAPID_WRONG_SCENE);
     CHECK_THAT(rapid_error_text(told.get()), Contains("wrong.lua:2: "));
     CHECK(std::string(rapid_error_message(nullptr)).empty());
     CHECK(rapid_error_line(nullptr) == 0);
-    rapid_error_free(nullptr);
+    rapid_error_release(nullptr);
 }
 
 TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]")
@@ -299,7 +301,6 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
     rapid_frame* frame = nullptr;
     REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
     auto column = sized<rapid_column>();
-    int64_t number = 0;
     {
         Told told;
         CHECK(rapid_scene_advance(nullptr, nullptr, told) == RAPID_WRONG_CALL);
@@ -311,18 +312,18 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
         CHECK_THAT(told.message(), Contains("no open frame"));
     }
     int local = 0;
-    CHECK(rapid_scene_next_frame(reinterpret_cast<rapid_scene*>(&local), &number, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_scene_restart(reinterpret_cast<rapid_scene*>(&local), nullptr) == RAPID_WRONG_CALL);
     CHECK(rapid_frame_release(frame, nullptr) == RAPID_OK);
     CHECK(rapid_frame_release(frame, nullptr) == RAPID_WRONG_CALL);
     CHECK(rapid_frame_column(frame, "P", &column, nullptr) == RAPID_WRONG_CALL);
-    CHECK(rapid_scene_close(scene, nullptr) == RAPID_OK);
-    CHECK(rapid_scene_close(scene, nullptr) == RAPID_WRONG_CALL);
+    CHECK(rapid_scene_release(scene, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_release(scene, nullptr) == RAPID_WRONG_CALL);
     CHECK(rapid_scene_advance(scene, nullptr, nullptr) == RAPID_WRONG_CALL);
     rapid_scene* next = opened();  // may have the place of the one before
     CHECK(next != scene);
-    CHECK(rapid_scene_next_frame(scene, &number, nullptr) == RAPID_WRONG_CALL);
-    CHECK(rapid_scene_next_frame(next, &number, nullptr) == RAPID_OK);
-    CHECK(rapid_scene_close(next, nullptr) == RAPID_OK);
+    CHECK(rapid_scene_next_frame(scene) == 0);
+    CHECK(rapid_scene_next_frame(next) == 1);
+    CHECK(rapid_scene_release(next, nullptr) == RAPID_OK);
 }
 
 TEST_CASE("arguments that are NULL are errors by name", "[c]")
@@ -341,10 +342,7 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("scene", [&](rapid_error** e) { return rapid_scene_open_text("a", fall, nullptr, nullptr, e); });
     refused("scene", [&](rapid_error** e) { return rapid_scene_open("a.lua", nullptr, nullptr, e); });
     refused("name", [&](rapid_error** e) { return rapid_scene_open_text(nullptr, fall, nullptr, &other, e); });
-    refused("count", [&](rapid_error** e) { return rapid_scene_parameter_count(scene, nullptr, e); });
-    refused("count", [&](rapid_error** e) { return rapid_scene_node_count(scene, nullptr, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_warnings(scene, nullptr, e); });
-    refused("frame", [&](rapid_error** e) { return rapid_scene_first_frame(scene, nullptr, e); });
     refused("offers", [&](rapid_error** e) { return rapid_scene_offer(scene, nullptr, e); });
     refused("a setting's name", [&](rapid_error** e) {
         const rapid_setting unnamed = {nullptr, {RAPID_NUMBER, {1, 0, 0}, nullptr}};
@@ -358,7 +356,6 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("settings", [&](rapid_error** e) { return rapid_scene_set(scene, nullptr, 1, e); });
     refused("node", [&](rapid_error** e) { return rapid_scene_node(scene, 0, nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_scene_node_types(scene, nullptr, e); });
-    refused("frame", [&](rapid_error** e) { return rapid_scene_next_frame(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_save(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_scene_explain(scene, nullptr, e); });
@@ -367,7 +364,7 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
         return rapid_scene_points_behind(scene, nullptr, 2, &behind, e);
     });
     refused("frame", [&](rapid_error** e) { return rapid_scene_points_behind(scene, "solve1", 2, nullptr, e); });
-    refused("json", [&](rapid_error** e) { return rapid_frame_profile(frame, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_frame_profile_json(frame, nullptr, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_graph(scene, RAPID_GRAPH_DOT, nullptr, e); });
     refused("json", [&](rapid_error** e) {
         const std::int64_t id = 0;
@@ -385,8 +382,8 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("column", [&](rapid_error** e) { return rapid_frame_expanded(frame, "heat", nullptr, e); });
     refused("name", [&](rapid_error** e) { return rapid_frame_detail(frame, nullptr, nullptr, e); });
     refused("frame", [&](rapid_error** e) { return rapid_frame_output(frame, "main", nullptr, e); });
-    refused("lines", [&](rapid_error** e) { return rapid_frame_names(frame, RAPID_COLUMNS, nullptr, e); });
-    refused("json", [&](rapid_error** e) { return rapid_frame_statistics(frame, nullptr, e); });
+    refused("lines", [&](rapid_error** e) { return rapid_frame_columns(frame, nullptr, e); });
+    refused("json", [&](rapid_error** e) { return rapid_frame_statistics_json(frame, nullptr, e); });
     refused("png", [&](rapid_error** e) {
         size_t bytes = 0;
         return rapid_scene_picture(scene, frame, 32, 18, nullptr, &bytes, e);
@@ -396,7 +393,9 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
         return rapid_scene_picture(scene, frame, 32, 18, &png, nullptr, e);
     });
     refused("call", [&](rapid_error** e) { return rapid_call_add_rod(nullptr, 0, 1, 1, 0, e); });
-    refused("info", [&](rapid_error** e) { return rapid_frame_get_info(frame, nullptr, e); });
+    refused("statistics", [&](rapid_error** e) { return rapid_frame_statistics(frame, nullptr, e); });
+    refused("shapes", [&](rapid_error** e) { return rapid_scene_shapes(scene, 1, nullptr, e); });
+    refused("run", [&](rapid_error** e) { return rapid_run_make("a.lua", nullptr, nullptr, nullptr, e); });
     refused("path", [&](rapid_error** e) { return rapid_frame_write(frame, nullptr, e); });
     refused("path", [&](rapid_error** e) {
         rapid_snapshot* read = nullptr;
@@ -414,13 +413,13 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     CHECK(rapid_frame_compare(frame, frame, 0, nullptr, nullptr, nullptr) == RAPID_OK);
     CHECK(rapid_scene_set(scene, nullptr, 0, nullptr) == RAPID_OK);
     rapid_frame_release(frame, nullptr);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 }
 
 TEST_CASE("a struct's size says what the program knows", "[c]")
 {
     rapid_scene* scene = nullptr;
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
     Told told;
     options.size = 0;
     CHECK(rapid_scene_open_text("a.lua", fall, &options, &scene, told) == RAPID_WRONG_CALL);
@@ -428,10 +427,10 @@ TEST_CASE("a struct's size says what the program knows", "[c]")
 
     // Of a program that knows no more than the settings.
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
-    options = RAPID_OPTIONS;
+    options = rapid_default_options();
     options.size = offsetof(rapid_options, seed);
-    options.settings = &height;
-    options.setting_count = 1;
+    options.set = &height;
+    options.set_count = 1;
     options.threads = -5;  // beyond
     REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &scene, nullptr) == RAPID_OK);
     auto parameter = sized<rapid_parameter>();
@@ -445,16 +444,16 @@ TEST_CASE("a struct's size says what the program knows", "[c]")
     CHECK(parameter.value.number[0] == 0);
     parameter.size = 3;
     CHECK(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_WRONG_CALL);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
 
     // Of a newer program: what is not asked for is zero.
     struct Newer {
         rapid_options known;
         void* more;
-    } newer{RAPID_OPTIONS, nullptr};
+    } newer{rapid_default_options(), nullptr};
     newer.known.size = sizeof newer;
     REQUIRE(rapid_scene_open_text("a.lua", fall, &newer.known, &scene, nullptr) == RAPID_OK);
-    rapid_scene_close(scene, nullptr);
+    rapid_scene_release(scene, nullptr);
     newer.more = &newer;
     CHECK(rapid_scene_open_text("a.lua", fall, &newer.known, &scene, nullptr) == RAPID_WRONG_CALL);
 }
@@ -465,7 +464,7 @@ TEST_CASE("callbacks get the program's pointer, and may not call the scene", "[c
         rapid_scene* scene = nullptr;
         int frames = 0, status = -1;
     } seen;
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
     options.user = &seen;
     options.progress = [](void* user, int64_t frame, int64_t) {
         auto& s = *static_cast<Seen*>(user);
@@ -480,14 +479,134 @@ TEST_CASE("callbacks get the program's pointer, and may not call the scene", "[c
     // Closed within its own call, it goes on to the end of that.
     options.progress = [](void* user, int64_t, int64_t) {
         auto& s = *static_cast<Seen*>(user);
-        s.status = rapid_scene_close(s.scene, nullptr);
+        s.status = rapid_scene_release(s.scene, nullptr);
         return 1;
     };
-    rapid_scene_close(seen.scene, nullptr);
+    rapid_scene_release(seen.scene, nullptr);
     REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &seen.scene, nullptr) == RAPID_OK);
     CHECK(rapid_scene_advance_to(seen.scene, 1, nullptr, nullptr) == RAPID_OK);
     CHECK(seen.status == RAPID_OK);
     CHECK(rapid_scene_advance(seen.scene, nullptr, nullptr) == RAPID_WRONG_CALL);
+}
+
+TEST_CASE("the shapes of a scene are read in C, and a picture has them", "[c]")
+{
+    rapid_scene* scene = opened(
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.grid {} }\n"
+        "  :collide { shape = rapid.mesh.box { size = {2, 4, 6} } }\n"
+        "  :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, center = {0, -3, 0} } } :solve {}");
+    rapid_shapes* shapes = nullptr;
+    REQUIRE(rapid_scene_shapes(scene, 1, &shapes, nullptr) == RAPID_OK);
+    REQUIRE(rapid_shapes_mesh_count(shapes) == 1);
+    REQUIRE(rapid_shapes_plane_count(shapes) == 1);
+    auto mesh = sized<rapid_mesh>();
+    REQUIRE(rapid_shapes_mesh(shapes, 0, &mesh, nullptr) == RAPID_OK);
+    CHECK(mesh.role == RAPID_COLLIDER);
+    double volume = 0;  // by the divergence theorem
+    for (std::size_t i = 0; i < mesh.triangle_count; ++i) {
+        const auto corner = [&](std::size_t k) { return mesh.positions + 3 * mesh.triangles[3 * i + k]; };
+        const float *a = corner(0), *b = corner(1), *c = corner(2);
+        volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                   a[2] * (b[0] * c[1] - b[1] * c[0])) /
+                  6;
+    }
+    CHECK(volume == Approx(48));
+    auto plane = sized<rapid_plane>();
+    REQUIRE(rapid_shapes_plane(shapes, 0, &plane, nullptr) == RAPID_OK);
+    CHECK(plane.normal[1] == 1);
+    CHECK(plane.offset == -3);
+    CHECK(rapid_shapes_has_camera(shapes) == 0);
+
+    rapid_frame* frame = nullptr;
+    REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
+    const void* png = nullptr;
+    std::size_t bytes = 0;
+    REQUIRE(rapid_scene_picture(scene, frame, 64, 36, &png, &bytes, nullptr) == RAPID_OK);
+    const std::string fitted(static_cast<const char*>(png), bytes);
+    REQUIRE(rapid_frame_picture(frame, shapes, nullptr, 64, 36, &png, &bytes, nullptr) == RAPID_OK);
+    CHECK(std::string(static_cast<const char*>(png), bytes) == fitted);
+    const double position[] = {0, 50, 90};
+    const rapid_camera far_away = {position, nullptr, 20};
+    REQUIRE(rapid_frame_picture(frame, shapes, &far_away, 64, 36, &png, &bytes, nullptr) == RAPID_OK);
+    CHECK(std::string(static_cast<const char*>(png), bytes) != fitted);
+    rapid_frame_release(frame, nullptr);
+    rapid_shapes_release(shapes, nullptr);
+    rapid_scene_release(scene, nullptr);
+}
+
+TEST_CASE("a run in C writes its files, and those of its parts are merged into the same", "[c]")
+{
+    const test::TemporaryFolder folder;
+    const auto bytes_of = [](const std::string& file) {
+        std::ifstream in(file, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(in), {});
+    };
+    struct Seen {
+        int frames = 0, merged = 0;
+    } seen;
+    const rapid_frames two = {1, 2, 1};
+    const auto run = [&](const std::string& output, int part, int count) {
+        const char* outputs[] = {output.c_str()};
+        rapid_run_options options = rapid_default_run_options();
+        options.text = fall;
+        options.frames = &two;
+        options.outputs = outputs;
+        options.output_count = 1;
+        options.part = part;
+        options.part_count = count;
+        options.user = &seen;
+        options.frame = [](void* user, int64_t, uint64_t, double, int) { ++static_cast<Seen*>(user)->frames; };
+        rapid_run* made = nullptr;
+        REQUIRE(rapid_run_make("fall.lua", nullptr, &options, &made, nullptr) == RAPID_OK);
+        REQUIRE(rapid_run_prepare(made, nullptr) == RAPID_OK);
+        CHECK(rapid_run_first_frame(made) == 1);
+        rapid_frames frames{};
+        REQUIRE(rapid_run_frames(made, &frames, nullptr) == RAPID_OK);
+        CHECK(frames.last == 2);
+        auto outcome = sized<rapid_outcome>();
+        REQUIRE(rapid_run_run(made, &outcome, nullptr) == RAPID_OK);
+        CHECK(outcome.ending == RAPID_COMPLETE);
+        CHECK(outcome.last_frame == 2);
+        CHECK(std::string(outcome.summary).size() > 10);
+        rapid_run_release(made, nullptr);
+    };
+    run(folder / "whole.####.csv", 0, 0);
+    CHECK(seen.frames == 2);
+    for (const int part : {1, 2}) run(folder / "x.####.csv", part, 2);
+    const std::string parts = folder / "x_{part}.####.csv";
+    const char* patterns[] = {parts.c_str()};
+    auto merged = sized<rapid_merged>();
+    REQUIRE(rapid_merge_files(
+                patterns, 1, (folder / "merged.####.csv").c_str(),
+                [](void* user, int64_t, uint64_t) { return ++static_cast<Seen*>(user)->merged; }, &seen, &merged,
+                nullptr) == RAPID_OK);
+    CHECK(merged.parts == 2);
+    CHECK(merged.frames == 2);
+    CHECK(merged.points == 32);
+    CHECK(seen.merged == 2);
+    for (const char* number : {"0001", "0002"})
+        CHECK(bytes_of(folder / ("merged." + std::string(number) + ".csv")) ==
+              bytes_of(folder / ("whole." + std::string(number) + ".csv")));
+}
+
+TEST_CASE("an error of a frame of a run is there with its outcome in C", "[c]")
+{
+    rapid_run_options options = rapid_default_run_options();
+    options.text =
+        "local rapid = require 'rapid'\n"
+        "return rapid.create { points = rapid.points.grid {} }"
+        ":points('fails', function(p, frame) if frame.number == 3 then error 'no more' end end) :solve {}";
+    rapid_run* run = nullptr;
+    REQUIRE(rapid_run_make("fails.lua", nullptr, &options, &run, nullptr) == RAPID_OK);
+    REQUIRE(rapid_run_prepare(run, nullptr) == RAPID_OK);
+    auto outcome = sized<rapid_outcome>();
+    Told told;
+    CHECK(rapid_run_run(run, &outcome, told) == RAPID_FAILED_FRAME);
+    CHECK(outcome.ending == RAPID_FAILED);
+    CHECK(outcome.last_frame == 2);
+    CHECK_THAT(told.message(), Contains("no more"));
+    rapid_run_release(run, nullptr);
 }
 
 TEST_CASE("handles are opened and closed on several threads", "[c][threads]")
@@ -501,7 +620,7 @@ TEST_CASE("handles are opened and closed on several threads", "[c][threads]")
                 rapid_frame* frame = nullptr;
                 if (rapid_scene_open_text("fall.lua", fall, nullptr, &scene, nullptr) != RAPID_OK) ++wrong;
                 if (rapid_scene_advance_to(scene, 3, &frame, nullptr) != RAPID_OK) ++wrong;
-                if (rapid_scene_close(scene, nullptr) != RAPID_OK) ++wrong;
+                if (rapid_scene_release(scene, nullptr) != RAPID_OK) ++wrong;
                 if (rapid_frame_release(frame, nullptr) != RAPID_OK) ++wrong;
             }
         });

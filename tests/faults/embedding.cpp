@@ -37,7 +37,7 @@ bool done(const char* name, int status)
         std::printf("%s: status %d: %s\n", name, status, rapid_error_text(error));
     }
     has_failed = has_failed || status != RAPID_OK;
-    rapid_error_free(error);
+    rapid_error_release(error);
     error = nullptr;
     return status == RAPID_OK;
 }
@@ -89,13 +89,13 @@ void read(rapid_scene* scene, rapid_frame* frame)
     const void* png = nullptr;
     size_t bytes = 0;
     auto column = sized<rapid_column>();
-    auto info = sized<rapid_frame_info>();
+    auto statistics = sized<rapid_statistics>();
     done("frame_column", rapid_frame_column(frame, "P", &column, &error));
     done("frame_expanded", rapid_frame_expanded(frame, "heat", &column, &error));
-    done("frame_get_info", rapid_frame_get_info(frame, &info, &error));
-    done("frame_statistics", rapid_frame_statistics(frame, &words, &error));
-    done("frame_names", rapid_frame_names(frame, RAPID_COLUMNS, &words, &error));
-    done("frame_profile", rapid_frame_profile(frame, &words, &error));
+    done("frame_statistics", rapid_frame_statistics(frame, &statistics, &error));
+    done("frame_statistics_json", rapid_frame_statistics_json(frame, &words, &error));
+    done("frame_names", rapid_frame_columns(frame, &words, &error));
+    done("frame_profile", rapid_frame_profile_json(frame, &words, &error));
     done("scene_explain", rapid_scene_explain(scene, &words, &error));
     done("scene_graph", rapid_scene_graph(scene, RAPID_GRAPH_DOT, &words, &error));
     done("frame_describe", rapid_frame_describe(frame, &words, &error));
@@ -108,7 +108,7 @@ void read(rapid_scene* scene, rapid_frame* frame)
 
 void run(rapid_offers* offers)
 {
-    rapid_options options = RAPID_OPTIONS;
+    rapid_options options = rapid_default_options();
     options.offers = offers;
     options.threads = 1;
     rapid_scene* scene = nullptr;
@@ -132,7 +132,7 @@ void run(rapid_offers* offers)
     done("advance_to", rapid_scene_advance_to(scene, 2, nullptr, &error));
     if (frame) rapid_frame_release(frame, nullptr);
     if (snapshot) rapid_snapshot_release(snapshot, nullptr);
-    if (scene) rapid_scene_close(scene, nullptr);
+    if (scene) rapid_scene_release(scene, nullptr);
 }
 
 }  // namespace

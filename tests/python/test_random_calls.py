@@ -65,7 +65,7 @@ class Sequence:
 
     def close(self):
         one = self.scene()
-        one["scene"].close()  # a second time, too
+        one["scene"].release()  # a second time, too
         one["open"] = False
 
     def begin(self, one):
@@ -190,9 +190,9 @@ def hostile_calls(scene, frames, snapshots):
     for array in ([1, 2, 3], numpy.zeros((2, 2)), "P", None, numpy.zeros((2, 3), complex), numpy.array([[object()] * 3])):
         all_calls.append(("from_numpy", lambda a=array: rapid.from_numpy(a)))
         all_calls.append(("Mesh", lambda a=array: rapid.Mesh(a, [[0, 1, 2], [2, 1, 0]][:1]).offer(None, "x", [])))
-    all_calls += [("read " + path, lambda p=path: rapid.read(p)) for path in paths]
+    all_calls += [("read " + path, lambda p=path: rapid.Frame.read(p)) for path in paths]
     all_calls += [("read snapshot " + path, lambda p=path: rapid.Snapshot.read(p)) for path in paths]
-    all_calls += [("plugin " + path, lambda p=path: rapid.load_plugin(p)) for path in paths[1:]]
+    all_calls += [("plugin " + path, lambda p=path: rapid.Scene.load_plugin(p)) for path in paths[1:]]
     for ids in ([2**70], ["x"], 3, [], [math.nan]):
         all_calls.append((f"trace {ids}", lambda i=ids: scene.trace(i, 1, 2)))
     all_calls += [("restore", lambda: scene.restore(None)), ("restore", lambda: scene.restore(Hostile()))]

@@ -64,7 +64,7 @@ class Frames(unittest.TestCase):
         frame.release()
         del frame
         scene.advance_to(9)
-        scene.close()
+        scene.release()
         del scene
         gc.collect()
         numpy.testing.assert_array_equal(P, before)
@@ -108,9 +108,10 @@ return rapid.create { points = rapid.host "cloud" } :attribute { material = "woo
             frame.columns
 
     def test_statistics_are_a_dictionary(self):
-        statistics = fall().advance_to(4).statistics
-        self.assertEqual(statistics["points"], 16)
-        self.assertEqual(statistics["frame"], 4)
+        frame = fall().advance_to(4)
+        self.assertEqual(frame.statistics_json["points"], 16)
+        self.assertEqual(frame.statistics_json["frame"], 4)
+        self.assertEqual(frame.statistics.points, 16)
 
     def test_a_picture(self):
         picture = fall().advance().show(64, 36)
@@ -137,9 +138,9 @@ def ball(P, gradient, center=(0, 1, 0), radius=0.5):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "fall.bgeo"
             first.write(path)
-            read = rapid.read(path)
+            read = rapid.Frame.read(path)
             with self.assertRaisesRegex(rapid.Error, "nothing.bgeo"):
-                rapid.read(path.with_name("nothing.bgeo"))
+                rapid.Frame.read(path.with_name("nothing.bgeo"))
         self.assertEqual((read.number, len(read), read.outputs), (0, 16, ["main"]))
         numpy.testing.assert_array_equal(read["P"], first["P"])
         self.assertEqual(read.describe(), first.describe() | {"bytes": read.describe()["bytes"]})
@@ -309,7 +310,7 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
             rapid.Scene("nowhere.lua")
         with self.assertRaises(rapid.Error) as caught:
             rapid.Scene("deep.lua", text="local function inner() error 'here' end\ninner()")
-        self.assertLess(caught.exception.stack.find("deep.lua:1"), caught.exception.stack.find("deep.lua:2"))
+        self.assertLess(caught.exception.script_stack.find("deep.lua:1"), caught.exception.script_stack.find("deep.lua:2"))
 
     def test_nodes_and_their_types(self):
         scene = fall()
@@ -326,7 +327,7 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
         with self.assertRaises(ValueError):
             scene.graph("png")
         frame = scene.advance_to(5)
-        self.assertIn(["solve1"], [work["nodes"] for work in frame.profile])
+        self.assertIn(["solve1"], [work["nodes"] for work in frame.profile_json])
         kept = {node["name"]: node["kept"] for node in scene.explain()["nodes"]}
         self.assertTrue(all(kept.values()))
         behind = scene.points_behind("gravity1", 3)
@@ -367,7 +368,7 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
             return frame < 2
 
         scene = rapid.Scene("a.lua", text="print(require('words').hello) " + FALL, log=printed.append, progress=progress,
-                            module=lambda name: "return { hello = 'from Python' }" if name == "words" else None)
+                            find_module=lambda name: "return { hello = 'from Python' }" if name == "words" else None)
         self.assertEqual(printed, ["from Python"])
         with self.assertRaisesRegex(rapid.Error, "cancelled"):
             scene.advance_to(5)
@@ -443,7 +444,66 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
             scene.advance()
         with self.assertRaisesRegex(rapid.Error, "closed"):
             scene.advance()
-        scene.close()
+        scene.release()
+
+
+class Runs(unittest.TestCase):
+    def test_a_run_writes_its_files_and_parts_are_merged_into_the_same(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder, frames, merged = pathlib.Path(folder), [], []
+            for part, name in ((None, "whole"), ((1, 2), "x"), ((2, 2), "x")):
+                with rapid.Run("fall.lua", [folder / f"{name}.####.csv"], (1, 2), text=FALL, part=part, height=7,
+                               frame=lambda number, points, seconds, is_known: frames.append((number, points))) as run:
+                    run.prepare()
+                    self.assertEqual((run.first_frame, run.frames), (1, (1, 2, 1)))
+                    outcome = run.run()
+                self.assertEqual((outcome["ending"], outcome["last_frame"]), ("complete", 2))
+            self.assertEqual(frames[:2], [(1, 16), (2, 16)])
+            told = rapid.merge_files([folder / "x_{part}.####.csv"], folder / "merged.####.csv",
+                                     lambda frame, points: merged.append(frame))
+            self.assertEqual((told, merged), ({"parts": 2, "frames": 2, "points": 32}, [1, 2]))
+            for number in ("0001", "0002"):
+                self.assertEqual((folder / f"merged.{number}.csv").read_text(), (folder / f"whole.{number}.csv").read_text())
+
+    def test_what_fails_in_a_run_raises(self):
+        with self.assertRaisesRegex(rapid.Error, "sample = 2"):
+            rapid.Run("fall.lua", text=FALL, sample=2)
+        run = rapid.Run("fall.lua", text=FALL.replace(":gravity {}", ":gravty {}"))
+        with self.assertRaisesRegex(rapid.Error, "did you mean"):
+            run.prepare()
+
+        def broken(*_):
+            raise ValueError("from a callback")
+        run = rapid.Run("fall.lua", frames=(1, 2), text=FALL, frame=broken)
+        run.prepare()
+        with self.assertRaisesRegex(ValueError, "from a callback"):
+            run.run()
+
+    def test_shapes_and_pictures_of_them(self):
+        scene = rapid.Scene("box.lua", text="""local rapid = require 'rapid'
+return rapid.create { points = rapid.points.grid {} } :collide { shape = rapid.mesh.box { size = {2, 4, 6} } }
+  :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, center = {0, -3, 0} } } :solve {}""")
+        shapes = scene.shapes(1)
+        mesh, = shapes.meshes
+        a, b, c = (mesh["positions"][mesh["triangles"][:, k]].astype(float) for k in range(3))
+        self.assertAlmostEqual(numpy.einsum("ij,ij->i", a, numpy.cross(b, c)).sum() / 6, 48, places=4)
+        self.assertEqual((mesh["role"], shapes.planes), ("collider", [{"normal": (0, 1, 0), "offset": -3}]))
+        frame = scene.advance()
+        self.assertEqual(frame.picture(shapes, width=64, height=36).png, frame.show(64, 36).png)
+        self.assertNotEqual(frame.picture(shapes, position=(0, 50, 90), fov=20, width=64, height=36).png,
+                            frame.show(64, 36).png)
+
+    def test_a_getter_raises_for_what_is_released(self):
+        scene = fall()
+        frame, shapes = scene.advance(), scene.shapes(1)
+        snapshot = scene.save()
+        self.assertEqual((frame.size, frame.places([3, 99]).tolist()), (16, [3, 2**32 - 1]))
+        self.assertEqual(rapid.Frame.text_of(rapid.Frame.token_of("leaf")), "leaf")
+        self.assertGreater(snapshot.size, 100)
+        for thing, name in ((frame, "number"), (shapes, "has_camera"), (snapshot, "size"), (scene, "next_frame")):
+            thing.release()
+            with self.assertRaises(rapid.Error):
+                getattr(thing, name)
 
 
 class Interrupts(unittest.TestCase):
@@ -523,7 +583,7 @@ class KeptArrays(unittest.TestCase):
                 array[:] = 12345
             array.sum()
         numpy.testing.assert_array_equal(frame["v"], before)
-        scene.close()
+        scene.release()
         kept[-1].sum()
 
     def test_arrays_of_a_force_and_of_a_shape_outlive_the_scene(self):
@@ -545,7 +605,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0
         force = rapid.Force("pull", pull, doc="x", reads=["heat"])
         scene = rapid.Scene("kept.lua", text=text, nodes=[force], objects={"ground": rapid.Shape(ground)})
         scene.advance_to(24).release()
-        scene.close()
+        scene.release()
         del scene
         gc.collect()
         self.assertGreater(len(kept), 8)
@@ -568,7 +628,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0
             scene.offer("ground", rapid.Shape(ground))
             scene.advance().release()
         self.assertLessEqual(len(rapid._offers._used_callbacks) - held, 300)
-        scene.close()
+        scene.release()
         del scene
         gc.collect()
         self.assertEqual(len(rapid._offers._used_callbacks), held)

@@ -96,7 +96,7 @@ TEST_CASE("groups and detail values are read", "[scene]")
         members += *hot.at<std::uint8_t>(i);
     }
     CHECK(members > 0);
-    CHECK(std::get<double>(frame.details().at("count")) > 0);
+    CHECK(std::get<double>(good(frame.detail("count"))) > 0);
 }
 
 TEST_CASE("a column of texts is of tokens, whose texts are told", "[scene]")

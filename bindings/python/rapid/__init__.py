@@ -11,18 +11,26 @@ docs/host.md is the guide. Errors are rapid.Error, with file, line and node of t
 import ctypes
 import json
 import weakref
-from ctypes import byref, c_char_p, c_int64, c_size_t, c_uint64, c_void_p
+from ctypes import byref, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
 
 import numpy
 
-from ._library import (Column, Error, Find, FrameInfo, Int, Int64, Log, Node, Options, Parameter, Progress, UInt64, Value,
-                       call, encoded, from_value, get, library, sized, to_settings)
+from ._library import (Camera, Column, Error, Find, FrameDone, Frames, Int, Int64, Line, Log, MergeProgress, Merged,
+                       Mesh as MeshStruct, Node, Options, Outcome, Parameter, Plane, Progress, RunOptions, Statistics,
+                       UInt64, Value, call, encoded, from_value, get, library, lines, sized, texts, to_settings, value_of)
 from ._interrupt import interruptible
 from ._offers import Constraint, Edit, Force, Mesh, Points, Shape, from_numpy, make_offers
 
-__all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Scene", "Shape", "Snapshot", "from_numpy",
-           "load_plugin", "read"]
-__version__ = library.rapid_version().decode()
+__all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "Points", "Run", "Scene", "Shape", "Shapes",
+           "Snapshot", "from_numpy", "merge_files", "version"]
+
+
+def version():
+    """"1.0.0", of the library."""
+    return library.rapid_version().decode()
+
+
+__version__ = version()
 
 _types = [numpy.float32, numpy.float32, numpy.int32, numpy.int64, numpy.float32, numpy.uint8, numpy.uint32]
 _string = 6
@@ -64,23 +72,36 @@ class Picture:
             file.write(self.png)
 
 
+def _picture(function, *arguments):
+    data, size = c_void_p(), c_size_t()
+    call(function, *arguments, byref(data), byref(size))
+    return Picture(ctypes.string_at(data.value, size.value))
+
+
+def _camera(position, target, fov):
+    def place(of):
+        return None if of is None else (c_double * 3)(*of)
+    return Camera(place(position), place(target), fov or 0)
+
+
 class Frame:
     """A computed frame: frame["P"] is an array that shares memory with the run, and stays as it is while it is held."""
 
     def __init__(self, handle, scene):
         self._handle, self._scene = _Handle(handle, "frame_release"), scene
-        self._info = get("frame_get_info", handle, sized(FrameInfo))
 
-    number = property(lambda self: self._info.number)
-    time = property(lambda self: self._info.time, doc="s since the start")
-    fps = property(lambda self: self._info.fps)
-    outputs = property(lambda self: self._names(0))
-    columns = property(lambda self: self._names(1))
-    groups = property(lambda self: self._names(2))
-    warnings = property(lambda self: self._names(3))
+    number = property(lambda self: value_of("frame_number", self._handle.value))
+    time = property(lambda self: value_of("frame_time", self._handle.value), doc="s since the start")
+    fps = property(lambda self: value_of("frame_fps", self._handle.value))
+    size = property(lambda self: value_of("frame_size", self._handle.value), doc="points")
+    outputs = property(lambda self: lines("frame_outputs", self._handle.value))
+    columns = property(lambda self: lines("frame_columns", self._handle.value))
+    groups = property(lambda self: lines("frame_groups", self._handle.value))
+    details = property(lambda self: lines("frame_details", self._handle.value))
+    warnings = property(lambda self: lines("frame_warnings", self._handle.value))
 
     def __len__(self):
-        return self._info.points
+        return self.size
 
     def __contains__(self, name):
         return name in self.columns
@@ -98,14 +119,38 @@ class Frame:
                 raise KeyError(error.message) from None
         return self._array("frame_column", name)
 
+    def column(self, name):
+        return self[name]
+
+    def expanded(self, name):
+        """The column, where values that all points share are written out: no stride is 0."""
+        return self._array("frame_expanded", name)
+
+    def places(self, ids):
+        """Where the points of these ids are in the columns; 2**32 - 1 of an id that no point has."""
+        ids = numpy.ascontiguousarray(ids, numpy.int64)
+        places = numpy.empty(len(ids), numpy.uint32)
+        call("frame_places", self._handle.value, ids.ctypes.data_as(ctypes.POINTER(c_int64)), len(ids),
+             places.ctypes.data_as(ctypes.POINTER(c_uint32)))
+        return places
+
+    @staticmethod
+    def text_of(token):
+        """The text of a token: equal texts have equal tokens in a process."""
+        return get("frame_text_of", token, c_char_p()).value.decode()
+
+    @staticmethod
+    def token_of(text):
+        return get("frame_token_of", encoded(text), c_uint32()).value
+
     def categories(self, name):
         """Of a column of texts: a list of the different ones, in order, and for each point the place of its own."""
         tokens, places = numpy.unique(self._array("frame_column", name, texts=False), return_inverse=True)
-        texts = [get("token_text", int(token), c_char_p()).value.decode() for token in tokens]
-        order = sorted(range(len(texts)), key=texts.__getitem__)
-        rank = numpy.empty(len(texts), numpy.int32)
-        rank[order] = numpy.arange(len(texts), dtype=numpy.int32)
-        return [texts[k] for k in order], rank[places]
+        words = [self.text_of(int(token)) for token in tokens]
+        order = sorted(range(len(words)), key=words.__getitem__)
+        rank = numpy.empty(len(words), numpy.int32)
+        rank[order] = numpy.arange(len(words), dtype=numpy.int32)
+        return [words[k] for k in order], rank[places]
 
     def group(self, name):
         """Of each point, whether it is in the group."""
@@ -125,17 +170,29 @@ class Frame:
 
     @property
     def statistics(self):
-        """What `rapid run --stats` writes of a frame."""
-        return json.loads(get("frame_statistics", self._handle.value, c_char_p()).value)
+        """The figures that are asked for most: frame.statistics.penetration_max."""
+        return get("frame_statistics", self._handle.value, sized(Statistics))
 
     @property
-    def profile(self):
+    def statistics_json(self):
+        """What `rapid run --stats` writes of a frame, as a dict."""
+        return json.loads(get("frame_statistics_json", self._handle.value, c_char_p()).value)
+
+    @property
+    def profile_json(self):
         """Where its time went: [{"nodes", "stage", "begin", "seconds", "points", "bytes"}], a pass over the points each."""
-        return json.loads(get("frame_profile", self._handle.value, c_char_p()).value)
+        return json.loads(get("frame_profile_json", self._handle.value, c_char_p()).value)
 
     def write(self, path):
         """Writes the points to a file of a format that Rapid knows, by the extension."""
         call("frame_write", self._handle.value, str(path).encode())
+
+    @staticmethod
+    def read(path):
+        """The points of a file of a format that Rapid knows, by the extension, as a Frame of number 0."""
+        handle = c_void_p()
+        call("frame_read", str(path).encode(), byref(handle))
+        return Frame(handle, None)
 
     def describe(self):
         """What `rapid info` tells: how many points there are, their bounds, the range of each attribute, the groups."""
@@ -150,22 +207,22 @@ class Frame:
         call("frame_compare", self._handle.value, other._handle.value, tolerance, None, byref(text))
         return json.loads(text.value)
 
+    def picture(self, shapes, position=None, target=None, fov=None, width=640, height=360):
+        """A Picture of the points among these Shapes; what is None of the camera is fitted."""
+        if not isinstance(shapes, Shapes):
+            raise TypeError(f"the shapes are a {type(shapes).__name__}; they must be rapid.Shapes")
+        return _picture("frame_picture", self._handle.value, shapes._handle.value, byref(_camera(position, target, fov)),
+                        width, height)
+
     def show(self, width=640, height=360):
-        """A picture, with the shapes of the scene."""
+        """A Picture with the shapes of the scene."""
         if self._scene is None:
             raise Error("wrong call", "the frame was read from a file, and has no scene to be shown with")
-        data, size = c_void_p(), c_size_t()
-        call("scene_picture", self._scene._handle.value, self._handle.value, width, height, byref(data), byref(size))
-        return Picture(ctypes.string_at(data.value, size.value))
+        return self._scene.picture(self, width, height)
 
     def release(self):
         """Gives the memory back before Python does. Arrays that are held keep theirs."""
         self._handle = _Released
-
-    def _names(self, what):
-        lines = c_char_p()
-        call("frame_names", self._handle.value, what, byref(lines))
-        return lines.value.decode().split("\n") if lines.value else []
 
     def _array(self, function, name, texts=True):
         column = sized(Column)
@@ -191,16 +248,45 @@ class _Memory:
                                     "typestr": dtype.str}
 
 
-def load_plugin(path):
-    """Loads types of nodes from a library that is built against the runtime's headers, for scenes that are opened later."""
-    call("load_plugin", str(path).encode())
+class Shapes:
+    """The shapes of a scene in a frame: meshes [{"role", "positions", "triangles"}], whose arrays share memory with them,
+    and planes [{"normal", "offset"}]. role: "collider" or "emitter"."""
 
+    def __init__(self, handle):
+        self._handle = _Handle(handle, "shapes_release")
 
-def read(path):
-    """The points of a file of a format that Rapid knows, by the extension, as a Frame of number 0."""
-    handle = c_void_p()
-    call("frame_read", str(path).encode(), byref(handle))
-    return Frame(handle, None)
+    @property
+    def meshes(self):
+        result = []
+        for place in range(value_of("shapes_mesh_count", self._handle.value)):
+            one = sized(MeshStruct)
+            call("shapes_mesh", self._handle.value, place, byref(one))
+            result.append({"role": ["collider", "emitter"][one.role],
+                           "positions": self._array(one.positions, one.corner_count, numpy.float32),
+                           "triangles": self._array(one.triangles, one.triangle_count, numpy.int32)})
+        return result
+
+    @property
+    def planes(self):
+        result = []
+        for place in range(value_of("shapes_plane_count", self._handle.value)):
+            one = sized(Plane)
+            call("shapes_plane", self._handle.value, place, byref(one))
+            result.append({"normal": tuple(one.normal), "offset": one.offset})
+        return result
+
+    has_camera = property(lambda self: bool(value_of("shapes_has_camera", self._handle.value)),
+                          doc="Whether the scene says from where its pictures are seen.")
+    warnings = property(lambda self: lines("shapes_warnings", self._handle.value))
+
+    def _array(self, address, count, dtype):
+        if count == 0:
+            return numpy.empty((0, 3), dtype)
+        return numpy.asarray(_Memory(self._handle, address, (count, 3), (12, 4), numpy.dtype(dtype)))
+
+    def release(self):
+        """Gives the memory back before Python does. Arrays that are held keep theirs."""
+        self._handle = _Released
 
 
 class Snapshot:
@@ -211,11 +297,15 @@ class Snapshot:
 
     @property
     def frame(self):
-        return get("snapshot_frame", self._handle.value, c_int64()).value
+        return value_of("snapshot_frame", self._handle.value)
 
-    def __len__(self):
+    @property
+    def size(self):
         """Bytes."""
-        return get("snapshot_bytes", self._handle.value, c_uint64()).value
+        return value_of("snapshot_size", self._handle.value)
+
+    def release(self):
+        self._handle.close()
 
     def write(self, path):
         """Writes it to a file, for Snapshot.read()."""
@@ -235,49 +325,109 @@ def _each_once(values, parameters):
     return {**values, **parameters}
 
 
-class Scene:
+class _Program:
+    """What scenes and runs have in common: their options, and callbacks, which live as long as they do."""
+
+    def __init__(self):
+        self._raised = None  # by a callback: raised when the call ends
+        self._handle = None
+        self._held = {}      # texts that callbacks have returned
+
+    def _scene_options(self, set=None, seed=None, paths=(), threads=0, script_seconds=600, script_memory=1 << 30, memory=0,
+                       estimate_errors=True, keep_all=False, log=None, progress=None, find_module=None, find_file=None,
+                       objects=None, nodes=(), **parameters):
+        """The library's options; their offers are to be released."""
+        options = sized(Options)
+        settings = to_settings(_each_once(set or {}, parameters))
+        options.set, options.set_count = settings, len(settings)
+        if seed is not None:
+            options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
+        options.paths, options.path_count = texts(paths)
+        options.threads, options.script_seconds = Int.checked(threads), script_seconds
+        options.script_memory, options.memory = UInt64.checked(script_memory), UInt64.checked(memory)
+        options.estimate_errors, options.keep_all = bool(estimate_errors), bool(keep_all)
+        if log:
+            options.log = Log(self._guard(lambda _, level, line: log(line.decode()), None))
+        options.progress = Progress(self._guard(lambda _, frame, last: self._go_on(progress, frame, last), 0))
+        if find_module:
+            options.find_module = Find(
+                self._guard(lambda _, name: self._hold("module", find_module(name.decode())), None))
+        if find_file:
+            options.find_file = Find(self._guard(lambda _, path: self._hold("file", find_file(path.decode())), None))
+        options.offers = make_offers(objects or {}, nodes, self._guard)
+        return options
+
+    def _cancel_if_open(self):
+        if self._handle:
+            self.cancel()
+
+    def release(self):
+        """Gives its memory back before Python does. Frames and snapshots stay."""
+        self._handle.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.release()
+
+    def _call(self, name, *arguments):
+        self._raised = None
+        try:
+            with interruptible(self._cancel_if_open):
+                call(name, *arguments)
+        except Error as error:
+            if self._raised:
+                raise self._raised from error
+            raise
+        if self._raised:
+            raise self._raised
+
+    def _guard(self, function, otherwise):
+        """A callback whose exception is kept until the call ends: none may pass through C."""
+        program = weakref.ref(self)
+
+        def guarded(*arguments):
+            try:
+                return function(*arguments)
+            except BaseException as error:  # KeyboardInterrupt, too
+                program()._raised = error
+                return otherwise
+        return guarded
+
+    def _go_on(self, progress, frame, last):
+        return int(self._raised is None and (progress is None or progress(frame, last) is not False))
+
+    def _hold(self, what, text):
+        if text is None:
+            return None
+        self._held[what] = ctypes.create_string_buffer(encoded(str(text)))
+        return ctypes.addressof(self._held[what])
+
+
+class Scene(_Program):
     """A scene of a file, or with text= of a text, whose messages name it so.
 
     Parameters of the scene are given by name (rate=5000); those of nodes, and names that are no words of Python, in
     set={"solve.substeps": 4}; so are parameters that are called as one of the options here. seed replaces the seed of
-    every create, as --seed does. paths: folders where modules are looked for. threads: 0 for all. script_seconds,
-    script_memory, memory: limits. errors=False estimates none. log(text) is told of what scripts print, and of warnings;
-    progress(frame, last) of each frame that advance_to() has done, and ends it where it returns False. module(name) gives
-    the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
+    every create, but no rapid.param "seed". paths: folders where modules are looked for. threads: 0 for all. script_seconds,
+    script_memory, memory: limits. estimate_errors=False estimates none. log(text) is told of what scripts print, and of
+    warnings; progress(frame, last) of each frame that advance_to() has done, and ends it where it returns False.
+    find_module(name) gives the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
 
     objects={"floor": rapid.Shape(...)}: what the scene takes as rapid.host "floor", and set={"collide2.shape": "host:floor"}
     for a parameter of a node. nodes: further types of nodes, rapid.Force, rapid.Edit and rapid.Constraint.
     """
 
-    def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=0, script_memory=0,
-                 memory=0, errors=True, keep_all=False, log=None, progress=None, module=None, find_file=None,
-                 objects=None, nodes=(), **parameters):
+    def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=600,
+                 script_memory=1 << 30, memory=0, estimate_errors=True, keep_all=False, log=None, progress=None,
+                 find_module=None, find_file=None, objects=None, nodes=(), **parameters):
+        super().__init__()
         numbers = {"seed": seed, "threads": threads, "script_seconds": script_seconds, "script_memory": script_memory,
-                   "memory": memory, "errors": errors, "keep_all": keep_all}
-        self._raised = None  # by a callback: raised when the call ends
-        self._handle = None
-        self._held = {}      # texts that callbacks have returned
-        options = sized(Options)
-        settings = to_settings(_each_once(set or {}, parameters))
-        options.settings, options.setting_count = settings, len(settings)
-        if seed is not None:
-            options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
-        if isinstance(paths, (str, bytes)):
-            raise TypeError(f"paths = {paths!r}; it must be a list of folders")
-        folders = (c_char_p * len(paths))(*(encoded(str(path)) for path in paths))
-        options.paths, options.path_count = folders, len(paths)
-        options.threads, options.script_seconds = Int.checked(threads), script_seconds
-        options.script_memory, options.memory = UInt64.checked(script_memory), UInt64.checked(memory)
-        options.no_errors, options.keep_all = not errors, bool(keep_all)
-        if log:
-            options.log = Log(self._guard(lambda _, level, line: log(line.decode()), None))
-        options.progress = Progress(self._guard(lambda _, frame, last: self._go_on(progress, frame, last), 0))
-        if module:
-            options.find_module = Find(self._guard(lambda _, name: self._hold("module", module(name.decode())), None))
-        if find_file:
-            options.find_file = Find(self._guard(lambda _, path: self._hold("file", find_file(path.decode())), None))
-        options.offers = make_offers(objects or {}, nodes, self._guard)
-        self._options = options  # the callbacks live as long as the scene
+                   "memory": memory, "estimate_errors": estimate_errors, "keep_all": keep_all}
+        options = self._options = self._scene_options(
+            set, paths=paths, log=log, progress=progress, find_module=find_module, find_file=find_file, objects=objects,
+            nodes=nodes, **numbers, **parameters)
         handle = c_void_p()
         try:
             if text is None:
@@ -286,8 +436,14 @@ class Scene:
                 self._call("scene_open_text", str(file).encode(), text.encode(), byref(options), byref(handle))
         finally:
             call("offers_release", options.offers)
-        self._handle = _Handle(handle, "scene_close")
+        self._handle = _Handle(handle, "scene_release")
         self._refuse_ambiguous(numbers, set or {})
+
+    @staticmethod
+    def load_plugin(path):
+        """Loads types of nodes from a library that is built against the runtime's headers, for scenes that are opened
+        later."""
+        call("scene_load_plugin", str(path).encode())
 
     def _refuse_ambiguous(self, options, settings):
         """Raises TypeError if an option was given that is also the name of a parameter, which it does not set."""
@@ -302,7 +458,7 @@ class Scene:
     def parameters(self):
         """By name: {"value", "default", "doc"}."""
         result = {}
-        for place in range(get("scene_parameter_count", self._handle.value, c_size_t()).value):
+        for place in range(value_of("scene_parameter_count", self._handle.value)):
             one = sized(Parameter)
             call("scene_parameter", self._handle.value, place, byref(one))
             result[one.name.decode()] = {"value": from_value(one.value), "default": from_value(one.fallback),
@@ -313,7 +469,7 @@ class Scene:
     def nodes(self):
         """[{"name", "type", "file", "line"}], in the order in which the scene makes them."""
         result = []
-        for place in range(get("scene_node_count", self._handle.value, c_size_t()).value):
+        for place in range(value_of("scene_node_count", self._handle.value)):
             one = sized(Node)
             call("scene_node", self._handle.value, place, byref(one))
             result.append({"name": one.name.decode(), "type": one.type.decode(), "file": one.file.decode(),
@@ -326,10 +482,10 @@ class Scene:
         types = json.loads(get("scene_node_types", self._handle.value, c_char_p()).value)
         return {one.pop("name"): one for one in types}
 
-    @property
-    def warnings(self):
-        text = get("scene_warnings", self._handle.value, c_char_p()).value
-        return text.decode().split("\n") if text else []
+    warnings = property(lambda self: lines("scene_warnings", self._handle.value), doc="Of opening.")
+    fps = property(lambda self: value_of("scene_fps", self._handle.value))
+    first_frame = property(lambda self: value_of("scene_first_frame", self._handle.value))
+    next_frame = property(lambda self: value_of("scene_next_frame", self._handle.value))
 
     def set(self, values=None, /, **parameters):
         """Gives parameters values, as Scene() does, and goes back to the start."""
@@ -344,14 +500,6 @@ class Scene:
             self._call("scene_offer", self._handle.value, offers)
         finally:
             call("offers_release", offers)
-
-    @property
-    def first_frame(self):
-        return get("scene_first_frame", self._handle.value, c_int64()).value
-
-    @property
-    def next_frame(self):
-        return get("scene_next_frame", self._handle.value, c_int64()).value
 
     def advance(self):
         """Computes the next frame. Ctrl-C cancels it; the scene then has to be restarted."""
@@ -428,49 +576,106 @@ class Scene:
             raise
         return Frame(handle, self)
 
-    def _cancel_if_open(self):
-        if self._handle:
-            self.cancel()
+    def shapes(self, frame):
+        """The Shapes of a frame, which need not be computed."""
+        handle = c_void_p()
+        self._call("scene_shapes", self._handle.value, frame, byref(handle))
+        return Shapes(handle)
 
-    def close(self):
-        """Gives its memory back before Python does. Frames and snapshots stay."""
-        self._handle.close()
+    def picture(self, frame, width=640, height=360):
+        """A Picture of a Frame of the scene, with its shapes."""
+        return _picture("scene_picture", self._handle.value, frame._handle.value, width, height)
 
-    def __enter__(self):
-        return self
 
-    def __exit__(self, *_):
-        self.close()
+class Run(_Program):
+    """A run that writes files, as `rapid run` does: prepare() it, and run() it, once.
 
-    def _call(self, name, *arguments):
-        self._raised = None
+    outputs: patterns of files, "first.####.vdb". frames: (first, last) or (first, last, step); 48 from the scene's first
+    without. Pictures: width, height, and position, target and fov of their camera, fitted where they are None. statistics,
+    profile, events: names of files. cache: a folder from which it goes on where an earlier run ended, with a snapshot
+    after each cache_every-th frame; cache_again computes all frames again, cache_replace takes the folder of another run.
+    part: (number, count), one of the subsets of the points; sample: the fraction of them. frame(number, points, seconds,
+    is_known) is told of each frame that is done, line(text) of files, warning(text) of warnings. All else is for the scene,
+    as Scene takes it.
+    """
+
+    def __init__(self, file, outputs=(), frames=None, *, text=None, width=1280, height=720, position=None, target=None,
+                 fov=None, statistics=None, profile=None, events=None, cache=None, cache_every=10, cache_again=False,
+                 cache_replace=False, part=None, sample=1, frame=None, line=None, warning=None, **scene):
+        super().__init__()
+        options = sized(RunOptions)
+        options.text = None if text is None else encoded(text)
+        if frames is not None:
+            options.frames = ctypes.pointer(Frames(*frames) if len(frames) == 3 else Frames(*frames, 1))
+        options.outputs, options.output_count = texts(outputs)
+        options.width, options.height = Int.checked(width), Int.checked(height)
+        options.camera = _camera(position, target, fov)
+        for name, path in (("statistics", statistics), ("profile", profile), ("events", events), ("cache", cache)):
+            setattr(options, name, None if path is None else encoded(str(path)))
+        options.cache_every, options.cache_again, options.cache_replace = cache_every, cache_again, cache_replace
+        options.part, options.part_count = part or (0, 0)
+        options.sample = sample
+        if frame:
+            options.frame = FrameDone(self._guard(lambda _, *told: frame(*told[:3], bool(told[3])), None))
+        if line:
+            options.line = Line(self._guard(lambda _, told: line(told.decode()), None))
+        if warning:
+            options.warning = Line(self._guard(lambda _, told: warning(told.decode()), None))
+        of_scene = self._scene_options(**scene)
+        self._options = options, of_scene
+        handle = c_void_p()
         try:
-            with interruptible(self._cancel_if_open):
-                call(name, *arguments)
-        except Error as error:
-            if self._raised:
-                raise self._raised from error
-            raise
-        if self._raised:
-            raise self._raised
+            self._call("run_make", str(file).encode(), byref(of_scene), byref(options), byref(handle))
+        finally:
+            call("offers_release", of_scene.offers)
+        self._handle = _Handle(handle, "run_release")
 
-    def _guard(self, function, otherwise):
-        """A callback whose exception is kept until the call ends: none may pass through C."""
-        scene = weakref.ref(self)
+    def prepare(self):
+        """Opens and plans the scene, and finds what is wrong with the names of files."""
+        self._call("run_prepare", self._handle.value)
 
-        def guarded(*arguments):
-            try:
-                return function(*arguments)
-            except BaseException as error:  # KeyboardInterrupt, too
-                scene()._raised = error
-                return otherwise
-        return guarded
+    first_frame = property(lambda self: value_of("run_first_frame", self._handle.value), doc="Of the scene.")
 
-    def _go_on(self, progress, frame, last):
-        return int(self._raised is None and (progress is None or progress(frame, last) is not False))
+    @property
+    def frames(self):
+        """(first, last, step) of those that are written."""
+        frames = get("run_frames", self._handle.value, Frames())
+        return frames.first, frames.last, frames.step
 
-    def _hold(self, what, text):
-        if text is None:
-            return None
-        self._held[what] = ctypes.create_string_buffer(encoded(str(text)))
-        return ctypes.addressof(self._held[what])
+    def run(self):
+        """Computes and writes the frames. Returns {"ending", "last_frame", "unwritten", "summary"}, where the ending is
+        "complete", or "ended" by end_after_frame(); raises the error of a frame."""
+        outcome = sized(Outcome)
+        self._call("run_run", self._handle.value, byref(outcome))
+        return {"ending": ["complete", "ended", "failed"][outcome.ending], "last_frame": outcome.last_frame,
+                "unwritten": outcome.unwritten.decode().split("\n") if outcome.unwritten else [],
+                "summary": outcome.summary.decode()}
+
+    def end_after_frame(self):
+        """Ends it behind the frame that is being computed, with a snapshot where it has a cache. From any thread."""
+        call("run_end_after_frame", self._handle.value)
+
+    def cancel(self):
+        """Ends it at once. From any thread."""
+        call("run_cancel", self._handle.value)
+
+
+def merge_files(parts, output, progress=None):
+    """Puts the files of the parts of a run together, as the whole run would have written them. parts: patterns, where {part}
+    stands for all parts. progress(frame, points) is told of each frame, and ends it where it returns False. Returns
+    {"parts", "frames", "points"}. Meanwhile no scene may run."""
+    merged, raised = sized(Merged), []
+
+    def told(_, frame, points):
+        try:
+            return int(progress is None or progress(frame, points) is not False)
+        except BaseException as error:
+            raised.append(error)
+            return 0
+    try:
+        call("merge_files", *texts(parts), encoded(str(output)), MergeProgress(told), None, byref(merged))
+    except Error as error:
+        if raised:
+            raise raised[0] from error
+        raise
+    return {"parts": merged.parts, "frames": merged.frames, "points": merged.points}

@@ -67,10 +67,10 @@ Find = CFUNCTYPE(c_void_p, c_void_p, c_char_p)
 
 
 class Options(ctypes.Structure):
-    _fields_ = [("size", c_size_t), ("settings", POINTER(Setting)), ("setting_count", c_size_t),
+    _fields_ = [("size", c_size_t), ("set", POINTER(Setting)), ("set_count", c_size_t),
                 ("seed", POINTER(c_uint64)), ("paths", POINTER(c_char_p)), ("path_count", c_size_t),
                 ("threads", c_int), ("script_seconds", c_double), ("script_memory", c_uint64), ("memory", c_uint64),
-                ("no_errors", c_int), ("keep_all", c_int), ("user", c_void_p), ("log", Log), ("progress", Progress),
+                ("estimate_errors", c_int), ("keep_all", c_int), ("user", c_void_p), ("log", Log), ("progress", Progress),
                 ("find_module", Find), ("find_file", Find), ("offers", c_void_p)]
 
 
@@ -87,12 +87,54 @@ class Column(ctypes.Structure):
                 ("components", c_size_t), ("stride", c_size_t), ("data", c_void_p)]
 
 
-class FrameInfo(ctypes.Structure):
-    _fields_ = [("size", c_size_t), ("number", c_int64), ("time", c_double), ("fps", c_double), ("points", c_size_t),
-                ("born", c_uint64), ("died", c_uint64), ("collisions", c_uint64), ("substeps", c_int),
-                ("has_errors", c_int), ("error_p50", c_double), ("error_p95", c_double), ("error_max", c_double),
-                ("penetration_max", c_double), ("constraint_residual_max", c_double), ("seconds", c_double),
-                ("script_seconds", c_double), ("solve_seconds", c_double)]
+class Statistics(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("points", c_uint64), ("born", c_uint64), ("died", c_uint64),
+                ("collisions", c_uint64), ("substeps", c_int), ("has_errors", c_int), ("error_p50", c_double),
+                ("error_p95", c_double), ("error_max", c_double), ("penetration_max", c_double),
+                ("constraint_residual_max", c_double), ("seconds", c_double), ("script_seconds", c_double),
+                ("solve_seconds", c_double)]
+
+
+class Mesh(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("role", c_int), ("corner_count", c_size_t), ("positions", c_void_p),
+                ("triangle_count", c_size_t), ("triangles", c_void_p)]
+
+
+class Plane(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("normal", c_double * 3), ("offset", c_double)]
+
+
+class Camera(ctypes.Structure):
+    _fields_ = [("position", POINTER(c_double)), ("target", POINTER(c_double)), ("fov", c_double)]
+
+
+class Frames(ctypes.Structure):
+    _fields_ = [("first", c_int64), ("last", c_int64), ("step", c_int64)]
+
+
+FrameDone = CFUNCTYPE(None, c_void_p, c_int64, c_uint64, c_double, c_int)
+Line = CFUNCTYPE(None, c_void_p, c_char_p)
+
+
+class RunOptions(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("text", c_char_p), ("frames", POINTER(Frames)), ("outputs", POINTER(c_char_p)),
+                ("output_count", c_size_t), ("width", c_int), ("height", c_int), ("camera", Camera),
+                ("statistics", c_char_p), ("profile", c_char_p), ("events", c_char_p), ("cache", c_char_p),
+                ("cache_every", c_int64), ("cache_again", c_int), ("cache_replace", c_int), ("part", c_int),
+                ("part_count", c_int), ("sample", c_double), ("user", c_void_p), ("frame", FrameDone), ("line", Line),
+                ("warning", Line)]
+
+
+class Outcome(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("ending", c_int), ("last_frame", c_int64), ("unwritten", c_char_p),
+                ("summary", c_char_p)]
+
+
+MergeProgress = CFUNCTYPE(c_int, c_void_p, c_int64, c_uint64)
+
+
+class Merged(ctypes.Structure):
+    _fields_ = [("size", c_size_t), ("parts", c_size_t), ("frames", c_size_t), ("points", c_uint64)]
 
 
 Distance = CFUNCTYPE(c_int, c_void_p, c_size_t, POINTER(c_double), POINTER(c_double), POINTER(c_double))
@@ -159,51 +201,60 @@ def _load():
 
 library = _load()
 
-_texts = ["message", "file", "node", "text", "stack"]
+_texts = ["message", "file", "node", "text", "script_stack"]
 for _text in _texts:
     getattr(library, f"rapid_error_{_text}").restype = c_char_p
     getattr(library, f"rapid_error_{_text}").argtypes = [c_void_p]
-library.rapid_error_line.argtypes = library.rapid_error_free.argtypes = [c_void_p]
-library.rapid_error_free.restype = None
+library.rapid_error_line.argtypes = library.rapid_error_release.argtypes = [c_void_p]
+library.rapid_error_release.restype = None
 library.rapid_version.restype = c_char_p
+
+# Getters, which can't fail.
+for _name, _result in {
+        "scene_parameter_count": c_size_t, "scene_node_count": c_size_t, "scene_fps": c_double,
+        "scene_first_frame": c_int64, "scene_next_frame": c_int64, "snapshot_frame": c_int64, "snapshot_size": c_uint64,
+        "frame_number": c_int64, "frame_time": c_double, "frame_fps": c_double, "frame_size": c_size_t,
+        "shapes_mesh_count": c_size_t, "shapes_plane_count": c_size_t, "shapes_has_camera": c_int,
+        "run_first_frame": c_int64}.items():
+    getattr(library, f"rapid_{_name}").restype = _result
+    getattr(library, f"rapid_{_name}").argtypes = [c_void_p]
 
 _handle = POINTER(c_void_p)
 _text = POINTER(c_char_p)
 for _name, _types in {
-        "load_plugin": [_Text],
+        "scene_load_plugin": [_Text],
         "scene_open": [_Text, POINTER(Options), _handle],
         "scene_open_text": [_Text, _Text, POINTER(Options), _handle],
-        "scene_close": [c_void_p],
-        "scene_parameter_count": [c_void_p, POINTER(c_size_t)],
+        "scene_release": [c_void_p],
         "scene_parameter": [c_void_p, Size, POINTER(Parameter)],
         "scene_set": [c_void_p, POINTER(Setting), Size],
-        "scene_node_count": [c_void_p, POINTER(c_size_t)],
         "scene_node": [c_void_p, Size, POINTER(Node)],
         "scene_node_types": [c_void_p, _text],
         "scene_warnings": [c_void_p, _text],
-        "scene_first_frame": [c_void_p, POINTER(c_int64)],
-        "scene_next_frame": [c_void_p, POINTER(c_int64)],
         "scene_advance": [c_void_p, _handle],
         "scene_advance_to": [c_void_p, Int64, _handle],
         "scene_restart": [c_void_p],
         "scene_cancel": [c_void_p],
         "scene_save": [c_void_p, _handle],
         "scene_restore": [c_void_p, c_void_p],
-        "snapshot_frame": [c_void_p, POINTER(c_int64)],
-        "snapshot_bytes": [c_void_p, POINTER(c_uint64)],
         "snapshot_write": [c_void_p, _Text],
         "snapshot_read": [_Text, _handle],
         "snapshot_release": [c_void_p],
         "frame_output": [c_void_p, _Text, _handle],
-        "frame_names": [c_void_p, Int, _text],
-        "frame_get_info": [c_void_p, POINTER(FrameInfo)],
-        "frame_statistics": [c_void_p, _text],
-        "frame_profile": [c_void_p, _text],
+        "frame_outputs": [c_void_p, _text],
+        "frame_columns": [c_void_p, _text],
+        "frame_groups": [c_void_p, _text],
+        "frame_details": [c_void_p, _text],
+        "frame_warnings": [c_void_p, _text],
+        "frame_statistics": [c_void_p, POINTER(Statistics)],
+        "frame_statistics_json": [c_void_p, _text],
+        "frame_profile_json": [c_void_p, _text],
+        "frame_places": [c_void_p, POINTER(c_int64), Size, POINTER(c_uint32)],
         "frame_column": [c_void_p, _Text, POINTER(Column)],
         "frame_group": [c_void_p, _Text, POINTER(Column)],
         "frame_expanded": [c_void_p, _Text, POINTER(Column)],
-        "token_text": [UInt32, _text],
-        "text_token": [_Text, POINTER(c_uint32)],
+        "frame_text_of": [UInt32, _text],
+        "frame_token_of": [_Text, POINTER(c_uint32)],
         "frame_detail": [c_void_p, _Text, POINTER(Value)],
         "frame_write": [c_void_p, _Text],
         "frame_read": [_Text, _handle],
@@ -223,17 +274,31 @@ for _name, _types in {
         "scene_trace": [c_void_p, POINTER(c_int64), Size, _Text, Int64, Int64, _text],
         "offers_release": [c_void_p],
         "scene_picture": [c_void_p, c_void_p, Int, Int, POINTER(c_void_p), POINTER(c_size_t)],
-        "frame_release": [c_void_p]}.items():
+        "frame_picture": [c_void_p, c_void_p, POINTER(Camera), Int, Int, POINTER(c_void_p), POINTER(c_size_t)],
+        "frame_release": [c_void_p],
+        "scene_shapes": [c_void_p, Int64, _handle],
+        "shapes_mesh": [c_void_p, Size, POINTER(Mesh)],
+        "shapes_plane": [c_void_p, Size, POINTER(Plane)],
+        "shapes_warnings": [c_void_p, _text],
+        "shapes_release": [c_void_p],
+        "run_make": [_Text, POINTER(Options), POINTER(RunOptions), _handle],
+        "run_prepare": [c_void_p],
+        "run_frames": [c_void_p, POINTER(Frames)],
+        "run_run": [c_void_p, POINTER(Outcome)],
+        "run_end_after_frame": [c_void_p],
+        "run_cancel": [c_void_p],
+        "run_release": [c_void_p],
+        "merge_files": [POINTER(c_char_p), Size, _Text, MergeProgress, c_void_p, POINTER(Merged)]}.items():
     getattr(library, f"rapid_{_name}").argtypes = _types + [_handle]
 
 
 class Error(RuntimeError):
-    """What went wrong: str() has FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line, node and kind;
-    stack has the calls of the script in which it was raised, the innermost first."""
+    """What went wrong: text and str() have FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line, node and
+    kind; script_stack has the calls of the script in which it was raised, the innermost first."""
 
-    def __init__(self, kind, message, file="", line=0, node="", text=None, stack=""):
+    def __init__(self, kind, message, file="", line=0, node="", text=None, script_stack=""):
         super().__init__(text or message)
-        self.stack = stack
+        self.text, self.script_stack = text or message, script_stack
         self.kind, self.message, self.file, self.line, self.node = kind, message, file, line, node
 
 
@@ -248,13 +313,44 @@ def call(name, *arguments):
                                             for part in _texts)
         raise Error(STATUS.get(status, str(status)), message, file, library.rapid_error_line(fault), node, text, stack)
     finally:
-        library.rapid_error_free(fault)
+        library.rapid_error_release(fault)
 
 
 def get(name, handle, result):
     """The result of a function that writes one behind its handle."""
     call(name, handle, byref(result))
     return result
+
+
+# By subject, what fails where a getter returns 0 for a handle that is released, or a scene that is in another call.
+_checked = {"scene": ("scene_warnings", c_char_p), "frame": ("frame_outputs", c_char_p),
+            "shapes": ("shapes_warnings", c_char_p), "run": ("run_frames", Frames)}
+
+
+def value_of(name, handle):
+    """What a getter gives. Raises Error as call() does."""
+    value = getattr(library, f"rapid_{name}")(handle)
+    if not value:
+        subject = name.split("_")[0]
+        if subject in _checked:
+            function, result = _checked[subject]
+            get(function, handle, result())
+        elif not library.rapid_snapshot_size(handle):
+            raise Error(STATUS[1], "the snapshot is released")
+    return value
+
+
+def lines(name, handle):
+    """The list that a function gives as lines."""
+    text = get(name, handle, c_char_p()).value
+    return text.decode().split("\n") if text else []
+
+
+def texts(values):
+    """An array of texts for the library, with their number."""
+    if isinstance(values, (str, bytes)):
+        raise TypeError(f"{values!r} is one text; it must be a list of them")
+    return (c_char_p * len(values))(*(encoded(str(one)) for one in values)), len(values)
 
 
 def sized(struct):

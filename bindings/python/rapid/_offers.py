@@ -18,7 +18,7 @@ _string = 6
 def _tokens(array):
     """The library's numbers of texts."""
     texts, places = numpy.unique(array, return_inverse=True)
-    tokens = [get("text_token", encoded(str(text)), ctypes.c_uint32()).value for text in texts]
+    tokens = [get("frame_token_of", encoded(str(text)), ctypes.c_uint32()).value for text in texts]
     return numpy.array(tokens, numpy.uint32)[places]
 
 

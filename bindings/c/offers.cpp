@@ -56,7 +56,7 @@ std::size_t bytes_of(ColumnType type)
     return bytes[static_cast<int>(type)];
 }
 
-// Of points or triangles, none of which takes more than 16 bytes a column. Refusal: more than an address has bits for.
+// Of points or triangles, none of which takes more than 16 bytes a column. Error: more than an address has bits for.
 void check_count(std::size_t count, const char* name)
 {
     constexpr std::size_t most = SIZE_MAX / 64;

@@ -70,7 +70,7 @@ int rapid_run_make(const char* file, const rapid_options* scene, const rapid_run
         const rapid_run_options usual = rapid_default_run_options();
         const rapid_run_options known = options ? known_part(options, "options", usual) : usual;
         SceneRun made =
-            SceneRun::make(&not_null(file, "file"), options_of(scene), {}, run_options_of(known), listener_of(known))
+            SceneRun::make(&not_null(file, "file"), options_of(scene), run_options_of(known), listener_of(known))
                 .value();
         *run = static_cast<rapid_run*>(Runs::add(std::shared_ptr<OpenRun>(new OpenRun{std::move(made), {}, {}})));
     });

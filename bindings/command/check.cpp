@@ -7,6 +7,7 @@
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -44,10 +45,10 @@ public:
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
-            const std::string text = check_outputs(scene, files_.files()).value();
+            const std::string text = SceneInside::check_outputs(scene, files_.files()).value();
             if (!races_) {
                 print(text);
-                print(advice_on(scene, files_.files()).value());
+                print(SceneInside::advice_on(scene, files_.files()).value());
                 return status_done;
             }
             const std::int64_t first = scene.first_frame();
@@ -65,7 +66,7 @@ public:
 private:
     bool is_free_of_races(Scene& scene, const RunFrames& frames, bool verbose) const
     {
-        const Result<SceneRaces> races = find_races(scene, files_.files(), frames);
+        const Result<SceneRaces> races = SceneInside::find_races(scene, files_.files(), frames);
         if (!races) {  // while a frame ran
             print_error(races.error(), verbose);
             return false;

@@ -8,6 +8,7 @@
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/threads.h"
 
 namespace rapid {
@@ -47,10 +48,10 @@ public:
         Threads threads(common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
-            const SceneReport kept = explain_outputs(scene, files_.files()).value();
+            const SceneReport kept = SceneInside::explain_outputs(scene, files_.files()).value();
             if (!against_.empty()) {
                 Scene other = graph_.open_other(against_, common);
-                const SceneReport more = explain_difference(scene, files_.files(), other).value();
+                const SceneReport more = SceneInside::explain_difference(scene, files_.files(), other).value();
                 print(json_ ? indented(ordered_json::parse(more.json)) : more.text);
                 return status_done;
             }
@@ -59,7 +60,7 @@ public:
                 if (*state_after_ < scene.first_frame())
                     throw Error(fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_,
                                             scene.first_frame()));
-                state = explain_state(scene, files_.files(), *state_after_).value();
+                state = SceneInside::explain_state(scene, files_.files(), *state_after_).value();
             }
             if (json_) {
                 ordered_json json = ordered_json::parse(kept.json);

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {
@@ -31,7 +32,7 @@ std::vector<double> read_numbers(const std::string& text)
 std::string extensions(bool of_films)
 {
     std::vector<std::string> known;
-    for (const OutputFormat& format : output_formats())
+    for (const OutputFormat& format : SceneInside::output_formats())
         if (format.is_film == of_films) known.push_back(format.extension);
     return fmt::format("{}", fmt::join(known, " "));
 }
@@ -95,7 +96,7 @@ void FileOptions::declare(Options& options)
 bool FileOptions::makes_films() const
 {
     return std::any_of(names().begin(), names().end(),
-                       [](const std::string& text) { return output_format(text).value().is_film; });
+                       [](const std::string& text) { return SceneInside::output_format(text).value().is_film; });
 }
 
 }  // namespace rapid

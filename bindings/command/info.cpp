@@ -6,6 +6,7 @@
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/printable.h"
 #include "runtime/threads.h"
 
@@ -39,8 +40,8 @@ public:
         const CacheFiles cache = find_cache(file_);
         ordered_json all = ordered_json::array();
         for (const auto& [frame, path] : cache.frames) {
-            if (SceneSnapshot::is_file(path)) {
-                const SceneReport report = SceneSnapshot::describe(path).value();
+            if (SceneInside::is_snapshot(path)) {
+                const SceneReport report = SceneInside::describe_snapshot(path).value();
                 ordered_json json = {{"file", path.string()}};
                 json.update(ordered_json::parse(report.json));
                 if (!json_) print(report.text);

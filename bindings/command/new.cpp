@@ -10,6 +10,7 @@
 
 #include "bindings/command_line/command.h"
 #include "bindings/scene/installation.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {
@@ -86,7 +87,7 @@ private:
                 fmt::format("rapid new: \"{}\" is no name of a scene; it must be made of letters, digits, _ and "
                             "-, and begin with a letter",
                             name_));
-        const std::vector<SceneNodeType> types = Scene::all_node_types().value();
+        const std::vector<SceneNodeType> types = SceneInside::all_node_types().value();
         if (std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name_; }))
             throw Error(
                 fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from scenes "

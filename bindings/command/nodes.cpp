@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
+#include "bindings/scene/scene_inside.h"
 
 namespace rapid {
 namespace {
@@ -37,7 +38,7 @@ public:
 
     int run(const CommonOptions&) override
     {
-        const NodeDocuments documents = Scene::documents().value();
+        const NodeDocuments documents = SceneInside::documents().value();
         for (const std::string& warning : documents.warnings) print_warning(warning);
         if (annotations_) {
             if (!name_.empty()) throw Error("rapid nodes: --annotations is of all nodes; leave out " + name_);

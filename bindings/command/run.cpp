@@ -19,6 +19,7 @@
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/signals.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/output_file.h"
 #include "runtime/threads.h"
@@ -162,7 +163,8 @@ private:
         SceneHooks hooks;
         hooks.late = hooks.beyond_memory = end;
         if (tell_) hooks.reads = [](const std::string& file) { Watch::tell(file); };
-        return SceneRun::make(graph_.file(), std::move(scene), std::move(hooks), options_, std::move(listener)).value();
+        return SceneInside::make(graph_.file(), std::move(scene), std::move(hooks), options_, std::move(listener))
+            .value();
     }
 
     void check_farm() const
@@ -182,7 +184,7 @@ private:
     {
         FarmJob job;
         job.name = "rapid-" + std::filesystem::path(graph_.file()).stem().string();
-        const std::vector<std::string> folders = output_folders(options_.files).value();
+        const std::vector<std::string> folders = SceneInside::output_folders(options_.files).value();
         job.outputs = folders.empty() ? "." : folders.front();
         job.words = farm_.words(*given_, {"--parts"});
         job.words.emplace_back("--quiet");
@@ -198,7 +200,7 @@ private:
             return farm_.submit(std::move(job));
         }
         const int parts = static_cast<int>(parts_);
-        const auto merges = run.merges(parts).value();
+        const auto merges = SceneInside::merges(run, parts).value();
         for (int number = 1; number <= parts; ++number) {
             const std::string name = part_name(number, parts);
             job.tasks.push_back(
@@ -214,7 +216,8 @@ private:
     SandboxAccess access() const
     {
         SandboxAccess access{{folder_of(graph_.file())}, {}};
-        for (const std::string& folder : output_folders(options_).value()) access.writable.emplace_back(folder);
+        for (const std::string& folder : SceneInside::output_folders(options_).value())
+            access.writable.emplace_back(folder);
         return access;
     }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {
@@ -58,7 +59,7 @@ int RunTerminal::end(const RunOutcome& outcome, int signal)
 void RunTerminal::abandon(SceneRun& run, int status, const std::string& why)
 {
     // The run's own thread holds the lock only briefly, unless its terminal is stopped; then do without it.
-    if (const auto told = run.abandon(); told && mutex_.try_lock_for(std::chrono::seconds(1))) {
+    if (const auto told = SceneInside::abandon(run); told && mutex_.try_lock_for(std::chrono::seconds(1))) {
         erase_progress();
         for (const std::string& warning : told->warnings) print_warning(warning);
         print_error(Error(why), false);

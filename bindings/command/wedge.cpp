@@ -24,6 +24,7 @@
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/picture_sheet.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/checked_json.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
@@ -353,7 +354,7 @@ public:
     int run(const CommonOptions& common) override
     {
         rows_ = wedge_rows(settings_, zip_, files_.names());
-        const std::vector<std::string> folders = output_folders(files_.files()).value();
+        const std::vector<std::string> folders = SceneInside::output_folders(files_.files()).value();
         if (!folders.empty()) folder_ = folders.front();
         cache_.check();
         farm_.check();

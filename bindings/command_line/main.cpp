@@ -18,6 +18,7 @@
 #include "bindings/command_line/options.h"
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/untrusted.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/output_file.h"
 #include "runtime/setting_names.h"
 
@@ -167,11 +168,11 @@ int become(const Program& program, const Arguments& arguments)
     }
 }
 
-// Whether nothing that was given to the command is to blame.
+// Whether nothing that was given to the command is to blame: a library failed, or the system has no memory.
 bool is_of_system(const SceneError& error)
 {
-    const bool has_place = !error.file.empty() || !error.node.empty();
-    return error.kind == SceneError::Unexpected || (error.kind == SceneError::OutOfMemory && !has_place);
+    const bool is_plain = error.file.empty() && error.node.empty() && error.message == "out of memory";
+    return error.kind == SceneError::Unexpected || (error.kind == SceneError::OutOfMemory && is_plain);
 }
 
 int run_command(Command& command, const CommonOptions& common)
@@ -180,7 +181,7 @@ int run_command(Command& command, const CommonOptions& common)
         auto* const confined = dynamic_cast<Confined*>(&command);
         if (confined) confined->confine(common);
         if (!confined || confined->takes_plugins()) {
-            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) Scene::load_plugins(path).value();
+            if (const char* path = std::getenv("RAPID_PLUGIN_PATH")) SceneInside::load_plugins(path).value();
             for (const std::string& file : common.plugins) Scene::load_plugin(file).value();
         }
         return finish(command.run(common));

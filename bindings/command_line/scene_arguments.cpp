@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "bindings/command_line/memory_limit.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
@@ -14,7 +15,7 @@ namespace {
 Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
     const MemoryLimit limit(file, hooks.late);
-    return Scene::open(file, std::move(options), std::move(hooks)).value();
+    return SceneInside::open(file, std::move(options), std::move(hooks)).value();
 }
 
 }  // namespace

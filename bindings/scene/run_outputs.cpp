@@ -96,7 +96,7 @@ FrameFiles frame_files(const FileOutputs& files)
     return FrameFiles(files.outputs, picture_options(asked.camera, asked.size));
 }
 
-Result<OutputFormat> output_format(const std::string& output)
+Result<OutputFormat> SceneInside::output_format(const std::string& output)
 {
     try {
         const Format& format = format_of(parse_output_target(output).pattern);
@@ -106,14 +106,14 @@ Result<OutputFormat> output_format(const std::string& output)
     }
 }
 
-std::vector<OutputFormat> output_formats()
+std::vector<OutputFormat> SceneInside::output_formats()
 {
     std::vector<OutputFormat> all;
     for (const Format& format : formats()) all.push_back({format.extension, format.film});
     return all;
 }
 
-Result<std::vector<std::string>> output_folders(const FileOutputs& files)
+Result<std::vector<std::string>> SceneInside::output_folders(const FileOutputs& files)
 {
     try {
         std::vector<std::string> folders;
@@ -124,7 +124,7 @@ Result<std::vector<std::string>> output_folders(const FileOutputs& files)
     }
 }
 
-Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files)
+Result<SceneReport> SceneInside::explain_outputs(Scene& scene, const FileOutputs& files)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::WrongScene, [&] {
@@ -133,7 +133,7 @@ Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files)
     });
 }
 
-Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other)
+Result<SceneReport> SceneInside::explain_difference(Scene& scene, const FileOutputs& files, Scene& other)
 {
     SceneInside::Impl& here = SceneInside::of(scene);
     SceneInside::Impl& there = SceneInside::of(other);
@@ -155,7 +155,7 @@ Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, S
     });
 }
 
-Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame)
+Result<SceneReport> SceneInside::explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
@@ -171,7 +171,7 @@ Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::i
     });
 }
 
-Result<std::string> check_outputs(Scene& scene, const FileOutputs& files)
+Result<std::string> SceneInside::check_outputs(Scene& scene, const FileOutputs& files)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::WrongScene, [&] {
@@ -211,7 +211,7 @@ bool is_of_kernel(const Plan& plan, const Error& error)
 
 }  // namespace
 
-Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
+Result<std::string> SceneInside::advice_on(Scene& scene, const FileOutputs& files)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {
@@ -240,7 +240,7 @@ Result<std::string> advice_on(Scene& scene, const FileOutputs& files)
     });
 }
 
-Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames)
+Result<SceneRaces> SceneInside::find_races(Scene& scene, const FileOutputs& files, RunFrames frames)
 {
     SceneInside::Impl& impl = SceneInside::of(scene);
     return impl.call(SceneError::FailedFrame, [&] {

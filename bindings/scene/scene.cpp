@@ -43,34 +43,15 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
-Result<Scene> Scene::open(const std::string& file, SceneOptions options)
-{
-    return open(file, std::move(options), SceneHooks());
-}
+namespace {
 
-Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
-{
-    if (name.empty()) return wrong_call("the scene has no name; give one for its messages, such as scene.lua");
-    return open_any(name, text, std::move(options));
-}
-
-Result<Scene> Scene::open(const std::string& file, SceneOptions options, SceneHooks hooks)
-{
-    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
-    return open_with(file, std::nullopt, std::move(options), std::move(hooks));
-}
-
-Result<Scene> Scene::open_any(const std::string& file, std::optional<std::string> text, SceneOptions options)
-{
-    return open_with(file, std::move(text), std::move(options), {});
-}
-
-Result<Scene> Scene::open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
-                               SceneHooks hooks)
+// With hooks, of a file or of a text with its name.
+Result<std::unique_ptr<SceneInside::Impl>> opened(const std::string& file, std::optional<std::string> text,
+                                                  SceneOptions options, SceneHooks hooks)
 {
     if (std::optional<SceneError> fault = fault_of(options)) return std::move(*fault);
     try {
-        auto impl = std::make_unique<Impl>();
+        auto impl = std::make_unique<SceneInside::Impl>();
         impl->file = file;
         impl->text = std::move(text);
         impl->options = std::move(options);
@@ -85,15 +66,38 @@ Result<Scene> Scene::open_with(const std::string& file, std::optional<std::strin
             return Done();
         });
         if (!loaded) return loaded.error();
-        return Scene(std::move(impl));
+        return impl;
     } catch (...) {
         return caught_error(SceneError::Unexpected);
     }
 }
 
+}  // namespace
+
+Result<Scene> Scene::open(const std::string& file, SceneOptions options)
+{
+    return SceneInside::open(file, std::move(options), {});
+}
+
+Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
+{
+    if (name.empty()) return wrong_call("the scene has no name; give one for its messages, such as scene.lua");
+    auto impl = opened(name, text, std::move(options), {});
+    if (!impl) return impl.error();
+    return Scene(std::move(*impl));
+}
+
+Result<Scene> SceneInside::open(const std::string& file, SceneOptions options, SceneHooks hooks)
+{
+    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
+    auto impl = opened(file, std::nullopt, std::move(options), std::move(hooks));
+    if (!impl) return impl.error();
+    return Scene(std::move(*impl));
+}
+
 const std::vector<SceneParameter>& Scene::parameters() const { return impl_->parameters; }
 const std::vector<SceneNode>& Scene::nodes() const { return impl_->nodes; }
-const std::vector<SceneOutput>& Scene::outputs() const { return impl_->outputs; }
+const std::vector<SceneOutput>& SceneInside::outputs(const Scene& scene) { return of(scene).outputs; }
 double Scene::fps() const { return impl_->plan->simulations.front().fps; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
 std::int64_t Scene::first_frame() const { return impl_->plan->first_frame(); }
@@ -109,7 +113,7 @@ Result<std::vector<SceneNodeType>> Scene::node_types()
     });
 }
 
-Result<std::vector<SceneNodeType>> Scene::all_node_types()
+Result<std::vector<SceneNodeType>> SceneInside::all_node_types()
 {
     try {
         std::map<std::string, SceneNodeType> by_name;

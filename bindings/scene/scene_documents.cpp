@@ -7,6 +7,7 @@
 #include "bindings/host/node_page.h"
 #include "bindings/host/own_nodes.h"
 #include "bindings/scene/scene_error.h"
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "runtime/graph/plugin.h"
 #include "runtime/points/spare_pages.h"
@@ -27,9 +28,9 @@ Result<Done> loaded(const std::string& from, void (*load)(const std::string&))
 }  // namespace
 
 Result<Done> Scene::load_plugin(const std::string& file) { return loaded(file, rapid::load_plugin); }
-Result<Done> Scene::load_plugins(const std::string& path) { return loaded(path, rapid::load_plugins); }
+Result<Done> SceneInside::load_plugins(const std::string& path) { return loaded(path, rapid::load_plugins); }
 
-Result<Done> Scene::keep_spare_columns(std::size_t columns)
+Result<Done> SceneInside::keep_spare_columns(std::size_t columns)
 {
     try {
         constexpr std::size_t most = 4096;  // each release goes over them
@@ -41,7 +42,7 @@ Result<Done> Scene::keep_spare_columns(std::size_t columns)
     }
 }
 
-Result<NodeDocuments> Scene::documents()
+Result<NodeDocuments> SceneInside::documents()
 {
     try {
         NodeTypes all = with_own_nodes();

@@ -7,6 +7,7 @@
 
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/files/left_out.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/describe.h"
@@ -154,10 +155,10 @@ Result<std::vector<std::uint32_t>> SceneFrame::places(const std::vector<std::int
     }
 }
 
-std::size_t SceneFrame::bytes() const
+std::size_t SceneInside::bytes(const SceneFrame& frame)
 {
     std::size_t bytes = 0;
-    for (const auto& [name, points] : data_->result.outputs) bytes += points.bytes();
+    for (const auto& [name, points] : frame.data_->result.outputs) bytes += points.bytes();
     return bytes;
 }
 
@@ -228,16 +229,16 @@ std::string SceneFrame::statistics_json() const
 
 std::string SceneFrame::profile_json() const { return rapid::profile_json(data_->result); }
 
-Result<SceneFrame> SceneFrame::without_statistics() const
+Result<SceneFrame> SceneInside::without_statistics(const SceneFrame& frame)
 {
     try {
-        auto data = std::make_shared<Data>();
-        data->result.frame = data_->result.frame;
-        data->result.outputs = data_->result.outputs;  // columns are shared
-        data->result.fps = data_->result.fps;
-        data->result.time = data_->result.time;
-        data->scene = data_->scene;
-        return SceneFrame(std::move(data), output_);
+        auto data = std::make_shared<SceneFrame::Data>();
+        data->result.frame = frame.data_->result.frame;
+        data->result.outputs = frame.data_->result.outputs;  // columns are shared
+        data->result.fps = frame.data_->result.fps;
+        data->result.time = frame.data_->result.time;
+        data->scene = frame.data_->scene;
+        return SceneFrame(std::move(data), frame.output_);
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }
@@ -272,20 +273,20 @@ Result<SceneFrame> SceneFrame::read(const std::string& path)
     }
 }
 
-Result<Done> SceneFrame::save(const std::string& path, const std::string& key) const
+Result<Done> SceneInside::save(const SceneFrame& frame, const std::string& path, const std::string& key)
 {
     return of_file(path, [&] {
-        const FrameResult& result = data_->result;
+        const FrameResult& result = frame.data_->result;
         write_kept(path, what_a_frame_is, key, KeptFrame{result.frame, result.fps, result.time, result.outputs});
         return Done();
     });
 }
 
-Result<SceneFrame> SceneFrame::load(const std::string& path, const std::string& key)
+Result<SceneFrame> SceneInside::load_frame(const std::string& path, const std::string& key)
 {
     return of_file(path, [&] {
         auto kept = read_kept<KeptFrame>(path, what_a_frame_is, key);
-        auto data = std::make_shared<Data>();
+        auto data = std::make_shared<SceneFrame::Data>();
         data->result.frame = kept.number;
         data->result.outputs = std::move(kept.outputs);
         data->result.fps = std::move(kept.fps);

@@ -21,6 +21,7 @@
 #include "bindings/run/fingerprint.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_error.h"
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "runtime/cancellation.h"
 #include "runtime/graph/evaluate.h"
@@ -199,12 +200,6 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             impl.cancellation.check();
         }
     };
-};
-
-// What a scene is made of, for the other files of this folder.
-struct SceneInside {
-    static Scene::Impl& of(Scene& scene) { return *scene.impl_; }
-    using Impl = Scene::Impl;
 };
 
 }  // namespace rapid

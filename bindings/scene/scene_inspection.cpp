@@ -31,15 +31,16 @@ const PlannedNode& planned_node(const Plan& plan, const std::string& name, const
 
 }  // namespace
 
-Result<std::vector<SceneAttribute>> Scene::attributes()
+Result<std::vector<SceneAttribute>> SceneInside::attributes(Scene& scene)
 {
-    return impl_->call(SceneError::WrongCall, [&] {
+    Impl& impl = of(scene);
+    return impl.call(SceneError::WrongCall, [&] {
         std::vector<SceneAttribute> all;
-        for (const PlannedSimulation& simulation : impl_->plan->simulations) {
+        for (const PlannedSimulation& simulation : impl.plan->simulations) {
             const std::string& create = simulation.create->name;
             std::set<std::string> told;  // Evaluator::tell_points
-            if (impl_->hooks.tell_points && simulation.solve) told = {"asleep", "substeps"};
-            if (!told.empty() && impl_->options.estimate_errors) told.insert("error");
+            if (impl.hooks.tell_points && simulation.solve) told = {"asleep", "substeps"};
+            if (!told.empty() && impl.options.estimate_errors) told.insert("error");
             for (const PlannedAttribute& attribute : simulation.attributes)
                 if (!told.contains(attribute.name))
                     all.push_back({attribute.name, create, attribute.kept, attribute.bytes_per_point()});
@@ -49,13 +50,15 @@ Result<std::vector<SceneAttribute>> Scene::attributes()
     });
 }
 
-Result<std::map<std::string, std::map<std::string, std::string>>> Scene::arguments(std::int64_t frame)
+Result<std::map<std::string, std::map<std::string, std::string>>> SceneInside::arguments(Scene& scene,
+                                                                                         std::int64_t frame)
 {
-    return impl_->call(SceneError::FailedFrame, [&] {
-        const Impl::Running running(*impl_);
+    Impl& impl = of(scene);
+    return impl.call(SceneError::FailedFrame, [&] {
+        const Scene::Impl::Running running(impl);
         std::map<std::string, std::map<std::string, std::string>> all;
-        for (const PlannedNode& planned : impl_->plan->nodes) {
-            const PlannedSimulation& simulation = impl_->plan->simulations[planned.simulation];
+        for (const PlannedNode& planned : impl.plan->nodes) {
+            const PlannedSimulation& simulation = impl.plan->simulations[planned.simulation];
             const Frame now =
                 FrameClock{simulation.fps, simulation.start, simulation.subframes}.at(static_cast<double>(frame));
             for (const auto& [name, value] : planned.node->arguments) {
@@ -166,16 +169,18 @@ Result<SceneFrame> Scene::points_behind(const std::string& node, std::int64_t fr
     return impl_->call(SceneError::FailedFrame, [&] { return impl_->points_behind(node, frame); });
 }
 
-Result<std::map<std::string, SceneFrame>> Scene::points_behind_all(std::int64_t frame,
-                                                                   const std::optional<SceneSnapshot>& from)
+Result<std::map<std::string, SceneFrame>> SceneInside::points_behind_all(Scene& scene, std::int64_t frame,
+                                                                         const std::optional<SceneSnapshot>& from)
 {
-    return impl_->call(SceneError::FailedFrame,
-                       [&] { return impl_->points_behind_all(frame, from ? &*from : nullptr); });
+    Impl& impl = of(scene);
+    return impl.call(SceneError::FailedFrame, [&] { return impl.points_behind_all(frame, from ? &*from : nullptr); });
 }
 
-Result<PointOrigin> Scene::origin(const SceneFrame& frame, std::int64_t id, const std::optional<SceneSnapshot>& from)
+Result<PointOrigin> SceneInside::origin(Scene& scene, const SceneFrame& frame, std::int64_t id,
+                                        const std::optional<SceneSnapshot>& from)
 {
-    return impl_->call(SceneError::FailedFrame, [&] { return impl_->origin(frame, id, from ? &*from : nullptr); });
+    Impl& impl = of(scene);
+    return impl.call(SceneError::FailedFrame, [&] { return impl.origin(frame, id, from ? &*from : nullptr); });
 }
 
 }  // namespace rapid

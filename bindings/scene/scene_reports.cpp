@@ -38,10 +38,11 @@ Result<std::string> Scene::graph(GraphForm form)
     });
 }
 
-Result<std::string> Scene::graph_json(GraphLayout* kept)
+Result<std::string> SceneInside::graph_json(Scene& scene, GraphLayout* kept)
 {
-    return impl_->call(SceneError::WrongCall, [&] {
-        const GraphPicture picture = picture_of(*impl_->plan);
+    Impl& impl = of(scene);
+    return impl.call(SceneError::WrongCall, [&] {
+        const GraphPicture picture = picture_of(*impl.plan);
         if (!kept) return to_json(picture, "");
         std::string dot = to_dot(picture, Tips::LeftOut);
         if (kept->graph != dot) {

@@ -329,15 +329,20 @@ SceneRun::SceneRun(SceneRun&&) noexcept = default;
 SceneRun& SceneRun::operator=(SceneRun&&) noexcept = default;
 SceneRun::~SceneRun() = default;
 
-Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
-                                RunListener listener)
+Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, RunOptions options, RunListener listener)
+{
+    return SceneInside::make(std::move(file), std::move(scene), {}, std::move(options), std::move(listener));
+}
+
+Result<SceneRun> SceneInside::make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
+                                   RunListener listener)
 {
     if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
     if (std::optional<SceneError> fault = fault_of(scene)) return std::move(*fault);
     try {
         check_options(scene, options);
-        return SceneRun(std::make_unique<Impl>(std::move(file), std::move(scene), std::move(hooks), std::move(options),
-                                               std::move(listener)));
+        return SceneRun(std::make_unique<SceneRun::Impl>(std::move(file), std::move(scene), std::move(hooks),
+                                                         std::move(options), std::move(listener)));
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }
@@ -354,15 +359,15 @@ Result<Done> SceneRun::prepare()
 std::int64_t SceneRun::first_frame() const { return impl_->first; }
 RunFrames SceneRun::frames() const { return impl_->frames; }
 
-Result<std::vector<std::pair<std::string, std::string>>> SceneRun::merges(int parts)
+Result<std::vector<std::pair<std::string, std::string>>> SceneInside::merges(SceneRun& run, int parts)
 {
-    return impl_->scene.call(SceneError::WrongCall, [&] {
-        if (!impl_->is_ready) refuse("the run is not prepared; call prepare() first");
+    return run.impl_->scene.call(SceneError::WrongCall, [&] {
+        if (!run.impl_->is_ready) refuse("the run is not prepared; call prepare() first");
         if (parts < 1 || parts > most_parts)
             refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, most_parts));
-        if (impl_->options.part) refuse("the run is a part itself");
-        if (parts > 1) refuse_coupled(*impl_->scene.plan);
-        return impl_->files.merges();
+        if (run.impl_->options.part) refuse("the run is a part itself");
+        if (parts > 1) refuse_coupled(*run.impl_->scene.plan);
+        return run.impl_->files.merges();
     });
 }
 
@@ -374,10 +379,10 @@ Result<RunOutcome> SceneRun::run()
 void SceneRun::end_after_frame() { impl_->is_to_end = true; }
 void SceneRun::cancel() { impl_->scene.cancel(); }
 
-std::optional<SceneRun::Abandoned> SceneRun::abandon()
+std::optional<Abandoned> SceneInside::abandon(SceneRun& run)
 {
     try {
-        std::optional<RunReport::Abandoned> told = impl_->report.abandon();
+        std::optional<RunReport::Abandoned> told = run.impl_->report.abandon();
         if (!told) return std::nullopt;
         Abandoned result{std::move(told->warnings), {}};
         if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
@@ -387,7 +392,7 @@ std::optional<SceneRun::Abandoned> SceneRun::abandon()
     }
 }
 
-Result<std::vector<std::string>> output_folders(const RunOptions& options)
+Result<std::vector<std::string>> SceneInside::output_folders(const RunOptions& options)
 {
     FileOutputs files = options.files;
     for (std::string& output : files.outputs) output = name_in_part(output, options.part);

@@ -125,19 +125,19 @@ bool SceneShapes::operator==(const SceneShapes& other) const
     return (data_ ? data_->scene : nullptr) == (other.data_ ? other.data_->scene : nullptr);
 }
 
-Result<Done> SceneShapes::save(const std::string& path) const
+Result<Done> SceneInside::save(const SceneShapes& shapes, const std::string& path)
 {
     return of_file(path, [&] {
         const PictureScene none;
-        write_kept(path, what_shapes_are, "", KeptScene(data_ ? *data_->scene : none));
+        write_kept(path, what_shapes_are, "", KeptScene(shapes.data_ ? *shapes.data_->scene : none));
         return Done();
     });
 }
 
-Result<SceneShapes> SceneShapes::load(const std::string& path)
+Result<SceneShapes> SceneInside::load_shapes(const std::string& path)
 {
     return of_file(path, [&] {
-        auto data = std::make_shared<Data>();
+        auto data = std::make_shared<SceneShapes::Data>();
         data->scene = read_kept<KeptScene>(path, what_shapes_are, "").scene();
         return SceneShapes(std::move(data));
     });
@@ -187,13 +187,14 @@ bool SceneShapes::has_camera() const
     return camera.position || camera.target || camera.fov || !camera.group.empty();
 }
 
-Result<PictureCamera> SceneFrame::camera(const SceneShapes& shapes, const PictureCamera& camera, PictureSize size) const
+Result<PictureCamera> SceneInside::camera(const SceneFrame& frame, const SceneShapes& shapes,
+                                          const PictureCamera& camera, PictureSize size)
 {
     try {
         FrameInfo info;
         info.picture = picture_options(camera, size);
         info.scene = shapes.data_ ? shapes.data_->scene : nullptr;
-        const Camera fitted = PictureFit().next(data_->result.outputs.at(output_), info).camera;
+        const Camera fitted = PictureFit().next(frame.data_->result.outputs.at(frame.output_), info).camera;
         const auto numbers = [](const Vec3d& x) { return std::array{x.x(), x.y(), x.z()}; };
         return PictureCamera{numbers(fitted.position), numbers(fitted.target), fitted.fov * 180 / M_PI};
     } catch (...) {

@@ -6,6 +6,7 @@
 
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
+#include "bindings/scene/scene_inside.h"
 #include "runtime/printable.h"
 #include "runtime/report/number_text.h"
 
@@ -54,17 +55,17 @@ SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move
 std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
 std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
 
-Result<Done> SceneSnapshot::write(const std::string& path) const { return write(path, ""); }
+Result<Done> SceneSnapshot::write(const std::string& path) const { return SceneInside::save(*this, path, ""); }
 
-Result<Done> SceneSnapshot::write(const std::string& path, const std::string& key) const
+Result<Done> SceneInside::save(const SceneSnapshot& saved, const std::string& path, const std::string& key)
 {
     return of_file(path, [&] {
-        const Snapshot& snapshot = data_->snapshot;
-        CheckedJson header = {{"what", what_it_is}, {"graph", data_->file}, {"frame", snapshot.frame}};
+        const Snapshot& snapshot = saved.data_->snapshot;
+        CheckedJson header = {{"what", what_it_is}, {"graph", saved.data_->file}, {"frame", snapshot.frame}};
         if (!key.empty()) header["key"] = key;
         for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
         for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
-        header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", data_->nodes}};
+        header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", saved.data_->nodes}};
         write_state(path, std::move(header), state_of(snapshot));
         return Done();
     });
@@ -88,18 +89,18 @@ Result<SceneSnapshot> SceneSnapshot::read(const std::string& path)
     return of_file(path, [&] { return Data::read_from(StateFile(path)); });
 }
 
-Result<SceneSnapshot> SceneSnapshot::read(const std::string& path, const std::string& key)
+Result<SceneSnapshot> SceneInside::load_snapshot(const std::string& path, const std::string& key)
 {
     return of_file(path, [&] {
         const StateFile file(path);
         require_key(file.header(), key);
-        return Data::read_from(file);
+        return SceneSnapshot::Data::read_from(file);
     });
 }
 
-bool SceneSnapshot::is_file(const std::string& path) { return StateFile::is_one(path); }
+bool SceneInside::is_snapshot(const std::string& path) { return StateFile::is_one(path); }
 
-Result<SceneReport> SceneSnapshot::describe(const std::string& path)
+Result<SceneReport> SceneInside::describe_snapshot(const std::string& path)
 {
     return of_file(path, [&] {
         const CheckedJson told = told_of(path);

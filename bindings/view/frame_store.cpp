@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "bindings/scene/scene_inside.h"
 #include "runtime/checked_json.h"
 
 namespace rapid {
@@ -27,7 +28,7 @@ void check_written(const Result<Done>& written)
 
 std::size_t bytes_of(const ViewFrame& frame)
 {
-    std::size_t bytes = sizeof(ViewFrame) + frame.statistics.size() + frame.points.bytes();
+    std::size_t bytes = sizeof(ViewFrame) + frame.statistics.size() + SceneInside::bytes(frame.points);
     for (const ShapeMesh& mesh : frame.shapes.meshes())
         bytes += (mesh.corner_count * sizeof(float) + mesh.triangle_count * sizeof(std::int32_t)) * 3 / 4;
     return bytes;
@@ -186,7 +187,8 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
             const auto number = entry.at("frame").get<std::int64_t>();
             Known known{entry.at("statistics").get<std::string>(), entry.at("warnings").get<std::vector<std::string>>(),
                         entry.at("shapes").get<std::int64_t>()};
-            if (!scene.are_unchanged(entry.at("read").get<std::map<std::string, std::string>>()).value() ||
+            if (!SceneInside::are_unchanged(scene, entry.at("read").get<std::map<std::string, std::string>>())
+                     .value() ||
                 !fs::exists(archive_.file(frame_kind, number), none) || !Json::accept(known.statistics) ||
                 (known.shapes != 0 && !fs::exists(archive_.file(shapes_kind, known.shapes), none)))
                 continue;
@@ -206,7 +208,8 @@ std::int64_t CachedRun::number_of(const SceneShapes& shapes)
     if (shapes == written_) return written_number_;
     written_ = shapes;
     written_number_ = ++last_shapes_;
-    archive_.submit(shapes_kind, written_number_, [shapes](const fs::path& path) { check_written(shapes.save(path)); });
+    archive_.submit(shapes_kind, written_number_,
+                    [shapes](const fs::path& path) { check_written(SceneInside::save(shapes, path)); });
     return written_number_;
 }
 
@@ -217,7 +220,7 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
     if (there_.contains(frame.number)) return;
     const std::int64_t shapes = number_of(frame.shapes);
     archive_.submit(frame_kind, frame.number, [points = frame.points, key = hash_](const fs::path& path) {
-        check_written(points.save(path, key));
+        check_written(SceneInside::save(points, path, key));
     });
     there_[frame.number] = shapes;
     const Json entry = {{"frame", frame.number},
@@ -233,8 +236,9 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
 
 void CachedRun::keep(const SceneSnapshot& snapshot)
 {
-    archive_.submit(snapshot_kind, snapshot.frame(),
-                    [snapshot, key = hash_](const fs::path& path) { check_written(snapshot.write(path, key)); });
+    archive_.submit(snapshot_kind, snapshot.frame(), [snapshot, key = hash_](const fs::path& path) {
+        check_written(SceneInside::save(snapshot, path, key));
+    });
 }
 
 std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) const
@@ -242,7 +246,8 @@ std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) cons
     const std::map<std::int64_t, fs::path> all = archive_.files(snapshot_kind);
     for (auto one = std::make_reverse_iterator(all.lower_bound(frame)); one != all.rend(); ++one)
         // A damaged one is passed over: an earlier one will do.
-        if (Result<SceneSnapshot> snapshot = SceneSnapshot::read(one->second, hash_)) return std::move(*snapshot);
+        if (Result<SceneSnapshot> snapshot = SceneInside::load_snapshot(one->second, hash_))
+            return std::move(*snapshot);
     return std::nullopt;
 }
 
@@ -257,7 +262,7 @@ SceneShapes CachedRun::shapes(std::int64_t number)
 {
     if (number == 0) return {};
     if (loaded_number_ == number) return loaded_;
-    loaded_ = SceneShapes::load(archive_.file(shapes_kind, number)).value();
+    loaded_ = SceneInside::load_shapes(archive_.file(shapes_kind, number)).value();
     loaded_number_ = number;
     return loaded_;
 }
@@ -267,7 +272,7 @@ ViewFramePtr CachedRun::load(std::int64_t number, std::uint64_t run)
     const std::lock_guard lock(mutex_);
     const auto there = there_.find(number);
     if (there == there_.end()) return nullptr;
-    Result<SceneFrame> loaded = SceneFrame::load(archive_.file(frame_kind, number), hash_);
+    Result<SceneFrame> loaded = SceneInside::load_frame(archive_.file(frame_kind, number), hash_);
     if (!loaded) {  // the next view computes it again
         std::error_code none;
         fs::remove(archive_.file(frame_kind, number), none);
@@ -284,7 +289,7 @@ FrameCache::FrameCache(const fs::path& folder)
 
 std::shared_ptr<CachedRun> FrameCache::open(Scene& scene)
 {
-    const std::string hash = scene.fingerprint().value().hash;
+    const std::string hash = SceneInside::fingerprint(scene).value().hash;
     auto run = std::make_shared<CachedRun>(folder_ / hash, hash, scene);
     remove_old();
     return run;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "bindings/scene/scene_inside.h"
 #include "bindings/view/request_fields.h"
 
 namespace rapid {
@@ -118,7 +119,7 @@ Json camera_of_scene(const ViewFrame& frame, const Json& json)
 {
     const Result<SceneFrame> points = chosen_output(frame, json);
     if (!frame.shapes.has_camera() || !points) return nullptr;
-    const PictureCamera camera = points->camera(frame.shapes, {}, size_of(json)).value();
+    const PictureCamera camera = SceneInside::camera(*points, frame.shapes, {}, size_of(json)).value();
     const auto &from = *camera.position, &to = *camera.target;
     return {from[0], from[1], from[2], to[0], to[1], to[2], *camera.fov};
 }

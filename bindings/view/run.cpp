@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bindings/scene/scene_inside.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
@@ -50,26 +51,27 @@ void ViewSimulation::Run::ask(Task task)
 ViewSimulation::Results ViewSimulation::Run::inspect(std::int64_t frame)
 {
     Results results =
-        scene_->points_behind_all(frame, inspected_ == frame ? std::nullopt : snapshot_before(frame)).value();
+        SceneInside::points_behind_all(*scene_, frame, inspected_ == frame ? std::nullopt : snapshot_before(frame))
+            .value();
     inspected_ = frame;
     return results;
 }
 
 ViewSimulation::Arguments ViewSimulation::Run::arguments(std::int64_t frame)
 {
-    return scene_->arguments(frame).value();
+    return SceneInside::arguments(*scene_, frame).value();
 }
 
 PointOrigin ViewSimulation::Run::origin(std::int64_t frame, const std::string& output, std::int64_t id)
 {
-    const auto& outputs = scene_->outputs();
+    const auto& outputs = SceneInside::outputs(*scene_);
     const auto of = std::find_if(outputs.begin(), outputs.end(), [&](const auto& one) { return one.name == output; });
     if (of == outputs.end()) throw Error("the scene has no such output");
     if (of->creates.size() == 1) return {of->creates.front(), id};
     const ViewFramePtr shown = view_.store_.find(frame);
     if (!shown || shown->run != number_) throw Error("the frame is not computed");
     inspect(frame);
-    return scene_->origin(shown->points.output(output).value(), id).value();
+    return SceneInside::origin(*scene_, shown->points.output(output).value(), id).value();
 }
 
 template <class F>
@@ -115,14 +117,14 @@ void ViewSimulation::Run::begin()
     hooks.tell_points = true;
     hooks.watch_memory = false;  // frames have a share of it, and give way
     view_.note_file(number_, view_.options_.graph);
-    scene_ = Scene::open(view_.options_.graph, view_.scene_options(), std::move(hooks)).value();
+    scene_ = SceneInside::open(view_.options_.graph, view_.scene_options(), std::move(hooks)).value();
     const std::int64_t start = scene_->first_frame();
     const auto [first, last] = view_.options_.frames.value_or(std::pair(start, start + 239));
     if (last < start) throw Error(fmt::format("-f: frame {} is before the scene's first, {}", last, start));
     first_ = start;
     last_ = last;
     if (view_.cache_) cached_ = view_.cache_->open(*scene_);
-    const std::vector<SceneAttribute> attributes = scene_->attributes().value();
+    const std::vector<SceneAttribute> attributes = SceneInside::attributes(*scene_).value();
     tell([&, last_frame = last](ViewStatus& status) {
         status.state = ViewState::Computing;
         status.first = start;
@@ -132,7 +134,7 @@ void ViewSimulation::Run::begin()
         status.warnings.clear();
         status.more_warnings = 0;
         status.outputs.clear();
-        for (const SceneOutput& output : scene_->outputs()) status.outputs.push_back(output.name);
+        for (const SceneOutput& output : SceneInside::outputs(*scene_)) status.outputs.push_back(output.name);
         status.names.clear();
         for (const SceneAttribute& attribute : attributes) {
             int& bytes = status.names.try_emplace(attribute.name, -1).first->second;
@@ -203,7 +205,7 @@ void ViewSimulation::Run::compute()
             frame.bytes = bytes_of(frame);
         };
         auto frame = std::make_shared<ViewFrame>(
-            ViewFrame{number, number_, result.without_statistics().value(), result.statistics_json()});
+            ViewFrame{number, number_, SceneInside::without_statistics(result).value(), result.statistics_json()});
         frame->bytes = bytes_of(*frame);
         // Shapes of the first frame come after its points: they may take long.
         if (number > first_) add_shapes(*frame);
@@ -237,7 +239,7 @@ bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<s
                                   bool is_whole)
 {
     if (stopped()) return false;
-    if (cached_ && is_whole) cached_->put(*frame, warnings, scene_->take_inputs().value());
+    if (cached_ && is_whole) cached_->put(*frame, warnings, SceneInside::take_inputs(*scene_).value());
     bool kept = view_.store_.put(frame, is_whole ? cached_ : nullptr);
     if (!kept && cached_ && is_whole) {
         view_.store_.add(frame->number, number_, frame->statistics, cached_);
@@ -266,14 +268,14 @@ void ViewSimulation::Run::draw_graph()
     // The page lays out the others: dot would take seconds, and the sandbox starts no program.
     if (scene_->nodes().size() <= most_laid_out && !view_.options_.is_confined) {
         GraphLayout layout = view_.layout();
-        Result<std::string> graph = scene_->graph_json(&layout);
+        Result<std::string> graph = SceneInside::graph_json(*scene_, &layout);
         if (graph)
             drawn = std::move(*graph);
         else
             why_not = graph.error().text();
         view_.keep(std::move(layout));
     }
-    if (drawn.empty()) drawn = scene_->graph_json(nullptr).value();
+    if (drawn.empty()) drawn = SceneInside::graph_json(*scene_, nullptr).value();
     const auto json = std::make_shared<const std::string>(std::move(drawn));
     tell([&](ViewStatus& status) {
         status.no_graph = why_not;

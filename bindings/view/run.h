@@ -17,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "bindings/scene/scene_inside.h"
 #include "bindings/view/simulation.h"
 
 namespace rapid {

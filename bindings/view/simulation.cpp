@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bindings/scene/scene_inside.h"
 #include "bindings/view/points.h"
 #include "bindings/view/run.h"
 
@@ -57,7 +58,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
-    Scene::keep_spare_columns(most_spare).value();
+    SceneInside::keep_spare_columns(most_spare).value();
     if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();
@@ -241,7 +242,7 @@ void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
             try {
                 SceneHooks hooks;
                 hooks.stop = stop;
-                Scene scene = Scene::open(options_.graph, options, hooks).value();
+                Scene scene = SceneInside::open(options_.graph, options, hooks).value();
                 const SceneTrace trace = scene.trace({{point.id}, point.create, scene.first_frame(), last, 1}).value();
                 if (trace.fault) throw SceneException(*trace.fault);
                 told(trace.lives.json, "");

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "bindings/scene/scene_inside.h"
 #include "bindings/view/frame_store.h"
 #include "include/rapid/scene.h"
 #include "runtime/error.h"

@@ -1,10 +1,9 @@
 // Runs that write files, as `rapid run` does: frames in any format, pictures and films, statistics, a cache from which
-// a run goes on, parts of the points for several machines. And what a scene's plan makes of such files: explain and
-// check.
+// a run goes on, parts of the points for several machines.
 //
 //   rapid::RunOptions options;
 //   options.files.outputs = {"first.####.vdb", "first.####.png"};
-//   auto run = rapid::SceneRun::make("first.lua", {}, {}, options, {});
+//   auto run = rapid::SceneRun::make("first.lua", {}, options);
 //   if (!run) return fail(run.error().text());
 //   if (auto ready = run->prepare(); !ready) return fail(ready.error().text());
 //   auto outcome = run->run();
@@ -45,15 +44,6 @@ struct FileOutputs {
     PictureSettings pictures;
 };
 
-// What a text of FileOutputs::outputs asks for.
-struct OutputFormat {
-    std::string extension;  // ".vdb"
-    bool is_film = false;   // one file of all frames, which ffmpeg writes
-};
-// Error: an extension that no format has, with the known ones; no pattern; no attributes behind a colon.
-Result<OutputFormat> output_format(const std::string& output);
-std::vector<OutputFormat> output_formats();  // all there are, in order of extension
-
 // Snapshots and a journal of frames in a folder, from which a run goes on where an earlier one ended. Of scenes that
 // take nothing of the program's own (SceneOptions::objects and nodes), as that may change unseen. The run that begins a
 // cache decides whether errors are estimated (SceneOptions::estimate_errors); later ones do likewise.
@@ -87,11 +77,6 @@ struct RunOptions {
     std::string claims;
 };
 
-// The folders that a run writes to, that of its first output first; they are made where they are missing. Error: one
-// can't be made.
-Result<std::vector<std::string>> output_folders(const FileOutputs& files);
-Result<std::vector<std::string>> output_folders(const RunOptions& options);
-
 // A frame that is done.
 struct RunFrame {
     std::int64_t number = 0;   // of the frame
@@ -124,13 +109,13 @@ struct RunOutcome {
     std::string summary;                 // of Complete: points, seconds, errors, as `rapid run` prints it
 };
 
-// One run. Like a Scene it is used by one thread at a time, but for cancel(), end_after_frame() and abandon().
+// One run. Like a Scene it is used by one thread at a time, but for cancel() and end_after_frame().
 class SceneRun {
 public:
     // Its time begins here. Nothing is opened yet, and nothing written, but the folders of statistics and profile are
-    // made. keep_state and tell_points of the hooks are chosen by the run. Error: WrongCall, an option that can't be.
-    static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
-                                 RunListener listener);
+    // made. Error: WrongCall, an option that can't be.
+    static Result<SceneRun> make(std::string file, SceneOptions scene = {}, RunOptions options = {},
+                                 RunListener listener = {});
 
     // What is moved from may only be assigned to, or end.
     SceneRun(SceneRun&&) noexcept;
@@ -146,10 +131,6 @@ public:
     std::int64_t first_frame() const;  // of the scene
     RunFrames frames() const;          // that are written
 
-    // For a run in `parts` parts: of each output the pattern of the whole, and that of the parts, with {part}. Error:
-    // points that are coupled; pictures and films, which can't be put together; a name with {part}.
-    Result<std::vector<std::pair<std::string, std::string>>> merges(int parts);
-
     // Computes and writes the frames; once. Error: found before the first frame: a folder of a cache that another run
     // has or that is of another run, a file of events that can't be written. What happens later is in the outcome.
     Result<RunOutcome> run();
@@ -159,46 +140,11 @@ public:
     // Ends it at once, as Scene::cancel(). From any thread.
     void cancel();
 
-    // What abandon() has to tell.
-    struct Abandoned {
-        std::vector<std::string> warnings;   // that were only counted until now
-        std::vector<std::string> unwritten;  // as RunOutcome
-    };
-    // For a program that is about to end, from any thread at any moment, but not from a listener: writes statistics and
-    // profile of the frames so far. A call of the run does not return afterwards. Nothing where the run's thread does
-    // not let go within a second, as when a listener does not return.
-    std::optional<Abandoned> abandon();
-
 private:
+    friend struct SceneInside;  // of Rapid itself
     struct Impl;
     explicit SceneRun(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
-
-// What a plan makes of files, of a scene that is open, which stays where it is; where a script had to be stopped it is
-// at its start afterwards, or is to be restarted.
-
-// As Scene::explain(), for these files: what they ask for is kept. Error: of an output, as SceneRun::prepare().
-Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files);
-// What one of two scenes keeps and the other does not, as `rapid explain --against` prints it.
-Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other);
-// Bytes that the points of each create, and each node, keep after a frame, as a snapshot holds them: computes the
-// frames up to this one beside the scene. Error: a frame before the first one.
-Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame);
-
-// What can be found without running a frame: a line for each parameter, and how many nodes are reached from which
-// outputs. Error: of an output, as SceneRun::prepare().
-Result<std::string> check_outputs(Scene& scene, const FileOutputs& files);
-// A line for each stiff node, and for each shape that is too coarse for its points: tries out the first frame with a
-// few points. Error: what a kernel does wrong with one of these points; other errors are left to the run.
-Result<std::string> advice_on(Scene& scene, const FileOutputs& files);
-
-// Whether frames have the same bits in other orders of the points and in two states of Lua.
-struct SceneRaces {
-    std::optional<SceneError> found;  // the first difference, with its node
-    bool compared = false;            // whether there was a point in these frames
-};
-// On one thread. Error: FailedFrame, of a frame that fails.
-Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames);
 
 }  // namespace rapid

@@ -24,7 +24,6 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
-#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -238,8 +237,6 @@ public:
     static constexpr std::uint32_t no_place = UINT32_MAX;
     // Where the points of these ids are in the columns: for many ids at once much faster than for one after the other.
     Result<std::vector<std::uint32_t>> places(const std::vector<std::int64_t>& ids) const;
-    // That the columns and groups of all outputs take; those that are shared with other frames count in each.
-    std::size_t bytes() const;
 
     std::vector<std::string> details() const;  // names of values of the whole set (:detail), in order
     // Such a value: a number or three. Error: no such detail value, with the nearest name.
@@ -255,9 +252,6 @@ public:
     std::string profile_json() const;
     // What nodes warned of in this frame.
     std::vector<std::string> warnings() const;
-    // The points alone, without statistics, profile and warnings, for a program that keeps many frames: errors may be
-    // estimated of each point.
-    Result<SceneFrame> without_statistics() const;
 
     // Writes the points to a file of a format that Rapid knows, by the extension; missing folders are made. The file
     // has its name when it is complete. Error: an unknown extension, with the known ones; the system's.
@@ -266,19 +260,11 @@ public:
     // besides there are warnings(). Error: an extension that is unknown, or only written; the system's; a file that is
     // damaged.
     static Result<SceneFrame> read(const std::string& path);
-    // The points of all outputs, to the bit, to a file for load() of the same build of Rapid. key: of what they follow
-    // from, such as Scene::fingerprint(). Not kept: statistics, profile and warnings. Error of save(): the system's; of
-    // load(): also a file that is of something else, damaged, of another build or another key.
-    Result<Done> save(const std::string& path, const std::string& key) const;
-    static Result<SceneFrame> load(const std::string& path, const std::string& key);
 
     // The bytes of a .png of the points among these shapes, as their `:picture` nodes say. From any thread. Error: a
     // size or an angle of view that no picture has.
     Result<std::string> picture(const SceneShapes& shapes, const PictureCamera& camera = {},
                                 PictureSize size = {}) const;
-    // The camera of this picture, with all that `camera` leaves open. Error: as picture().
-    Result<PictureCamera> camera(const SceneShapes& shapes, const PictureCamera& camera = {},
-                                 PictureSize size = {}) const;
 
     // How many points there are, their bounds, the range of each attribute, the groups: as `rapid info` prints it.
     Result<SceneReport> describe() const;
@@ -290,6 +276,7 @@ public:
 private:
     friend class Scene;
     friend class SceneFilm;
+    friend struct SceneInside;  // of Rapid itself
     struct Data;
     explicit SceneFrame(std::shared_ptr<const Data> data, std::string output);
     std::shared_ptr<const Data> data_;
@@ -308,18 +295,10 @@ public:
     // Error: the system's; a file that is of something else, damaged, of another build of Rapid, or of a run of the
     // command.
     static Result<SceneSnapshot> read(const std::string& path);
-    // The same with a key, as SceneFrame::save() and load() have one. Error: also another key.
-    Result<Done> write(const std::string& path, const std::string& key) const;
-    static Result<SceneSnapshot> read(const std::string& path, const std::string& key);
-
-    // Whether a file begins as one of a snapshot, of a scene or of `rapid run --cache`, does.
-    static bool is_file(const std::string& path);
-    // What such a file says of itself, as `rapid info` prints it. Error: the system's; a file that is of something
-    // else, or damaged.
-    static Result<SceneReport> describe(const std::string& path);
 
 private:
     friend class Scene;
+    friend struct SceneInside;  // of Rapid itself
     struct Data;
     explicit SceneSnapshot(std::shared_ptr<const Data> data);
     std::shared_ptr<const Data> data_;
@@ -364,88 +343,11 @@ struct SceneOptions {
     bool keep_all = false;                             // leaves no attribute out, to the same bits
 };
 
-// What a program needs that runs scenes of others, besides SceneOptions.
-struct SceneHooks {
-    // Told, with the error's text, of each script that takes longer than script_seconds, before it is stopped: for a
-    // program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On a
-    // thread of Rapid's; what it throws is dropped.
-    std::function<void(const std::string& message)> late;
-    // Told of each file before it is read, and of each place where a module or a node was looked for. On any thread;
-    // what it throws is dropped.
-    std::function<void(const std::string& path)> reads;
-    // Told where memory was to end what is computed, and comes too late: the process has a sixteenth more than it may,
-    // or did not stop within a second. With the error's text; for a program that then rather ends. On a thread of
-    // Rapid's.
-    std::function<void(const std::string& message)> beyond_memory;
-    // Whether a frame ends with an error where the process takes more memory than its limit: not for a program that
-    // keeps frames, as long as it has room for them.
-    bool watch_memory = true;
-    // Told of the parameters as soon as the scene's file has run, before its plan is made, which may fail: for a
-    // program that lets its user change them then, too. On the thread of the call; what it throws is dropped.
-    std::function<void(const std::vector<SceneParameter>& parameters)> parameters;
-    // Ends what the scene does, opening too, and all that it is asked to do later, with the error Cancelled: as
-    // Scene::cancel(), but once and for all. std::stop_source::request_stop() is for any thread at any time.
-    std::stop_token stop;
-    // Refuses what no snapshot can hold, such as a function of the frame that counts in a local variable: for programs
-    // that go on in another process. Only then is there a fingerprint().
-    bool keep_state = false;
-    // The points behind a solve have the columns "error" (m, where it is estimated), "substeps" and "asleep".
-    bool tell_points = false;
-};
-
-// What the scene gives, known before a frame is computed.
-struct SceneOutput {
-    std::string name;                  // "main" where the scene returns one node
-    std::vector<std::string> creates;  // whose points it holds, by name; of several, ids are not those of the creates
-};
-
-// An attribute, or a group, that the points of a create may have.
-struct SceneAttribute {
-    std::string name;       // of a group with "group:" before it
-    std::string create;     // the name of the node
-    bool is_kept = false;   // whether the run keeps it; explain() says why
-    std::size_t bytes = 0;  // that it takes for each point, where the points do not share one value
-};
-
-// A point as its create knows it.
-struct PointOrigin {
-    std::string create;   // the name of the node
-    std::int64_t id = 0;  // under which it made the point
-};
-
-// What the frames of a scene follow from: scenes of equal fingerprints come to the same bits.
-struct SceneFingerprint {
-    // By name: the build of Rapid, plugins, parameters, seeds, nodes with their arguments and inputs, the code of all
-    // functions, the contents of the files that opening has read, what points tell (SceneHooks::tell_points). Of what
-    // the program offers the names alone.
-    std::map<std::string, std::string> parts;
-    std::string hash;  // of them, without the lines in which functions stand
-};
-
-// The documentation of a type of node.
-struct NodeDocument {
-    std::string name, doc;  // `:NAME { ... }`, and a sentence
-    SceneReport page;       // parameters, and what it reads, writes and makes, as `rapid nodes NAME` prints it
-};
-
-// What scenes are made of.
-struct NodeDocuments {
-    std::vector<NodeDocument> types;    // native ones, Rapid's own in Lua, and those that are found; in order of name
-    std::vector<std::string> warnings;  // of files that define a node with a mistake in it
-    std::string annotations;            // all that scenes are written with, for the Lua language server
-};
-
 // How Scene::graph() gives a graph.
 enum class GraphForm {
     Dot,   // in Graphviz's language
     Svg,   // a picture
     Json,  // nodes and edges with their places: an object, as `rapid graph -o FILE.json` writes it (docs/cli.md)
-};
-
-// Where Graphviz has put the nodes and edges of a graph, for those of the next run that has the same ones.
-struct GraphLayout {
-    std::string graph;   // in Graphviz's language, without what depends on values; empty: none is kept
-    std::string places;  // of it, as `dot -Tjson` writes them
 };
 
 // Of Scene::trace().
@@ -470,7 +372,6 @@ public:
     // OutOfMemory.
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
-    static Result<Scene> open(const std::string& file, SceneOptions options, SceneHooks hooks);
 
     // What is moved from may only be assigned to, or end.
     Scene(Scene&&) noexcept;
@@ -478,36 +379,15 @@ public:
     ~Scene();  // not while a call of another thread is running
 
     // Loads types of nodes from a library that is built against the runtime's headers (docs/extending.md), for scenes
-    // that are opened later, in the whole process. Not while another thread opens a scene. load_plugins(): from files
-    // and folders, a list separated by colons, as RAPID_PLUGIN_PATH. Error: a file that can't be read or loaded, is no
-    // plugin, was built with other headers, or has a node of a name that is taken.
+    // that are opened later, in the whole process. Not while another thread opens a scene. Error: a file that can't be
+    // read or loaded, is no plugin, was built with other headers, or has a node of a name that is taken.
     static Result<Done> load_plugin(const std::string& file);
-    static Result<Done> load_plugins(const std::string& path);
-
-    // In the whole process: memory of up to so many columns that are released, and of 64 MiB at most, is kept for those
-    // that are made next; at first 4, never fewer than before. For a program that keeps the frames of a run until those
-    // of the next one replace them: all columns of a frame are then released at once, and the system would clear each
-    // page anew.
-    static Result<Done> keep_spare_columns(std::size_t columns);
-
-    // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on
-    // RAPID_PATH.
-    static Result<NodeDocuments> documents();
-    // The types that every scene of the process may use: native ones, those of plugins, and Rapid's own in Lua; in
-    // order of name.
-    static Result<std::vector<SceneNodeType>> all_node_types();
 
     // In the order in which the scene declares them.
     const std::vector<SceneParameter>& parameters() const;
     const std::vector<SceneNode>& nodes() const;
-    // In order of name.
-    const std::vector<SceneOutput>& outputs() const;
     // Frames a second of the first create of the plan; SceneFrame::fps() is that of an output.
     double fps() const;
-    // Those of all creates, in the order of the plan.
-    Result<std::vector<SceneAttribute>> attributes();
-    // The arguments of the nodes in a frame, as texts, by node and parameter.
-    Result<std::map<std::string, std::map<std::string, std::string>>> arguments(std::int64_t frame);
     // All types that a scene of this program may use: native ones, Rapid's own in Lua, the scene's, in order of name.
     Result<std::vector<SceneNodeType>> node_types();
     // Of opening: meshes with holes, nodes that no output reaches.
@@ -548,9 +428,6 @@ public:
     // The graph of the scene, with what is left out and why. Error of Svg and Json: Graphviz's program `dot`, which
     // lays them out, is not there.
     Result<std::string> graph(GraphForm form);
-    // As GraphForm::Json. `kept` is used where it is of this graph, and else replaced. nullptr: no places, for a
-    // program that lays graphs out itself, or may start no other one. Error: `dot` is needed, and not there.
-    Result<std::string> graph_json(GraphLayout* kept);
     // Tells of points by their ids: goes to the start, and computes the frames up to the last one beside the scene,
     // which then is at its start; where a script had to be stopped it is to be restarted. Error: no ids; no such
     // create, with the nearest name; a last frame before the first one.
@@ -560,26 +437,6 @@ public:
     // and computes the frames up to this one beside the scene, as trace(). Error: no such node, with the nearest name;
     // one that is left out; a frame before the first one.
     Result<SceneFrame> points_behind(const std::string& node, std::int64_t frame);
-    // The points as they leave each node that is evaluated in a frame, as ones with the only output of the node's name.
-    // The scene stays where it is: the frames are computed beside it, from a snapshot of this scene before the frame,
-    // or from the first one. Those of the last frame that was asked for are kept. Nodes whose result never changes are
-    // not evaluated in each frame. Error: a frame before the first one; a snapshot of another graph, or behind the
-    // frame; after a script had to be stopped, the scene is to be restarted.
-    Result<std::map<std::string, SceneFrame>> points_behind_all(std::int64_t frame,
-                                                                const std::optional<SceneSnapshot>& from = {});
-    // The create of a point of a frame's output, and its id there: where the points of several are merged, by the place
-    // and the velocity, from points_behind_all(). Error: the frame has no such output or point; several points are at
-    // its place; nodes behind its Solve have moved it.
-    Result<PointOrigin> origin(const SceneFrame& frame, std::int64_t id, const std::optional<SceneSnapshot>& from = {});
-
-    // With SceneHooks::keep_state alone.
-    Result<SceneFingerprint> fingerprint();
-    // Files that have been read since the last call, those of opening left out: a hash of the content of each, by name.
-    // With SceneHooks::keep_state alone.
-    Result<std::map<std::string, std::string>> take_inputs();
-    // Whether the files of which another run of this scene has told by take_inputs() have the same contents still.
-    Result<bool> are_unchanged(const std::map<std::string, std::string>& inputs);
-
     // What points collide with, and are born from, in a frame, which need not be computed; how its pictures look.
     Result<SceneShapes> shapes(std::int64_t frame);
     // The bytes of a .png of a frame of this scene, with its shapes; the camera is fitted to the frame unless the scene
@@ -590,9 +447,6 @@ private:
     friend struct SceneInside;  // of Rapid itself
     struct Impl;
     explicit Scene(std::unique_ptr<Impl> impl);
-    static Result<Scene> open_any(const std::string& file, std::optional<std::string> text, SceneOptions options);
-    static Result<Scene> open_with(const std::string& file, std::optional<std::string> text, SceneOptions options,
-                                   SceneHooks hooks);
     std::unique_ptr<Impl> impl_;
 };
 

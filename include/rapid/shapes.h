@@ -56,11 +56,6 @@ public:
     // What was warned of when they were made, such as a mesh with holes.
     std::vector<std::string> warnings() const;
 
-    // All but warnings() to a file for load() of the same build of Rapid. Error of save(): the system's; of load():
-    // also a file that is of something else, damaged or of another build.
-    Result<Done> save(const std::string& path) const;
-    static Result<SceneShapes> load(const std::string& path);
-
     // Whether they are the same ones: of one frame, or of two frames of a scene in which nothing moves.
     bool operator==(const SceneShapes& other) const;
 
@@ -68,6 +63,7 @@ private:
     friend class Scene;
     friend class SceneFrame;
     friend class SceneFilm;
+    friend struct SceneInside;  // of Rapid itself
     struct Data;
     explicit SceneShapes(std::shared_ptr<const Data> data);
     std::shared_ptr<const Data> data_;  // null: none

@@ -27,7 +27,7 @@ constexpr StageWords stage_words[] = {
     {Stage::ContactGrid, "contact grid", "no contact node"},
     {Stage::Constraints, "constraints", "no constraint node"},
     {Stage::ErrorEstimate, "error estimate", "no solve node"},
-    {Stage::Writing, "writing", "no -o and no write node"},
+    {Stage::Writing, "writing", "no {} and no write node"},
 };
 
 bool runs_script(const Node& node)

@@ -257,7 +257,7 @@ TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
     CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
     CHECK(unused == 1);
 
-    auto options = sized<rapid_options>();
+    rapid_options options = rapid_default_options();
     options.offers = offer_plane(first);
     rapid_scene* scene = nullptr;
     REQUIRE(rapid_scene_open_text("ground.lua",
@@ -493,16 +493,15 @@ TEST_CASE("the shapes of a scene are read in C, and a picture has them", "[c]")
 {
     rapid_scene* scene = opened(
         "local rapid = require 'rapid'\n"
-        "return rapid.create { points = rapid.points.grid {} }\n"
-        "  :collide { shape = rapid.mesh.box { size = {2, 4, 6} } }\n"
-        "  :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, center = {0, -3, 0} } } :solve {}");
+        "return rapid.create {} :emit { source = rapid.mesh.box { size = {2, 4, 6} }, rate = 1000 }\n"
+        "  :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, offset = -3 } } :solve {}");
     rapid_shapes* shapes = nullptr;
     REQUIRE(rapid_scene_shapes(scene, 1, &shapes, nullptr) == RAPID_OK);
     REQUIRE(rapid_shapes_mesh_count(shapes) == 1);
     REQUIRE(rapid_shapes_plane_count(shapes) == 1);
     auto mesh = sized<rapid_mesh>();
     REQUIRE(rapid_shapes_mesh(shapes, 0, &mesh, nullptr) == RAPID_OK);
-    CHECK(mesh.role == RAPID_COLLIDER);
+    CHECK(mesh.role == RAPID_EMITTER);
     double volume = 0;  // by the divergence theorem
     for (std::size_t i = 0; i < mesh.triangle_count; ++i) {
         const auto corner = [&](std::size_t k) { return mesh.positions + 3 * mesh.triangles[3 * i + k]; };
@@ -574,7 +573,7 @@ TEST_CASE("a run in C writes its files, and those of its parts are merged into t
     run(folder / "whole.####.csv", 0, 0);
     CHECK(seen.frames == 2);
     for (const int part : {1, 2}) run(folder / "x.####.csv", part, 2);
-    const std::string parts = folder / "x_{part}.####.csv";
+    const std::string parts = folder / "x_part{part}.####.csv";
     const char* patterns[] = {parts.c_str()};
     auto merged = sized<rapid_merged>();
     REQUIRE(rapid_merge_files(

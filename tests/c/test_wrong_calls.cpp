@@ -30,8 +30,8 @@ return rapid.create { points = rapid.points.from { P = {{0, height, 0}} } }
     if frame.number >= 5 then error "no more" end
   end)
   :detail("count", function(points) points.detail.count = #points end)
-  :gravity {} :collide { shape = rapid.shape.plane {} } :collide { shape = rapid.mesh.box {} }
-  :picture { camera = { position = {0, 2, 9}, target = {0, 0, 0} } } :solve {}
+  :gravity {} :collide { shape = rapid.shape.plane {} } :collide { shape = rapid.shape.box { center = {0, -50, 0} } }
+  :picture { camera = rapid.camera { position = {0, 2, 9}, target = {0, 0, 0} } } :solve {}
 )";
 
 template <class T>
@@ -408,7 +408,7 @@ const std::vector<Getter>& getters()
     };
     static const std::vector<Getter> all = {
         {"rapid_scene_parameter_count", 0, get(rapid_scene_parameter_count, &Handles::scene), 1},
-        {"rapid_scene_node_count", 0, get(rapid_scene_node_count, &Handles::scene), 6},
+        {"rapid_scene_node_count", 0, get(rapid_scene_node_count, &Handles::scene), 9},
         {"rapid_scene_fps", 0, get(rapid_scene_fps, &Handles::scene), 24},
         {"rapid_scene_first_frame", 0, get(rapid_scene_first_frame, &Handles::scene), 1},
         {"rapid_scene_next_frame", 0, get(rapid_scene_next_frame, &Handles::scene), 3},

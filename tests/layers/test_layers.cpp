@@ -79,7 +79,8 @@ const std::set<std::string> small_tools = {
 // What they include besides these of the library's inside: each is for them alone, and no program of others needs it.
 const std::set<std::string> for_our_programs = {"bindings/host/graph_parameter.h", "bindings/run/study_scene.h",
                                                 "bindings/scene/installation.h",   "bindings/scene/picture_sheet.h",
-                                                "bindings/scene/scene_film.h",     "bindings/scene/scene_tests.h"};
+                                                "bindings/scene/scene_film.h",     "bindings/scene/scene_inside.h",
+                                                "bindings/scene/scene_tests.h"};
 
 // The folder of the command, or of a program that `rapid` becomes.
 bool is_program(const std::string& folder)

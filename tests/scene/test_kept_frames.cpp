@@ -2,6 +2,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -45,8 +46,8 @@ TEST_CASE("a frame of a file has the bits of the one that was saved", "[kept]")
     const test::TemporaryFolder folder;
     Scene scene = test::opened(two_outputs);
     const SceneFrame frame = good(scene.advance_to(3));
-    good(frame.save(folder / "deep/frame", "key"));
-    const SceneFrame read = good(SceneFrame::load(folder / "deep/frame", "key"));
+    good(SceneInside::save(frame, folder / "deep/frame", "key"));
+    const SceneFrame read = good(SceneInside::load_frame(folder / "deep/frame", "key"));
     CHECK(read.number() == 3);
     check_same_bits(frame, read);
     CHECK(read.statistics().seconds == 0);
@@ -57,23 +58,24 @@ TEST_CASE("a frame of another key, and a file that is none, are errors that name
     const test::TemporaryFolder folder;
     Scene scene = test::opened(two_outputs);
     const SceneFrame frame = good(scene.advance());
-    good(frame.save(folder / "frame", "one"));
-    const SceneError other = SceneFrame::load(folder / "frame", "two").error();
+    good(SceneInside::save(frame, folder / "frame", "one"));
+    const SceneError other = SceneInside::load_frame(folder / "frame", "two").error();
     CHECK(other.kind == SceneError::WrongCall);
     CHECK(other.text() == (folder / "frame").string() + ": it is of another run");
-    CHECK_FALSE(SceneFrame::load(folder / "frame", ""));
-    CHECK_FALSE(SceneFrame::load(folder / "missing", ""));
-    CHECK_FALSE(SceneFrame::load(folder.write("text", "no frame"), ""));
+    CHECK_FALSE(SceneInside::load_frame(folder / "frame", ""));
+    CHECK_FALSE(SceneInside::load_frame(folder / "missing", ""));
+    CHECK_FALSE(SceneInside::load_frame(folder.write("text", "no frame"), ""));
     good(good(scene.save()).write(folder / "snapshot"));
-    CHECK_THAT(SceneFrame::load(folder / "snapshot", "").error().message, Contains("it is a snapshot of a scene"));
+    CHECK_THAT(SceneInside::load_frame(folder / "snapshot", "").error().message,
+               Contains("it is a snapshot of a scene"));
 
     const std::string whole = test::file_text(folder / "frame");
     for (std::size_t at = 8; at < whole.size(); at += 61) {
         std::string damaged = whole;
         damaged[at] = static_cast<char>(damaged[at] ^ 0x40);
-        CHECK_FALSE(SceneFrame::load(folder.write("damaged", damaged), "one"));
+        CHECK_FALSE(SceneInside::load_frame(folder.write("damaged", damaged), "one"));
     }
-    CHECK_FALSE(frame.save(folder / "text/below", ""));
+    CHECK_FALSE(SceneInside::save(frame, folder / "text/below", ""));
 }
 
 TEST_CASE("a snapshot with a key is read by it alone", "[kept]")
@@ -81,10 +83,10 @@ TEST_CASE("a snapshot with a key is read by it alone", "[kept]")
     const test::TemporaryFolder folder;
     Scene scene = test::opened(two_outputs);
     good(scene.advance_to(2));
-    good(good(scene.save()).write(folder / "snapshot", "one"));
-    CHECK(good(SceneSnapshot::read(folder / "snapshot", "one")).frame() == 2);
+    good(SceneInside::save(good(scene.save()), folder / "snapshot", "one"));
+    CHECK(good(SceneInside::load_snapshot(folder / "snapshot", "one")).frame() == 2);
     CHECK(good(SceneSnapshot::read(folder / "snapshot")).frame() == 2);
-    CHECK_THAT(SceneSnapshot::read(folder / "snapshot", "two").error().text(), Contains("it is of another run"));
+    CHECK_THAT(SceneInside::load_snapshot(folder / "snapshot", "two").error().text(), Contains("it is of another run"));
 }
 
 TEST_CASE("points alone are those of their frame, and have no statistics", "[kept]")
@@ -97,7 +99,7 @@ TEST_CASE("points alone are those of their frame, and have no statistics", "[kep
     CHECK(frame.statistics().seconds > 0);
     CHECK(points.statistics().seconds == 0);
     CHECK(points.profile_json() == "[]");
-    CHECK(points.bytes() == frame.bytes());
+    CHECK(SceneInside::bytes(points) == SceneInside::bytes(frame));
 }
 
 TEST_CASE("a frame takes at least the bytes of its columns that are written out", "[kept]")
@@ -109,8 +111,8 @@ TEST_CASE("a frame takes at least the bytes of its columns that are written out"
         for (const std::string& name : frame.columns())
             bytes += frame.size() * good(frame.output(output)).column(name)->stride;
     CHECK(bytes > 0);
-    CHECK(frame.bytes() >= bytes);
-    CHECK(frame.bytes() < bytes + 4096);
+    CHECK(SceneInside::bytes(frame) >= bytes);
+    CHECK(SceneInside::bytes(frame) < bytes + 4096);
 }
 
 TEST_CASE("points are found by their ids, and dead ones are not", "[kept]")
@@ -125,8 +127,8 @@ TEST_CASE("points are found by their ids, and dead ones are not", "[kept]")
 
 TEST_CASE("a number of spare columns that is no number of columns is refused", "[kept]")
 {
-    good(Scene::keep_spare_columns(4));
-    CHECK_THAT(Scene::keep_spare_columns(1'000'000).error().message, Contains("at most 4096"));
+    good(SceneInside::keep_spare_columns(4));
+    CHECK_THAT(SceneInside::keep_spare_columns(1'000'000).error().message, Contains("at most 4096"));
 }
 
 }  // namespace rapid

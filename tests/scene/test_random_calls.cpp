@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "bindings/scene/scene_inside.h"
 #include "tests/scene/call_model.h"
 
 namespace rapid {
@@ -121,9 +122,9 @@ private:
         for (const char* path : {"", "/", "/dev/zero", "/none.lua"}) {
             all.push_back([=] { return answer(rapid::Scene::open(path)); });
             all.push_back([=] { return answer(SceneFrame::read(path)); });
-            all.push_back([=] { return answer(SceneFrame::load(path, "key")); });
+            all.push_back([=] { return answer(SceneInside::load_frame(path, "key")); });
             all.push_back([=] { return answer(SceneSnapshot::read(path)); });
-            all.push_back([=] { return answer(SceneSnapshot::describe(path)); });
+            all.push_back([=] { return answer(SceneInside::describe_snapshot(path)); });
             if (*path) all.push_back([=] { return answer(rapid::Scene::load_plugin(path)); });
         }
         all.push_back([] { return answer(SceneFrame::text_of(0xffffffff)); });
@@ -149,10 +150,10 @@ private:
             all.push_back([&scene, options] { return answer(scene.trace(options)); });
         for (const auto& [node, frame] : {std::pair{"none", 2}, std::pair{"create1", -5}, std::pair{"", 2}})
             all.push_back([&scene, node = node, frame = frame] { return answer(scene.points_behind(node, frame)); });
-        all.push_back([&scene] { return answer(scene.fingerprint()); });
-        all.push_back([&scene] { return answer(scene.take_inputs()); });
+        all.push_back([&scene] { return answer(SceneInside::fingerprint(scene)); });
+        all.push_back([&scene] { return answer(SceneInside::take_inputs(scene)); });
         for (const std::int64_t number : {std::int64_t{0}, std::numeric_limits<std::int64_t>::min()})
-            all.push_back([&scene, number] { return answer(scene.points_behind_all(number)); });
+            all.push_back([&scene, number] { return answer(SceneInside::points_behind_all(scene, number)); });
     }
 
     static void add_offers(std::vector<Hostile>& all, rapid::Scene& scene)
@@ -185,7 +186,7 @@ private:
             all.push_back([=] { return answer(frame.compare(frame, tolerance)); });
         for (const int edge : {0, -5, std::numeric_limits<int>::max()})
             all.push_back([=, &scene] { return answer(scene.picture(frame, {edge, edge})); });
-        all.push_back([=, &scene] { return answer(scene.origin(frame, -7)); });
+        all.push_back([=, &scene] { return answer(SceneInside::origin(scene, frame, -7)); });
     }
 };
 

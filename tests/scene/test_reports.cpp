@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bindings/scene/installation.h"
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -31,7 +32,7 @@ float height(const SceneFrame& frame, std::size_t i) { return frame.column("P")-
 
 TEST_CASE("what scenes are made of is documented without a scene", "[reports]")
 {
-    const NodeDocuments documents = good(Scene::documents());
+    const NodeDocuments documents = good(SceneInside::documents());
     CHECK(documents.types.size() > 40);
     CHECK(std::is_sorted(documents.types.begin(), documents.types.end(),
                          [](const auto& a, const auto& b) { return a.name < b.name; }));
@@ -46,7 +47,7 @@ TEST_CASE("what scenes are made of is documented without a scene", "[reports]")
 
 TEST_CASE("the types that every scene may use are listed without one", "[reports]")
 {
-    const std::vector<SceneNodeType> types = good(Scene::all_node_types());
+    const std::vector<SceneNodeType> types = good(SceneInside::all_node_types());
     const auto has = [&](const char* name) {
         return std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name; });
     };
@@ -269,7 +270,7 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
         if (told++ == 0) text = message;
         throw 1;  // is dropped
     };
-    const Result<Scene> scene = Scene::open(file, options, hooks);
+    const Result<Scene> scene = SceneInside::open(file, options, hooks);
     REQUIRE_FALSE(scene);
     CHECK(scene.error().kind == SceneError::TooLong);
     CHECK(told >= 1);
@@ -288,7 +289,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10, speed =
         read.push_back(path);
         throw 1;  // is dropped
     };
-    good(Scene::open(file, {}, hooks));
+    good(SceneInside::open(file, {}, hooks));
     CHECK(std::any_of(read.begin(), read.end(), [](const std::string& path) { return path.ends_with("speed.lua"); }));
 }
 
@@ -299,7 +300,7 @@ TEST_CASE("points tell their errors, sub-steps and sleep where a program asks fo
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 } :gravity {} :solve { substeps = 3 })");
     SceneHooks hooks;
     hooks.tell_points = true;
-    Scene scene = good(Scene::open(file, {}, hooks));
+    Scene scene = good(SceneInside::open(file, {}, hooks));
     const SceneFrame frame = good(scene.advance_to(4));
     REQUIRE(frame.size() > 100);
     for (const char* const name : {"error", "substeps", "asleep"}) CHECK(frame.column(name));
@@ -315,7 +316,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function() 
   :solve {})");
     SceneHooks hooks;
     hooks.keep_state = true;
-    CHECK_FALSE(Scene::open(file, {}, hooks));
+    CHECK_FALSE(SceneInside::open(file, {}, hooks));
     CHECK(Scene::open(file));
 }
 

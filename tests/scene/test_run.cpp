@@ -7,6 +7,7 @@
 #include <sstream>
 #include <thread>
 
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/run.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -67,7 +68,7 @@ struct Told {
 
 SceneRun made(RunOptions asked, RunListener listener = {}, SceneOptions scene = {})
 {
-    return good(SceneRun::make("cloud.lua", std::move(scene), {}, std::move(asked), std::move(listener)));
+    return good(SceneRun::make("cloud.lua", std::move(scene), std::move(asked), std::move(listener)));
 }
 
 RunOutcome outcome_of(SceneRun& run)
@@ -87,7 +88,7 @@ RunOutcome complete(RunOptions asked, RunListener listener = {}, SceneOptions sc
 
 void check_wrong(const RunOptions& asked, const std::string& message)
 {
-    const Result<SceneRun> run = SceneRun::make("cloud.lua", {}, {}, asked, {});
+    const Result<SceneRun> run = SceneRun::make("cloud.lua", {}, asked);
     REQUIRE_FALSE(run);
     CHECK(run.error().kind == SceneError::WrongCall);
     CHECK_THAT(run.error().message, Contains(message));
@@ -231,13 +232,13 @@ TEST_CASE("the parts of a run have the points of the whole", "[run]")
     CHECK(half == Approx(0.5 * static_cast<double>(whole.size())).epsilon(0.2));
 
     SceneRun run = made(options(folder));
-    CHECK_THAT(run.merges(3).error().message, Contains("call prepare() first"));
+    CHECK_THAT(SceneInside::merges(run, 3).error().message, Contains("call prepare() first"));
     good(run.prepare());
-    const auto merges = good(run.merges(3));
+    const auto merges = good(SceneInside::merges(run, 3));
     REQUIRE(merges.size() == 1);
     CHECK(merges.front().first == (folder / "cloud.####.csv"));
     CHECK(merges.front().second == (folder / "cloud_part{part}.####.csv"));
-    CHECK_THAT(run.merges(0).error().message, Contains("parts = 0; it must be from 1"));
+    CHECK_THAT(SceneInside::merges(run, 0).error().message, Contains("parts = 0; it must be from 1"));
     good(run.run());  // of all points still
     CHECK(good(SceneFrame::read(folder / "cloud.0008.csv")).size() == whole.size());
 }
@@ -299,7 +300,7 @@ TEST_CASE("a run is abandoned between two frames, or not at all", "[run]")
     SceneRun run = made(asked, told.listener());
     bool is_abandoned = true;
     told.on_frame = [&](const RunFrame& frame) {  // while the program has been called
-        if (frame.number == 3) std::thread([&] { is_abandoned = run.abandon().has_value(); }).join();
+        if (frame.number == 3) std::thread([&] { is_abandoned = SceneInside::abandon(run).has_value(); }).join();
         if (frame.number == 4) run.end_after_frame();
     };
     CHECK(outcome_of(run).last_frame == 4);
@@ -308,7 +309,7 @@ TEST_CASE("a run is abandoned between two frames, or not at all", "[run]")
     asked.statistics = folder / "abandoned.json";
     SceneRun prepared = made(asked);
     good(prepared.prepare());
-    const std::optional<SceneRun::Abandoned> abandoned = prepared.abandon();
+    const std::optional<Abandoned> abandoned = SceneInside::abandon(prepared);
     REQUIRE(abandoned);
     CHECK(abandoned->unwritten.empty());
     CHECK(nlohmann::json::parse(content(asked.statistics)).at("frames").empty());
@@ -318,7 +319,7 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
 {
     const test::TemporaryFolder folder;
     const RunOptions right = options(folder);
-    CHECK_FALSE(SceneRun::make("", {}, {}, right, {}));
+    CHECK_FALSE(SceneRun::make("", {}, right));
     const auto wrong = [&](const auto& change, const std::string& message) {
         RunOptions asked = right;
         change(asked);
@@ -344,12 +345,12 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     wrong([](RunOptions& o) { o.files.pictures.camera.fov = 180; }, "fov = 180");
     SceneOptions scene;
     scene.threads = -1;
-    CHECK_FALSE(SceneRun::make("cloud.lua", scene, {}, right, {}));
+    CHECK_FALSE(SceneRun::make("cloud.lua", scene, right));
     scene.threads = 0;
     scene.nodes.emplace_back();
     RunOptions cached = right;
     cached.cache.folder = folder / "cache";
-    const Result<SceneRun> offering = SceneRun::make("cloud.lua", scene, {}, cached, {});
+    const Result<SceneRun> offering = SceneRun::make("cloud.lua", scene, cached);
     REQUIRE_FALSE(offering);
     CHECK_THAT(offering.error().message, Contains("a cache does not know when what the program offers has changed"));
     CHECK(fs::is_empty(folder.path()));
@@ -396,9 +397,9 @@ local n = rapid.param("n", 1e12)
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
   :points("long", function(p) for i = 1, n do p.v = p.v * 0.5 end end) :drag { linear = 5000 } :solve {})",
                                options);
-    CHECK(good(advice_on(scene, {})).empty());
+    CHECK(good(SceneInside::advice_on(scene, {})).empty());
     good(scene.set("n", 1.0));
-    CHECK_THAT(good(advice_on(scene, {})), Contains("drag1"));
+    CHECK_THAT(good(SceneInside::advice_on(scene, {})), Contains("drag1"));
     CHECK(good(scene.advance()).number() == 1);
 }
 
@@ -422,58 +423,58 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :solve
 TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
 {
     const test::TemporaryFolder folder;
-    CHECK(good(output_format("a.####.vdb:heat")).extension == ".vdb");
-    CHECK_FALSE(good(output_format("a.####.vdb")).is_film);
-    CHECK(good(output_format("a.mp4")).is_film);
-    CHECK_FALSE(output_format("a.####.xyz"));
-    CHECK(output_formats().size() >= 13);
-    for (const OutputFormat& format : output_formats())
-        CHECK(good(output_format("a.####" + format.extension)).is_film == format.is_film);
+    CHECK(good(SceneInside::output_format("a.####.vdb:heat")).extension == ".vdb");
+    CHECK_FALSE(good(SceneInside::output_format("a.####.vdb")).is_film);
+    CHECK(good(SceneInside::output_format("a.mp4")).is_film);
+    CHECK_FALSE(SceneInside::output_format("a.####.xyz"));
+    CHECK(SceneInside::output_formats().size() >= 13);
+    for (const OutputFormat& format : SceneInside::output_formats())
+        CHECK(good(SceneInside::output_format("a.####" + format.extension)).is_film == format.is_film);
 
     RunOptions asked = options(folder);
     asked.files.outputs = {folder / "points/{output}/a.####.csv", folder / "b.####.csv"};
     asked.statistics = folder / "told/s.json";
     asked.cache.folder = folder / "cache";
-    const std::vector<std::string> folders = good(output_folders(asked));
+    const std::vector<std::string> folders = good(SceneInside::output_folders(asked));
     CHECK(folders == std::vector<std::string>{folder / "points", folder.path(), folder / "told", folder / "cache"});
     for (const std::string& one : folders) CHECK(fs::is_directory(one));
     asked.part = {2, 4};
     asked.files.outputs = {folder / "{part}/a.####.csv"};
     asked.statistics = folder / "told{part}/s.json";
     asked.claims = folder / "claims";
-    CHECK(good(output_folders(asked)) ==
+    CHECK(good(SceneInside::output_folders(asked)) ==
           std::vector<std::string>{folder / "2of4", folder / "told2of4", folder / "cache", folder / "claims"});
     CHECK(fs::is_directory(folder / "told2of4"));
     CHECK_FALSE(fs::exists(folder / "told{part}"));
     asked.files.outputs = {"/proc/none/a.####.csv"};
-    CHECK_FALSE(output_folders(asked));
+    CHECK_FALSE(SceneInside::output_folders(asked));
 }
 
 TEST_CASE("what a plan keeps for files is explained", "[run]")
 {
     Scene scene = test::opened(cloud);
     FileOutputs files;
-    const SceneReport all = good(explain_outputs(scene, files));
+    const SceneReport all = good(SceneInside::explain_outputs(scene, files));
     CHECK(all.text == good(scene.explain()).text);
     files.outputs = {"a.####.csv:v"};
-    const SceneReport some = good(explain_outputs(scene, files));
+    const SceneReport some = good(SceneInside::explain_outputs(scene, files));
     CHECK(some.text != all.text);
     CHECK_FALSE(nlohmann::json::parse(some.json).empty());
     files.outputs = {"a.####.csv:heet"};
-    CHECK_THAT(explain_outputs(scene, files).error().message, Contains("did you mean"));
+    CHECK_THAT(SceneInside::explain_outputs(scene, files).error().message, Contains("did you mean"));
 
     files.outputs.clear();
     Scene other = test::opened(cloud + ":drag { linear = 1 }", {}, "other.lua");
-    const SceneReport more = good(explain_difference(scene, files, other));
+    const SceneReport more = good(SceneInside::explain_difference(scene, files, other));
     CHECK_THAT(more.text, Contains("cloud.lua") && Contains("other.lua") && Contains("drag"));
     CHECK(nlohmann::json::parse(more.json).at("against") == "other.lua");
-    CHECK_FALSE(explain_difference(scene, files, scene));
+    CHECK_FALSE(SceneInside::explain_difference(scene, files, scene));
 
     good(scene.advance());
-    const auto state = nlohmann::json::parse(good(explain_state(scene, files, 4)).json);
+    const auto state = nlohmann::json::parse(good(SceneInside::explain_state(scene, files, 4)).json);
     CHECK(state.at("frame") == 4);
     CHECK(state.at("simulations").at("create1").get<std::size_t>() > 0);
-    CHECK_THAT(explain_state(scene, files, 0).error().message, Contains("before the scene's first"));
+    CHECK_THAT(SceneInside::explain_state(scene, files, 0).error().message, Contains("before the scene's first"));
     CHECK(good(scene.advance()).number() == 2);
 }
 
@@ -482,20 +483,20 @@ TEST_CASE("a scene is checked without a frame, and for kernels that remember", "
     Scene scene = test::opened(cloud);
     good(scene.advance());
     CHECK_THAT(
-        good(check_outputs(scene, {})),
+        good(SceneInside::check_outputs(scene, {})),
         StartsWith("param rate = 2000  particles born per second\ncloud.lua: OK, ") && Contains("from output main"));
-    CHECK(good(advice_on(scene, {})).empty());
-    const SceneRaces none = good(find_races(scene, {}, {2, 4}));
+    CHECK(good(SceneInside::advice_on(scene, {})).empty());
+    const SceneRaces none = good(SceneInside::find_races(scene, {}, {2, 4}));
     CHECK_FALSE(none.found);
     CHECK(none.compared);
-    CHECK_FALSE(good(find_races(scene, {}, {1, 1})).compared);
-    CHECK_FALSE(find_races(scene, {}, {0, 0}));
-    CHECK_FALSE(find_races(scene, {}, {1, 4, 0}));
+    CHECK_FALSE(good(SceneInside::find_races(scene, {}, {1, 1})).compared);
+    CHECK_FALSE(SceneInside::find_races(scene, {}, {0, 0}));
+    CHECK_FALSE(SceneInside::find_races(scene, {}, {1, 4, 0}));
     CHECK(good(scene.advance()).number() == 2);
 
     Scene stiff = test::opened(R"(local rapid = require "rapid"
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, velocity = {0, 1, 0} } :drag { linear = 5000 } :solve {})");
-    CHECK_THAT(good(advice_on(stiff, {})), Contains("drag1"));
+    CHECK_THAT(good(SceneInside::advice_on(stiff, {})), Contains("drag1"));
 
     // A table in a table of the kernel's own is not followed, and large ones are not compared.
     Scene remembers = test::opened(R"(local rapid = require "rapid"
@@ -504,7 +505,7 @@ ballast = {}
 for i = 1, 20000 do ballast[i] = i end
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, attributes = { heat = 0 } }
   :points("count", function(p) local held = { box } local kept = held[1] kept.n = kept.n + 1 p.heat = kept.n end) :solve {})");
-    const SceneRaces races = good(find_races(remembers, {}, {2, 4}));
+    const SceneRaces races = good(SceneInside::find_races(remembers, {}, {2, 4}));
     REQUIRE(races.found);
     CHECK(races.found->node == "count");
     CHECK_THAT(races.found->message, Contains("a kernel must not remember other points"));

@@ -1,5 +1,6 @@
 // Scenes as a program has them (rapid/scene.h): the bits of a session, memory that is shared and stays as it is, errors
 // as values, and a scene that is usable behind each of them.
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 
 #include <chrono>
@@ -360,27 +361,27 @@ TEST_CASE("a stop that is asked for ends opening, and all that a scene does late
     {
         std::stop_source stop;
         const std::jthread other = after(stop, 50);
-        const auto scene = Scene::open(folder.write("body.lua", endless("body")), {}, hooks_of(stop));
+        const auto scene = SceneInside::open(folder.write("body.lua", endless("body")), {}, hooks_of(stop));
         REQUIRE_FALSE(scene);
         CHECK(scene.error().kind == SceneError::Cancelled);
     }
     const auto file = folder.write("kernel.lua", endless("kernel"));
     {
         std::stop_source stop;
-        Scene scene = good(Scene::open(file, {}, hooks_of(stop)));
+        Scene scene = good(SceneInside::open(file, {}, hooks_of(stop)));
         const SceneFrame first = good(scene.advance());
         const std::jthread other = after(stop, 50);
         CHECK(scene.advance().error().kind == SceneError::Cancelled);
         CHECK(scene.restart().error().kind == SceneError::Cancelled);
-        CHECK(scene.points_behind_all(1).error().kind == SceneError::Cancelled);
+        CHECK(SceneInside::points_behind_all(scene, 1).error().kind == SceneError::Cancelled);
         CHECK(scene.shapes(1).error().kind == SceneError::Cancelled);
-        CHECK(scene.arguments(1).error().kind == SceneError::Cancelled);
+        CHECK(SceneInside::arguments(scene, 1).error().kind == SceneError::Cancelled);
         CHECK(first.size() > 0);
     }
     std::stop_source stop;
     stop.request_stop();
-    CHECK(Scene::open(file, {}, hooks_of(stop)).error().kind == SceneError::Cancelled);
-    CHECK(good(Scene::open(file, {}, hooks_of(std::stop_source()))).next_frame() == 1);
+    CHECK(SceneInside::open(file, {}, hooks_of(stop)).error().kind == SceneError::Cancelled);
+    CHECK(good(SceneInside::open(file, {}, hooks_of(std::stop_source()))).next_frame() == 1);
 }
 
 TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
@@ -395,11 +396,11 @@ TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
     const auto file = folder.write("scene.lua",
                                    "local rapid = require 'rapid'\nlocal s = rapid.param('steps', 0, 'sub-steps')\n"
                                    "return rapid.create {} :solve { substeps = s }");
-    CHECK_FALSE(Scene::open(file, {}, hooks));
+    CHECK_FALSE(SceneInside::open(file, {}, hooks));
     CHECK(told == std::vector<std::string>{"steps"});
     SceneOptions right;
     right.set = {{"steps", 2.0}};
-    CHECK(good(Scene::open(file, right, hooks)).next_frame() == 1);
+    CHECK(good(SceneInside::open(file, right, hooks)).next_frame() == 1);
     CHECK(told.size() == 2);
 }
 

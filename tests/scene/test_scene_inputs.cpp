@@ -1,6 +1,7 @@
 // What the frames of a scene follow from, and the files that they read.
 #include <filesystem>
 
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -27,8 +28,10 @@ Scene opened_to_keep(const std::filesystem::path& file, SceneOptions options = {
 {
     SceneHooks hooks;
     hooks.keep_state = true;
-    return good(Scene::open(file, std::move(options), hooks));
+    return good(SceneInside::open(file, std::move(options), hooks));
 }
+
+SceneFingerprint fingerprint_of(Scene scene) { return good(SceneInside::fingerprint(scene)); }
 
 }  // namespace
 
@@ -37,8 +40,8 @@ TEST_CASE("equal scenes have equal fingerprints, and others name what differs", 
     const test::TemporaryFolder folder;
     const auto file = folder.write("scene.lua", cloud);
     folder.write("source.ply", triangle(0.5));
-    const SceneFingerprint first = good(opened_to_keep(file).fingerprint());
-    const SceneFingerprint same = good(opened_to_keep(file).fingerprint());
+    const SceneFingerprint first = fingerprint_of(opened_to_keep(file));
+    const SceneFingerprint same = fingerprint_of(opened_to_keep(file));
     CHECK(first.parts == same.parts);
     CHECK(first.hash == same.hash);
     CHECK(first.parts.at("rate") == "200");
@@ -47,14 +50,14 @@ TEST_CASE("equal scenes have equal fingerprints, and others name what differs", 
 
     SceneOptions faster;
     faster.set = {{"rate", 300.0}};
-    CHECK(good(opened_to_keep(file, faster).fingerprint()).hash != first.hash);
+    CHECK(fingerprint_of(opened_to_keep(file, faster)).hash != first.hash);
     SceneOptions seeded;
     seeded.seed = 9;
-    CHECK(good(opened_to_keep(file, seeded).fingerprint()).parts.at("seed of create1") == "9");
+    CHECK(fingerprint_of(opened_to_keep(file, seeded)).parts.at("seed of create1") == "9");
     folder.write("scene.lua", "-- a comment\n\n" + cloud);
-    CHECK(good(opened_to_keep(file).fingerprint()).hash == first.hash);
+    CHECK(fingerprint_of(opened_to_keep(file)).hash == first.hash);
     folder.write("source.ply", triangle(0.25));
-    CHECK(good(opened_to_keep(file).fingerprint()).hash != first.hash);
+    CHECK(fingerprint_of(opened_to_keep(file)).hash != first.hash);
 }
 
 TEST_CASE("a fingerprint is that of the parameters that the scene has now", "[inputs]")
@@ -62,12 +65,12 @@ TEST_CASE("a fingerprint is that of the parameters that the scene has now", "[in
     const test::TemporaryFolder folder;
     folder.write("source.ply", triangle(0.5));
     Scene scene = opened_to_keep(folder.write("scene.lua", cloud));
-    const std::string before = good(scene.fingerprint()).hash;
-    CHECK(good(scene.fingerprint()).hash == before);
+    const std::string before = good(SceneInside::fingerprint(scene)).hash;
+    CHECK(good(SceneInside::fingerprint(scene)).hash == before);
     good(scene.set("rate", 300.0));
-    CHECK(good(scene.fingerprint()).hash != before);
+    CHECK(good(SceneInside::fingerprint(scene)).hash != before);
     good(scene.set("rate", 200.0));
-    CHECK(good(scene.fingerprint()).hash == before);
+    CHECK(good(SceneInside::fingerprint(scene)).hash == before);
 }
 
 TEST_CASE("files that frames read are told once, and known when they change", "[inputs]")
@@ -80,26 +83,26 @@ TEST_CASE("files that frames read are told once, and known when they change", "[
                                               "if frame.number < 3 then return rapid.mesh.sphere {} end\n"
                                               "return rapid.mesh.read 'late.ply' end } :solve {}"));
     good(scene.advance_to(2));
-    CHECK(good(scene.take_inputs()).empty());
+    CHECK(good(SceneInside::take_inputs(scene)).empty());
     good(scene.advance_to(4));
-    const auto inputs = good(scene.take_inputs());
+    const auto inputs = good(SceneInside::take_inputs(scene));
     REQUIRE(inputs.size() == 1);
     CHECK(inputs.begin()->first == "content of late.ply");
-    CHECK(good(scene.take_inputs()).empty());
-    CHECK(good(scene.are_unchanged(inputs)));
-    CHECK(good(scene.are_unchanged({})));
-    CHECK_FALSE(good(scene.are_unchanged({{"late.ply", inputs.begin()->second}})));
+    CHECK(good(SceneInside::take_inputs(scene)).empty());
+    CHECK(good(SceneInside::are_unchanged(scene, inputs)));
+    CHECK(good(SceneInside::are_unchanged(scene, {})));
+    CHECK_FALSE(good(SceneInside::are_unchanged(scene, {{"late.ply", inputs.begin()->second}})));
     folder.write("late.ply", triangle(0.25));
-    CHECK_FALSE(good(scene.are_unchanged(inputs)));
+    CHECK_FALSE(good(SceneInside::are_unchanged(scene, inputs)));
     std::filesystem::remove(folder / "late.ply");
-    CHECK_FALSE(good(scene.are_unchanged(inputs)));
+    CHECK_FALSE(good(SceneInside::are_unchanged(scene, inputs)));
 }
 
 TEST_CASE("a scene that keeps no state has no fingerprint, and says how to get one", "[inputs]")
 {
     Scene scene = test::opened("return require 'rapid'.create {} :solve {}");
-    for (const SceneError& error :
-         {scene.fingerprint().error(), scene.take_inputs().error(), scene.are_unchanged({}).error()}) {
+    for (const SceneError& error : {SceneInside::fingerprint(scene).error(), SceneInside::take_inputs(scene).error(),
+                                    SceneInside::are_unchanged(scene, {}).error()}) {
         CHECK(error.kind == SceneError::WrongCall);
         CHECK_THAT(error.message, Contains("SceneHooks::keep_state"));
     }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -49,11 +50,11 @@ TEST_CASE("outputs are known before a frame, with the creates whose points they 
 {
     Scene scene =
         opened(std::string(merged) + "return { left = chain('a', 0), both = chain('b', 1):merge(chain('c', 2)) }");
-    REQUIRE(scene.outputs().size() == 2);
-    CHECK(scene.outputs()[0].name == "both");
-    CHECK(scene.outputs()[0].creates == std::vector<std::string>{"b", "c"});
-    CHECK(scene.outputs()[1].name == "left");
-    CHECK(scene.outputs()[1].creates == std::vector<std::string>{"a"});
+    REQUIRE(SceneInside::outputs(scene).size() == 2);
+    CHECK(SceneInside::outputs(scene)[0].name == "both");
+    CHECK(SceneInside::outputs(scene)[0].creates == std::vector<std::string>{"b", "c"});
+    CHECK(SceneInside::outputs(scene)[1].name == "left");
+    CHECK(SceneInside::outputs(scene)[1].creates == std::vector<std::string>{"a"});
     CHECK(opened("return rapid.create { fps = 30 } :solve {}").fps() == 30);
 }
 
@@ -63,7 +64,7 @@ TEST_CASE("attributes are told with their bytes, and whether they are kept", "[i
         "return rapid.create { name = 'made' } :attribute { heat = 1 } :group { name = 'low', where = function(p) "
         "return "
         "p.P.y < 0 end } :gravity {} :solve {}");
-    const std::vector<SceneAttribute> all = good(scene.attributes());
+    const std::vector<SceneAttribute> all = good(SceneInside::attributes(scene));
     CHECK(found(all, "P").bytes == 12);
     CHECK(found(all, "P").create == "made");
     CHECK(found(all, "P").is_kept);
@@ -78,9 +79,9 @@ TEST_CASE("a scene that tells points has the attributes of its solve", "[inspect
     const auto file = folder.write("scene.lua", std::string("local rapid = require 'rapid'\n") + warm);
     SceneHooks hooks;
     hooks.tell_points = true;
-    Scene scene = good(Scene::open(file, {}, hooks));
+    Scene scene = good(SceneInside::open(file, {}, hooks));
     for (const char* const name : {"error", "substeps", "asleep"}) {
-        CHECK(found(good(scene.attributes()), name).is_kept);
+        CHECK(found(good(SceneInside::attributes(scene)), name).is_kept);
         CHECK(good(scene.advance()).column(name)->count == 2);
     }
 }
@@ -88,8 +89,8 @@ TEST_CASE("a scene that tells points has the attributes of its solve", "[inspect
 TEST_CASE("arguments are told as texts, those of functions for a frame", "[inspection]")
 {
     Scene scene = opened(warm);
-    CHECK(good(scene.arguments(3)).at("down").at("g") == "{0, -3, 0}");
-    CHECK(good(scene.arguments(7)).at("down").at("g") == "{0, -7, 0}");
+    CHECK(good(SceneInside::arguments(scene, 3)).at("down").at("g") == "{0, -3, 0}");
+    CHECK(good(SceneInside::arguments(scene, 7)).at("down").at("g") == "{0, -7, 0}");
     CHECK(scene.next_frame() == 1);
     Scene wrong = opened(
         "return rapid.create {} :gravity { g = function(frame) if frame.number > 1 then error 'no g' end "
@@ -105,12 +106,12 @@ TEST_CASE("points behind all nodes are those behind each, and the scene stays wh
     good(scene.advance_to(3));
     const SceneSnapshot snapshot = good(scene.save());
     good(scene.advance_to(5));
-    const auto from_start = good(scene.points_behind_all(4));
+    const auto from_start = good(SceneInside::points_behind_all(scene, 4));
     CHECK(scene.next_frame() == 6);
     const SceneFrame sixth = good(scene.advance());
 
     Scene again = opened(warm);
-    const auto from_snapshot = good(again.points_behind_all(4, snapshot));
+    const auto from_snapshot = good(SceneInside::points_behind_all(again, 4, snapshot));
     check_equal(sixth, good(again.advance_to(6)));
     REQUIRE(from_start.size() == from_snapshot.size());
     for (const auto& [node, points] : from_start) {
@@ -130,24 +131,26 @@ TEST_CASE("points behind all nodes are other ones where parameters are", "[inspe
     Scene scene = opened(
         "local x = rapid.param('x', 1, 'm')\n"
         "return rapid.create { points = rapid.points.from { P = {{x, 0, 0}} } } :solve {}");
-    CHECK(good(scene.points_behind_all(2)).at("solve1").column("P")->at<float>(0)[0] == 1);
+    CHECK(good(SceneInside::points_behind_all(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 1);
     good(scene.set("x", 4.0));
-    CHECK(good(scene.points_behind_all(2)).at("solve1").column("P")->at<float>(0)[0] == 4);
+    CHECK(good(SceneInside::points_behind_all(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 4);
 }
 
 TEST_CASE("a wrong frame or snapshot for the points behind nodes is refused", "[inspection]")
 {
     Scene scene = opened(warm);
-    const SceneError early = scene.points_behind_all(0).error();
+    const SceneError early = SceneInside::points_behind_all(scene, 0).error();
     CHECK(early.kind == SceneError::WrongCall);
     CHECK_THAT(early.message, Contains("before the scene's first, 1"));
 
     good(scene.advance_to(3));
     const SceneSnapshot third = good(scene.save());
-    CHECK_THAT(scene.points_behind_all(3, third).error().message, Contains("behind frame 3; frame 3 takes one"));
+    CHECK_THAT(SceneInside::points_behind_all(scene, 3, third).error().message,
+               Contains("behind frame 3; frame 3 takes one"));
     Scene other = opened("return rapid.create {} :solve {}");
     good(other.advance());
-    CHECK_THAT(scene.points_behind_all(3, good(other.save())).error().message, Contains("of another graph"));
+    CHECK_THAT(SceneInside::points_behind_all(scene, 3, good(other.save())).error().message,
+               Contains("of another graph"));
     CHECK(good(scene.advance()).number() == 4);
 }
 
@@ -157,10 +160,10 @@ TEST_CASE("a frame that fails has no points behind nodes, and the frames before 
         "return rapid.create { points = rapid.points.grid {} }\n"
         ":points('hot', function(p, frame) if frame.number == 3 then error 'hot' end end) :solve {}");
     CHECK(scene.advance_to(3).error().kind == SceneError::FailedFrame);
-    const SceneError error = scene.points_behind_all(3).error();
+    const SceneError error = SceneInside::points_behind_all(scene, 3).error();
     CHECK(error.kind == SceneError::FailedFrame);
     CHECK(error.node == "hot");
-    CHECK(good(scene.points_behind_all(2)).contains("hot"));
+    CHECK(good(SceneInside::points_behind_all(scene, 2)).contains("hot"));
 }
 
 TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
@@ -170,12 +173,12 @@ TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
     REQUIRE(frame.size() == 4);
     for (std::size_t i = 0; i < 4; ++i) {
         const float* P = frame.column("P")->at<float>(i);
-        const PointOrigin origin = good(scene.origin(frame, *frame.column("id")->at<std::int64_t>(i)));
+        const PointOrigin origin = good(SceneInside::origin(scene, frame, *frame.column("id")->at<std::int64_t>(i)));
         CHECK(origin.create == (P[0] < 1 ? "a" : "b"));
         CHECK(origin.id == (P[1] > 1.5f ? 1 : 0));
     }
     CHECK(scene.next_frame() == 5);
-    CHECK_THAT(scene.origin(frame, 99).error().message, Contains("not in this frame"));
+    CHECK_THAT(SceneInside::origin(scene, frame, 99).error().message, Contains("not in this frame"));
 
     Scene single = opened(warm);
     const PointOrigin same = good(single.origin(good(single.advance_to(2)), 1));
@@ -199,20 +202,20 @@ TEST_CASE("a point of a merge that is not known by its place is an error that sa
 TEST_CASE("a graph without places has the nodes of the one that is laid out", "[inspection]")
 {
     Scene scene = opened(warm);
-    const std::string bare = good(scene.graph_json(nullptr));
+    const std::string bare = good(SceneInside::graph_json(scene, nullptr));
     CHECK_THAT(bare, Contains(R"("name":"warm")"));
     const std::string laid_out = good(scene.graph(GraphForm::Json));
     GraphLayout layout;
-    CHECK(good(scene.graph_json(&layout)) == laid_out);
+    CHECK(good(SceneInside::graph_json(scene, &layout)) == laid_out);
     CHECK(bare.size() < laid_out.size());
     REQUIRE_FALSE(layout.graph.empty());
 
     // The same graph with another value takes the places that are there.
     const GraphLayout kept = layout;
     layout.places = "{}";
-    CHECK_FALSE(good(scene.graph_json(&layout)) == laid_out);
+    CHECK_FALSE(good(SceneInside::graph_json(scene, &layout)) == laid_out);
     layout.graph = "of another one";
-    CHECK(good(scene.graph_json(&layout)) == laid_out);
+    CHECK(good(SceneInside::graph_json(scene, &layout)) == laid_out);
     CHECK(layout.graph == kept.graph);
 }
 

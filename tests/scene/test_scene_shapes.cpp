@@ -1,4 +1,5 @@
 // Shapes of a frame, and pictures of points among them.
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/shapes.h"
 
 #include <cmath>
@@ -110,32 +111,32 @@ TEST_CASE("shapes in a file are those that were written, and pictures of them th
     Scene scene = opened(shapes_of_all_kinds);
     const SceneFrame frame = good(scene.advance_to(3));
     const SceneShapes shapes = good(scene.shapes(3));
-    good(shapes.save(folder / "deep/shapes"));
-    const SceneShapes read = good(SceneShapes::load(folder / "deep/shapes"));
+    good(SceneInside::save(shapes, folder / "deep/shapes"));
+    const SceneShapes read = good(SceneInside::load_shapes(folder / "deep/shapes"));
     REQUIRE(read.meshes().size() == 2);
     CHECK(read.meshes()[0].role == ShapeRole::Emitter);
     CHECK(highest(read.meshes()[1]) == highest(shapes.meshes()[1]));
     CHECK(read.planes()[0].offset == shapes.planes()[0].offset);
     CHECK(good(frame.picture(read, {}, {64, 48})) == good(frame.picture(shapes, {}, {64, 48})));
 
-    good(SceneShapes().save(folder / "none"));
-    CHECK(good(SceneShapes::load(folder / "none")).meshes().empty());
+    good(SceneInside::save(SceneShapes(), folder / "none"));
+    CHECK(good(SceneInside::load_shapes(folder / "none")).meshes().empty());
 }
 
 TEST_CASE("a file that holds no shapes is an error that names it", "[shapes]")
 {
     const test::TemporaryFolder folder;
     Scene scene = opened(resting);
-    good(good(scene.advance()).save(folder / "frame", ""));
-    const SceneError other = SceneShapes::load(folder / "frame").error();
+    good(SceneInside::save(good(scene.advance()), folder / "frame", ""));
+    const SceneError other = SceneInside::load_shapes(folder / "frame").error();
     CHECK_THAT(other.text(), StartsWith((folder / "frame").string() + ": it is a frame of a scene, and no shapes"));
-    CHECK_FALSE(SceneShapes::load(folder / "missing"));
-    CHECK_FALSE(SceneShapes::load(folder.write("text", "no shapes")));
-    CHECK_FALSE(SceneShapes().save(folder / "text/below"));
+    CHECK_FALSE(SceneInside::load_shapes(folder / "missing"));
+    CHECK_FALSE(SceneInside::load_shapes(folder.write("text", "no shapes")));
+    CHECK_FALSE(SceneInside::save(SceneShapes(), folder / "text/below"));
 
-    good(good(scene.shapes(1)).save(folder / "shapes"));
+    good(SceneInside::save(good(scene.shapes(1)), folder / "shapes"));
     const std::string whole = test::file_text(folder / "shapes");
-    CHECK_FALSE(SceneShapes::load(folder.write("torn", whole.substr(0, whole.size() / 2))));
+    CHECK_FALSE(SceneInside::load_shapes(folder.write("torn", whole.substr(0, whole.size() / 2))));
 }
 
 TEST_CASE("a picture needs no scene, and is seen from where the program says", "[shapes]")
@@ -171,7 +172,7 @@ TEST_CASE("a frame has the camera of its picture: the scene's, the program's, or
     Scene plain = opened(points);
     const SceneFrame alone = good(plain.advance());
     CHECK_FALSE(good(plain.shapes(1)).has_camera());
-    const PictureCamera fitted = good(alone.camera(good(plain.shapes(1))));
+    const PictureCamera fitted = good(SceneInside::camera(alone, good(plain.shapes(1))));
     CHECK(std::hypot((*fitted.target)[0] - 1, (*fitted.target)[1] - 2, (*fitted.target)[2] - 3) < 1e-6);
     CHECK((*fitted.position)[1] > 2);  // from above
 
@@ -179,15 +180,15 @@ TEST_CASE("a frame has the camera of its picture: the scene's, the program's, or
     const SceneFrame frame = good(scene.advance());
     const SceneShapes shapes = good(scene.shapes(1));
     CHECK(shapes.has_camera());
-    const PictureCamera of_scene = good(frame.camera(shapes));
+    const PictureCamera of_scene = good(SceneInside::camera(frame, shapes));
     CHECK(*of_scene.position == std::array{0.0, 8.0, 1.0});
     CHECK(*of_scene.target == std::array{0.0, 1.0, 0.0});
     CHECK(std::abs(*of_scene.fov - 35) < 0.1);
     PictureCamera other;
     other.position = {3, 3, 3};
-    CHECK(*good(frame.camera(shapes, other)).position == *other.position);
+    CHECK(*good(SceneInside::camera(frame, shapes, other)).position == *other.position);
     other.fov = 180;
-    CHECK_FALSE(frame.camera(shapes, other));
+    CHECK_FALSE(SceneInside::camera(frame, shapes, other));
 }
 
 }  // namespace rapid

@@ -2,6 +2,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -36,7 +37,7 @@ TEST_CASE("behind a snapshot of a file come the bits of the run that went on", "
     {
         const SceneSnapshot snapshot = good(scene.save());
         good(snapshot.write(file));
-        CHECK(SceneSnapshot::is_file(file));
+        CHECK(SceneInside::is_snapshot(file));
     }
     const SceneFrame expected = good(scene.advance_to(14));
     REQUIRE(expected.size() > 100);
@@ -60,7 +61,7 @@ TEST_CASE("a file of a snapshot is described", "[snapshots]")
     Scene scene = opened();
     good(scene.advance_to(3));
     good(good(scene.save()).write(file));
-    const SceneReport report = good(SceneSnapshot::describe(file));
+    const SceneReport report = good(SceneInside::describe_snapshot(file));
     CHECK_THAT(report.json, StartsWith(R"({"what":"snapshot of a scene","graph":"cloud.lua","frame":3,)"));
     CHECK_THAT(report.json, Contains(R"("simulations":{"create1":)"));
     CHECK_THAT(report.text, StartsWith(file + ": a snapshot, ") && Contains("of cloud.lua after frame 3\n"));
@@ -94,7 +95,7 @@ TEST_CASE("a file that is no snapshot, torn or damaged is an error that names it
         REQUIRE_FALSE(read);
         CHECK(read.error().kind == SceneError::WrongCall);
         CHECK(read.error().file == path);
-        CHECK_FALSE(SceneSnapshot::describe(path));
+        CHECK_FALSE(SceneInside::describe_snapshot(path));
     };
     refused(folder / "nothing.state");
     refused(folder.path());
@@ -106,8 +107,8 @@ TEST_CASE("a file that is no snapshot, torn or damaged is an error that names it
         damaged[place] = static_cast<char>(damaged[place] ^ 1);
         refused(folder.write("damaged.state", damaged));
     }
-    CHECK_FALSE(SceneSnapshot::is_file(folder / "text.state"));
-    CHECK_FALSE(SceneSnapshot::is_file(folder / "nothing.state"));
+    CHECK_FALSE(SceneInside::is_snapshot(folder / "text.state"));
+    CHECK_FALSE(SceneInside::is_snapshot(folder / "nothing.state"));
     CHECK_FALSE(good(scene.save()).write("/dev/null/cloud.state"));
 }
 

@@ -342,7 +342,7 @@ class _Program:
         options.set, options.set_count = settings, len(settings)
         if seed is not None:
             options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
-        options.paths, options.path_count = texts(paths)
+        options.paths, options.path_count = texts(paths, "paths", "folders")
         options.threads, options.script_seconds = Int.checked(threads), script_seconds
         options.script_memory, options.memory = UInt64.checked(script_memory), UInt64.checked(memory)
         options.estimate_errors, options.keep_all = bool(estimate_errors), bool(keep_all)
@@ -607,7 +607,7 @@ class Run(_Program):
         options.text = None if text is None else encoded(text)
         if frames is not None:
             options.frames = ctypes.pointer(Frames(*frames) if len(frames) == 3 else Frames(*frames, 1))
-        options.outputs, options.output_count = texts(outputs)
+        options.outputs, options.output_count = texts(outputs, "outputs", "patterns")
         options.width, options.height = Int.checked(width), Int.checked(height)
         options.camera = _camera(position, target, fov)
         for name, path in (("statistics", statistics), ("profile", profile), ("events", events), ("cache", cache)):
@@ -673,7 +673,7 @@ def merge_files(parts, output, progress=None):
             raised.append(error)
             return 0
     try:
-        call("merge_files", *texts(parts), encoded(str(output)), MergeProgress(told), None, byref(merged))
+        call("merge_files", *texts(parts, "parts", "patterns"), encoded(str(output)), MergeProgress(told), None, byref(merged))
     except Error as error:
         if raised:
             raise raised[0] from error

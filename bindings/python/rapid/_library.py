@@ -346,10 +346,10 @@ def lines(name, handle):
     return text.decode().split("\n") if text else []
 
 
-def texts(values):
+def texts(values, name, what):
     """An array of texts for the library, with their number."""
     if isinstance(values, (str, bytes)):
-        raise TypeError(f"{values!r} is one text; it must be a list of them")
+        raise TypeError(f"{name} = {values!r}; it must be a list of {what}")
     return (c_char_p * len(values))(*(encoded(str(one)) for one in values)), len(values)
 
 

@@ -1,4 +1,4 @@
-// Constraints that begin a sub-step with the impulses of the last one, beside rods and springs.
+// Constraints that start a substep with the impulses of the previous one and act alongside rods and springs.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,13 @@
 
 namespace rapid {
 
-// What a Coupling is, too, that does.
+// An interface that such a Coupling also implements.
 class CarriedImpulses {
 public:
     virtual ~CarriedImpulses() = default;
 
-    // Before warm_start(). islands: by point; points that rods and springs link have the same. Empty where there are
-    // none. Valid for the sub-step.
+    // Is called before warm_start(). islands: by point; points linked by rods and springs share a number. Empty if
+    // there are no rods or springs. Valid for the substep.
     virtual void follow_rods(std::span<const std::uint32_t> islands) = 0;
 };
 

@@ -1,11 +1,11 @@
 // The contact forces on each point, as `:contact { record = true }` writes them to three attributes:
 //
-//   normalforce     N, the sum over the point's contacts of their normal impulses / time
-//   frictionforce   N, the same of their tangential impulses
-//   contactnum      contacts that press at the end of the frame
+//   normalforce     N, the sum over the point's contacts of normal impulse / time
+//   frictionforce   N, the same for tangential impulses
+//   contactnum      contacts under pressure at the end of the frame
 //
-// Forces are means over the sub-steps of the frame in which the point is awake; a point that sleeps keeps those that it
-// fell asleep under. Contacts are those with other points and with shapes.
+// Forces are means over the substeps of the frame in which the point is awake. A sleeping point keeps the values with
+// which it fell asleep. Contacts with other points and with shapes both count.
 #pragma once
 
 #include <cmath>
@@ -27,10 +27,10 @@ public:
 
     explicit ContactForces(std::size_t size) : sums_(size) {}
 
-    // Points of this radius above 0 are recorded.
+    // Records the points whose radius is above 0.
     void include(std::span<const float> radii);
     void begin(const Substep& step, const Sleep* sleep);
-    // Impulses on a point, N s. Points may be added to at the same time, each from one thread.
+    // Adds impulses on a point, N s. Different points may be updated concurrently, each from one thread.
     void add(std::size_t i, double normal, double tangential)
     {
         sums_[i].normal += normal;
@@ -41,7 +41,7 @@ public:
         const double normal = n.dot(impulse);
         add(i, std::abs(normal), (impulse - normal * n).norm());
     }
-    // J: of friction on the point, and of what moves the shape that it touches.
+    // Adds work, J: by friction on the point, and by moving shapes that it touches.
     void add_work(std::size_t i, double friction, double shapes)
     {
         sums_[i].friction_work += friction;
@@ -49,10 +49,10 @@ public:
     }
     void count(std::size_t i) { ++sums_[i].contacts; }
 
-    // J, of all points.
+    // Return sums over all points, J.
     double friction_work() const;
     double shape_work() const;
-    // At the end of the frame, into the columns, which must exist.
+    // Writes the sums to the columns, which must exist, at the end of the frame.
     void store(PointSet& points) const;
 
 private:
@@ -60,14 +60,14 @@ private:
         double normal = 0, tangential = 0;         // N s
         double time = 0;                           // s
         double friction_work = 0, shape_work = 0;  // J
-        std::int32_t contacts = 0;                 // in the last sub-step
+        std::int32_t contacts = 0;                 // in the last substep
         bool is_recorded = false;
     };
     std::vector<Sum> sums_;
 };
 
-// The parts along the normals, at least 0, of what several contacts gave a point together: the least squares of what is
-// left, which is returned. Gauss-Seidel.
+// Splits the impulse that several contacts gave a point together into parts along their normals, each at least 0, by
+// least squares (Gauss-Seidel). Returns the remainder.
 Vec3d split_impulse(const Vec3d& impulse, std::span<const Vec3d> normals, std::span<double> parts);
 
 }  // namespace rapid

@@ -26,7 +26,7 @@ ContactMaterial::ContactMaterial(const PointSet& points, const ContactOptions& o
     if (options.spin) follow_spin(options.rolling.read(points));
 }
 
-// Impacts that turn points are solved at their times, those without restitution too: angular momentum is then kept.
+// Impacts that turn points are solved at their times, even without restitution. This conserves angular momentum.
 void ContactMaterial::follow_spin(Strided<float> rolling_friction)
 {
     bounces = true;

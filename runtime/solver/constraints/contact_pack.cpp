@@ -2,15 +2,15 @@
 
 namespace rapid {
 
-// Each pair goes into the first pack with room after those that its points are in: the result is then that of one pair
-// after the other, in their order. A window of 64 packs is open; a pair that fits into none of them begins the next
-// window, so that each takes the same time to find its pack.
+// Each pair goes into the first pack with room after those that contain its points, so the result equals solving one
+// pair after the other, in order. A window of 64 packs is open. A pair that fits into none of them starts the next
+// window, which bounds the time to find a pack.
 void ContactPacks::pack(std::size_t block, std::span<const std::uint32_t> pairs, std::span<const ContactPair> all)
 {
     std::vector<ContactPack>& packs = packs_[block];
     packs.clear();
-    std::uint32_t window = 0;  // its number: 1 more than that of its first pair
-    std::uint64_t room = 0;    // which of its packs have any
+    std::uint32_t window = 0;  // the window's number: 1 more than that of its first pair
+    std::uint64_t room = 0;    // bit mask of its packs with room
     std::size_t first = 0;
     for (const std::uint32_t k : pairs) {
         const auto [i, j] = all[k];
@@ -28,7 +28,7 @@ void ContactPacks::pack(std::size_t block, std::span<const std::uint32_t> pairs,
         const std::uint32_t l = pack.count++;
         pack.i[l] = i, pack.j[l] = j, pack.pair[l] = k;
         if (pack.count == lanes) room &= ~(std::uint64_t{1} << p);
-        // Number by number: one written in two parts and copied whole at once would stall.
+        // Assign the members one by one: reading both with one wide load after two narrow stores would stall.
         a.window = b.window = window;
         a.packs = b.packs = (std::uint64_t{2} << p) - 1;
     }

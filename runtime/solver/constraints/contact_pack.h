@@ -11,18 +11,18 @@
 
 namespace rapid {
 
-// A contact in each lane; lanes from `count` on repeat the first, and their results are dropped.
+// One contact per lane. Lanes from `count` on repeat the first, and their results are dropped.
 struct alignas(64) ContactPack {
     Indices i, j, pair;
     std::uint32_t count;
     Floats reach;                        // m: r_i + r_j
-    Floats initial_gap;                  // m: C at the beginning of the sub-step, at most 0
-    Floats normal_impulse;               // N s along n: at first of the projection of positions, then the whole
-    Floats carried_impulse;              // N s along n: that the warm start gives to velocities alone
+    Floats initial_gap;                  // m: C at the beginning of the substep, at most 0
+    Floats normal_impulse;               // N s along n: first for the projection of positions, then the total
+    Floats carried_impulse;              // N s along n: given by the warm start to velocities only
     Floats friction;                     // μ
     Floats restitution;                  // ε
     Floats effective_mass;               // kg: 1 / (w_i + w_j)
-    Floats scale;                        // what w_i is multiplied by, and w_j divided by, under mass scaling
+    Floats scale;                        // mass scaling multiplies w_i and divides w_j by this
     Vectors<Floats> n;                   // from j to i, unit
     Vectors<Floats> tangential_impulse;  // N s, across n
 
@@ -46,7 +46,7 @@ void for_each_contact(const ContactPack& pack, const F& f)
         f(PairContact{pack.i[l], pack.j[l], pack.pair[l], pack.reach[l], pack.initial_gap[l], pack.n[l]});
 }
 
-// The contacts of a sub-step, block by block.
+// The contacts of a substep, block by block.
 class ContactPacks {
 public:
     void resize(std::size_t blocks)
@@ -56,7 +56,7 @@ public:
     }
     std::vector<ContactPack>& operator[](std::size_t block) { return packs_[block]; }
 
-    // On one thread.
+    // Calls f for each contact, on one thread.
     template <class F>
     void for_each(const F& f) const
     {
@@ -64,16 +64,16 @@ public:
             for (const ContactPack& pack : packs_[b]) for_each_contact(pack, f);
     }
 
-    // Before packing; points: in the set.
+    // Starts packing; points: number of points in the set.
     void begin(std::size_t points) { last_.assign(points, {}); }
-    // Packs pairs of a block, which are indices in `all`. To be called for blocks at the same time that share no point.
+    // Packs the pairs of a block, given as indices in `all`. Blocks that share no point may be packed concurrently.
     void pack(std::size_t block, std::span<const std::uint32_t> pairs, std::span<const ContactPair> all);
 
 private:
     std::size_t size_ = 0;
-    std::vector<std::vector<ContactPack>> packs_;  // beyond size_ kept for their memory
+    std::vector<std::vector<ContactPack>> packs_;  // entries from size_ on keep their memory for reuse
 
-    // Of each point: the open packs up to the last that it is in, by bits, if the window is the same still.
+    // For each point: a bit mask of the open packs up to the last one with the point, valid for this window.
     struct Open {
         std::uint32_t window = 0;
         std::uint64_t packs = 0;

@@ -17,14 +17,14 @@
 namespace rapid {
 namespace {
 
-// Spheres whose neighbours are looked for together: a fraction of a millisecond's work, so that a few thousand are
-// enough for several threads.
+// Spheres whose neighbours are searched in one task: a fraction of a millisecond of work, so a few thousand already
+// use several threads.
 constexpr std::size_t spheres_a_task = 2048;
 
-// Pairs are numbered by 32 bits.
+// Pairs are numbered with 32 bits.
 constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
 
-// What single precision can't decide.
+// Decides pairs that single precision cannot decide.
 bool spheres_touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
 {
     const double d = double(spheres.reach[a]) + double(spheres.reach[b]);
@@ -74,7 +74,7 @@ void ContactSearch::measure(std::span<const Vec3d> P, Strided<float> reach)
     blur_ = near_blur(extent);
 }
 
-// A cell is as wide as two spheres of the farthest reach, in its grid or a finer one.
+// Makes a cell as wide as two spheres of the largest reach, in its grid or a finer one.
 void ContactSearch::set_widths(const RadiusGrids& grids)
 {
     const std::size_t n = spheres_.P.size();
@@ -109,7 +109,7 @@ std::vector<ContactSearch::Found>& ContactSearch::room_for(std::size_t spheres)
     return found;
 }
 
-// Half of the neighbourhood: each pair from the sphere that comes first in the cells.
+// Searches half of the neighbourhood: each pair is found from the sphere that comes first in the cells.
 void ContactSearch::find_within(const CellGrid& grid)
 {
     std::vector<Found>& found = room_for(grid.size());
@@ -132,8 +132,8 @@ void ContactSearch::find_within(const CellGrid& grid)
     for_each_chunk(grid.size(), look, spheres_a_task);
 }
 
-// All of the neighbourhood of each sphere of the finer grid in the coarser, of which many that follow each other are in
-// one cell.
+// Searches the whole neighbourhood, in the coarser grid, of each sphere of the finer grid. Consecutive spheres often
+// share a cell.
 void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
 {
     std::vector<Found>& found = room_for(fine.size());
@@ -156,7 +156,7 @@ void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
     for_each_chunk(fine.size(), look, spheres_a_task);
 }
 
-// Into buckets of points first, and then each bucket point by point.
+// Sorts into buckets of points first, then sorts each bucket by point.
 void ContactSearch::sort(Pairs& pairs, std::size_t points)
 {
     std::vector<const Found*> sources;
@@ -192,7 +192,7 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
         const std::uint32_t start = starts_[bucket * chunks];
         const std::span<const Found::value_type> here =
             std::span(pairs_).subspan(start, starts_[(bucket + 1) * chunks] - start);
-        std::uint32_t* end = pairs.begin.data() + 1;  // of each point's partners, once they are there
+        std::uint32_t* end = pairs.begin.data() + 1;  // end of each point's partners once these are inserted
         std::fill(end + first, end + last, 0);
         for (const auto& pair : here) ++end[pair.first];
         std::exclusive_scan(end + first, end + last, end + first, start);

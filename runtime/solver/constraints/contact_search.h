@@ -1,7 +1,8 @@
-// All pairs of spheres that touch, from sparse grids of cells (paper §5.1, §5.2).
+// Finds all pairs of touching spheres with sparse cell grids (paper §5.1, §5.2).
 //
-// Spheres of one size go into one grid, of cells as wide as they: a pair is then in one cell or in neighbours. Several
-// sizes go into several grids (radius_grids.h); a pair of different grids is found from its smaller side.
+// Spheres of one size share a grid whose cells are as wide as they are, so the two of a pair are in the same cell or
+// in neighbouring cells. Several sizes use several grids (radius_grids.h); a pair from different grids is found from
+// its smaller sphere.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@
 
 namespace rapid {
 
-// Of each point the partners that come after it in the set, ascending: the same whatever the grids are.
+// For each point, the partners with a higher index, ascending. The result does not depend on the grids.
 struct Pairs {
     std::vector<std::uint32_t> begin;  // shape [points + 1]
     std::vector<std::uint32_t> other;
@@ -27,18 +28,18 @@ struct Pairs {
     }
 };
 
-// What becomes of the pairs, for the error where there is no memory for them.
+// The purpose of the pairs, for the error message if they do not fit in memory.
 struct PairUse {
     std::string what = "the search for contacts";  // "radius = 3 m"
     std::string remedy = "give a smaller radius";
-    double bytes_a_pair = 32;  // in all; the search itself takes that
+    double bytes_a_pair = 32;  // in total; the default is what the search itself takes
 };
 
-// Pairs with |P_i - P_j| < reach_i + reach_j.
+// Search for pairs with |P_i - P_j| < reach_i + reach_j.
 class ContactSearch {
 public:
-    // grids: of the radii, which the reaches may exceed; a reach is 0 for points in no grid. Error: more pairs than
-    // there is memory for, before they are looked for.
+    // grids: built from the radii, which the reaches may exceed. A reach is 0 for points in no grid. Throws
+    // InputError, before searching, if the pairs would exceed memory.
     void find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs,
               const PairUse& use = {});
 
@@ -55,12 +56,12 @@ private:
     void sort(Pairs& pairs, std::size_t points);
 
     SpheresView spheres_{{}, {nullptr, 0}, Vec3d::Zero()};
-    float blur_ = 0;  // m, by which distances in single precision may be off
+    float blur_ = 0;  // m, error bound of distances in single precision
     std::vector<CellGrid> grids_;
     CellSorter sorter_;
     std::vector<std::uint32_t> members_;        // of a grid
-    std::vector<std::vector<Found>> found_;     // by grids and chunks of spheres; kept for their memory
-    std::size_t used_ = 0;                      // of them
+    std::vector<std::vector<Found>> found_;     // by grids and chunks of spheres; keeps its memory for reuse
+    std::size_t used_ = 0;                      // number of these in use
     Found pairs_;                               // by buckets of points
     std::vector<std::uint32_t> starts_, ends_;  // of these, by bucket and source
 };

@@ -8,13 +8,13 @@
 namespace rapid {
 namespace {
 
-// The part of its burden by which the impulse of a neighbour has to change to wake a sleeper.
+// The change of a neighbour's impulse that wakes a sleeper, relative to its burden.
 constexpr double disturbing = 0.1;
 
-// The part of the smaller radius by which two points may overlap and fall asleep.
+// The largest overlap at which two points may fall asleep, relative to the smaller radius.
 constexpr double too_deep_to_sleep = 0.05;
 
-// N s, on i.
+// Returns the impulse on i, N s.
 Vec3f impulse_of(const PairContact& contact, const PairImpulses& impulses)
 {
     return impulses.normal[contact.pair] * contact.n.cast<float>() + impulses.tangential[contact.pair];

@@ -1,4 +1,4 @@
-// Sleep of points in contact: impacts and changes of load wake them, overlaps keep them awake.
+// Sleep of points in contact: impacts and load changes wake them, overlaps keep them awake.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace rapid {
 
 class ContactSleep {
 public:
-    // Null where no point may sleep in this frame.
+    // Null if no point may sleep in this frame.
     void join(Sleep* sleep) { sleep_ = sleep; }
     Sleep* sleep() const { return sleep_; }
     void wake_both(std::uint32_t i, std::uint32_t j) const
@@ -27,22 +27,22 @@ public:
     bool asleep(std::uint32_t i) const { return sleep_ && sleep_->asleep(i); }
     bool both_asleep(std::uint32_t i, std::uint32_t j) const { return asleep(i) && asleep(j); }
 
-    // Wakes the sleepers that are hit, and those that the shock reaches: each passes half of it on to those that it
-    // touches. They move on as their weight makes them. True if any wakes.
+    // Wakes sleepers that are hit, and those that the shock reaches: each passes half of it to the points that it
+    // touches. They continue with their free motion. Returns true if any wakes.
     bool wake_by_impact(const ContactPacks& packs, const PairImpulses& impulses, const ContactMaterial& material,
                         Substep& step);
 
-    // Wakes the sleeper of a contact that is loaded otherwise than when it fell asleep.
+    // Wakes the sleeper of a contact if its load differs from the one with which it fell asleep.
     void wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step) const;
 
-    // At the end of a frame: tells the loads of all points, keeps what they rest under, and keeps those awake that
-    // overlap too far, with all that touch them: they have to give way.
+    // Is called at the end of a frame. Reports the loads of all points and stores their resting impulses. Points with
+    // deep overlaps, and all that touch them, are kept awake because they have to give way.
     void report(const ContactPacks& packs, PairImpulses& impulses, const ContactMaterial& material,
                 const Substep& step) const;
 
 private:
     Sleep* sleep_ = nullptr;
-    std::vector<double> shock_;  // N s, of each point
+    std::vector<double> shock_;  // N s, by point
 };
 
 }  // namespace rapid

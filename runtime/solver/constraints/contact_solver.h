@@ -1,4 +1,4 @@
-// Sequential impulses for a pack of contacts: impacts, warm start, projection of positions, velocities and friction.
+// Sequential impulses for a pack of contacts: impacts, warm start, position projection, velocities and friction.
 //
 // weights: see MassScaling::with_weights().
 #pragma once
@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-// Of the contact in one lane: whether it was an impact.
+// Solves the contact in one lane. Returns true if it was an impact.
 inline bool solve_impact(const ContactPack& pack, std::uint32_t l, Substep& step, double at_rest, std::uint32_t sweep)
 {
     const std::uint32_t i = pack.i[l], j = pack.j[l];
@@ -47,8 +47,8 @@ inline bool solve_impact(const ContactPack& pack, std::uint32_t l, Substep& step
     return true;
 }
 
-// Of contacts that close faster than at rest, which are marked in `hits`, by pair. False where there are none, which is
-// seen at once of most packs.
+// Solves contacts that close faster than resting contacts, and marks them in `hits`, by pair. Returns false if there
+// are none, which a quick test shows for most packs.
 inline bool solve_impacts(const ContactPack& pack, Substep& step, double at_rest, std::uint32_t sweep,
                           std::span<std::uint8_t> hits)
 {
@@ -81,9 +81,9 @@ template <class Weights>
     scatter(b, step.points, pack.j, pack.count);
 }
 
-// The gap is to be no less than at the beginning of the sub-step, nor than 0. relaxation: above 1 more than one contact
-// would need, as others will push against it (successive over-relaxation); the sweep over velocities takes back what
-// was too much.
+// Keeps the gap at its value from the beginning of the substep, or at 0 if it was open. relaxation: above 1 more than
+// one contact alone needs, because others will push against it (successive over-relaxation); the velocity sweep takes
+// any excess back.
 template <class Weights>
 [[gnu::always_inline]] inline void project_positions(ContactPack& pack, Substep& step, double per_dt, double relaxation,
                                                      const Weights& weights)
@@ -102,17 +102,18 @@ template <class Weights>
     scatter(b, step.points, pack.j, pack.count);
 }
 
-// Normal velocities first: none into the other point; then Coulomb friction by the whole normal impulse. Friction acts
-// throughout the sub-step, and so half of it on positions: else a point that is held would creep. recovery(pack): which
-// part of an overlap is taken away; null but in the last iteration. impact_speed: pairs that bounce, are pushed into
-// one another by recovery and close faster than this are left to the impacts of the next sub-step; infinite where none
-// bounce. frictional: false where points turn, and friction is solved apart (spin.h). Returns the overlaps before.
+// Solves normal velocities first, so that no point moves into the other, then Coulomb friction from the total normal
+// impulse. Friction acts throughout the substep, so half of it also moves positions; otherwise a held point would
+// creep. recovery(pack): the fraction of an overlap to remove; null except in the last iteration. impact_speed:
+// bouncing pairs that recovery pushes into one another, and that close faster than this, are left to the impacts of
+// the next substep; infinite if none bounce. frictional: false if points turn, since friction is then solved
+// separately (spin.h). Returns the overlaps before the call.
 template <bool frictional, class Weights, class Recovery>
 [[gnu::always_inline]] inline Doubles solve_pack_velocities(ContactPack& pack, Substep& step, const Weights& weights,
                                                             const Recovery* recovery, double impact_speed)
 {
-    // As a part of the sum of the radii, an overlap that is left: a contact that is just lost is found again in the
-    // next sub-step, and that is jitter.
+    // The overlap that is left, as a fraction of the sum of the radii. A contact that is barely lost is found again in
+    // the next substep, which causes jitter.
     constexpr double slop = 1e-4;
 
     PointPack a = gather(step.points, pack.i), b = gather(step.points, pack.j);
@@ -152,7 +153,7 @@ template <bool frictional, class Weights, class Recovery>
     return overlap;
 }
 
-// Takes this part of what overlaps are beyond `allowed` away, without giving speed.
+// Removes this fraction of the overlaps beyond `allowed` without adding speed.
 template <class Weights>
 [[gnu::always_inline]] inline void recover_overlaps(const ContactPack& pack, Substep& step, const Weights& weights,
                                                     const Doubles& part, const Doubles& allowed)

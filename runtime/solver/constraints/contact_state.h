@@ -1,5 +1,4 @@
-// The state of contacts (points/state_archive.h): pairs with their impulses, loads on shapes, and what sleepers fell
-// asleep under.
+// Serialization of contacts (points/state_archive.h): pairs with their impulses, loads on shapes, and sleep records.
 #pragma once
 
 #include "runtime/points/state_archive.h"

@@ -21,24 +21,25 @@
 namespace rapid {
 namespace {
 
-// The part of an overlap that is taken away in a sub-step; less of one with a sleeper: of two sleepers that hold a
-// point between them neither gives way, and it would be pushed to and fro.
+// The fraction of an overlap that is removed in a substep. It is smaller for overlaps with a sleeper: two sleepers
+// that hold a point between them do not give way, so the point would be pushed back and forth.
 constexpr double overlap_recovery = 0.8, overlap_recovery_asleep = 0.1;
 
-// One sweep leaves a few overlaps much deeper than the rest. Those beyond this part of the smaller radius are recovered
-// by so many more sweeps, forwards and backwards, which costs little as they are few. Contacts that have had an overlap
-// beyond this part of the sum of the radii are looked at again.
+// One sweep leaves a few overlaps much deeper than the rest. Those above deep_overlap, relative to the smaller radius,
+// are recovered by additional sweeps, forwards and backwards, at little cost because they are few. The candidates are
+// contacts with an overlap above deep_part_of_reach, relative to the sum of the radii.
 constexpr double deep_overlap = 0.02, deep_part_of_reach = 0.005;
 constexpr int deep_sweeps = 2;  // even: forces are recorded in the order of the first sweep
 
-// With 1.5 columns of grain overlap even less, but their grains are off the converged path by twice as far.
-// Where points may sleep it is left out: piles would take longer to come to rest.
+// With 1.5, columns of grain overlap even less, but the error of their grains' paths doubles. Not applied if points
+// may sleep, because piles would take longer to come to rest.
 constexpr double over_relaxation = 1.2;
 
-// Of their distance: as far as impulses that are carried over part points of one island of rods.
+// The largest distance by which carried impulses may separate points of one island of rods, relative to their
+// distance.
 constexpr double most_parted = 0.25;
 
-// Points in one place are parted in some direction, each pair in another.
+// Separates coincident points along a pseudo-random direction that differs between pairs.
 Vec3d arbitrary_direction(std::uint32_t i, std::uint32_t j)
 {
     const std::uint32_t mixed = (i * 0x9e3779b9u) ^ (j * 0x85ebca6bu);
@@ -55,7 +56,7 @@ Vectors<Doubles> directions(const Vectors<Doubles>& d, const ContactPack& pack)
     return n;
 }
 
-// Whether each of these points is in a grid whose radius is at least its own, or in none.
+// Returns true if every point is assigned to a grid at least as large as its radius, or to no grid.
 bool are_of(const RadiusGrids& all, std::span<const float> radius)
 {
     const auto& [grids, of, error, excess] = all;
@@ -85,7 +86,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
 
     const Strided<std::int64_t> id = points.id().read();
     const bool same_points = ids_.size() == points.size() && std::equal(ids_.begin(), ids_.end(), id.data);
-    std::vector<std::uint32_t> index(ids_.size());  // where the points of the frame before are now
+    std::vector<std::uint32_t> index(ids_.size());  // current indices of the points of the previous frame
     std::iota(index.begin(), index.end(), 0u);
     if (!same_points) {
         const IdIndex by_id(points.id());
@@ -101,7 +102,7 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
     if (!same_points) renumber(points.id(), index);
 }
 
-// A list that is stale is made anew before it is used, and its blocks with it.
+// Stale lists are not checked: they and their blocks are rebuilt before use.
 bool Contacts::is_consistent() const
 {
     const std::size_t points = ids_.size(), pairs = impulses_.pairs.size();
@@ -162,7 +163,7 @@ void Contacts::follow_strays(const Substep& step)
     search_seconds_ += stopwatch.seconds();
 }
 
-// Before pairs change, from one of them on.
+// Is called before the pairs from index `from` on change.
 void Contacts::note_hits(std::size_t from)
 {
     for (std::size_t k = from; k < hit_.size(); ++k)
@@ -179,7 +180,7 @@ void Contacts::measure_reaches(std::size_t from)
     });
 }
 
-// Forwards and backwards by turns: always in the same order, what a sweep leaves undone would add up on one side.
+// Alternates the direction: a fixed order would accumulate the sweeps' remaining error on one side.
 template <class F>
 void Contacts::sweep(const F& f)
 {
@@ -225,7 +226,7 @@ void Contacts::update_contacts(Substep& step)
     if (sleep_.wake_by_impact(packs_, impulses_, material_, step)) find_contacts(step);
 }
 
-// An impact moves points into others that were not near: once none is left, contacts are found again.
+// An impact may move points into others that were not near. After the last one, contacts are therefore searched again.
 bool Contacts::solve_impacts(Substep& step, std::uint32_t sweep)
 {
     bool hit = sweep_impacts(step, sweep, sweep - 1);
@@ -237,7 +238,7 @@ bool Contacts::solve_impacts(Substep& step, std::uint32_t sweep)
     return hit;
 }
 
-// Of the points that were hit in sweep `since` or later, 0 for all.
+// Sweeps over points that were hit in sweep `since` or later; 0 for all.
 bool Contacts::sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t since)
 {
     const double at_rest = resting_speed(step);
@@ -256,14 +257,14 @@ bool Contacts::sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t 
     return hit;
 }
 
-// Pairs that touch where their free motion ends, or have pressed each other until now.
+// Finds pairs that touch at the end of their free motion, or were under pressure until now.
 void Contacts::find_contacts(const Substep& step)
 {
     packs_.begin(step.size());
     blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
         thread_local OfThread<std::vector<std::uint32_t>> kept;
         std::vector<std::uint32_t>& near = *kept;
-        const auto found = static_cast<std::ptrdiff_t>(find_near(b, step, near));  // first: it makes room
+        const auto found = static_cast<std::ptrdiff_t>(find_near(b, step, near));  // first: it resizes `near`
         const auto last = near.begin() + found;
         const auto end = std::remove_if(near.begin(), last, [&](std::uint32_t k) { return !may_touch(k, step); });
         packs_.pack(b, {near.begin(), end}, impulses_.pairs);
@@ -271,7 +272,7 @@ void Contacts::find_contacts(const Substep& step)
     });
 }
 
-// Lists the near pairs of a block, without a branch: that would be mispredicted for every other pair.
+// Lists the near pairs of a block without a branch, which would be mispredicted for every other pair.
 std::size_t Contacts::find_near(std::size_t block, const Substep& step, std::vector<std::uint32_t>& near) const
 {
     const std::uint32_t first = blocks_.begin(block), last = blocks_.end(block);
@@ -297,13 +298,13 @@ std::size_t Contacts::find_near(std::size_t block, const Substep& step, std::vec
     return found;
 }
 
-// Whether a pair that is near is a contact.
+// Returns true if a near pair is a contact.
 bool Contacts::may_touch(std::uint32_t pair, const Substep& step) const
 {
     const auto [i, j] = impulses_.pairs[pair];
     if (!step.lives(i) || !step.lives(j)) return false;
     if (step.points[i].w + step.points[j].w > 0) return true;
-    // A point of infinite mass that moves wakes a sleeper that it touches.
+    // A moving point of infinite mass wakes a sleeper that it touches.
     if (step.v[i] != step.v[j]) sleep_.wake_both(i, j);
     return false;
 }
@@ -336,7 +337,7 @@ void Contacts::begin(ContactPack& pack, const Substep& step) const
     const Vectors<Doubles> d = a.P - b.P, u = gather(step.v, pack.i) - gather(step.v, pack.j);
     for (std::uint32_t l = 0; l < lanes; ++l) {
         pack.restitution[l] = std::max(material_.restitution[pack.i[l]], material_.restitution[pack.j[l]]);
-        // What impacts have left in one another, and parting, is parted by no impulse.
+        // No impulse separates pairs that impacts have left overlapping but separating.
         if (pack.restitution[l] > 0 && d[l].dot(u[l]) >= 0)
             pack.initial_gap[l] = std::min(pack.initial_gap[l], static_cast<float>(d[l].norm() - reach[l]));
     }
@@ -344,7 +345,7 @@ void Contacts::begin(ContactPack& pack, const Substep& step) const
 
 void Contacts::warm_start(Substep& step)
 {
-    if (impacts_moved_) find_contacts(step);  // some impacts are left
+    if (impacts_moved_) find_contacts(step);  // some impacts are unsolved
     const auto each_point = [&](const auto& f) {
         for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) f(i);
@@ -359,8 +360,8 @@ void Contacts::warm_start(Substep& step)
     if (material_.turns()) sweep([&](const ContactPack& pack) { start_spins(pack, step, impulses_.rolling); });
 }
 
-// Contacts that contradict rods are held by these in each sub-step, and never satisfied: their impulses would add up,
-// and throw the points farther than rods can find back from.
+// Limits carried impulses within an island of rods. Rods keep contacts that contradict them unsatisfied in each
+// substep, so the impulses would accumulate and throw the points too far for the rods to recover.
 void Contacts::limit_carried(ContactPack& pack, const Substep& step) const
 {
     for (std::uint32_t l = 0; l < pack.count; ++l) {
@@ -403,8 +404,8 @@ void Contacts::solve_velocities(Substep& step)
             sweep([&](ContactPack& pack) { solve_pack(pack, step, weights, none, impact_speed); });
         }
         backwards_ = !backwards_;
-        // Not where light points between heavy ones and a shape would be pushed to and fro; nor, as over-relaxation,
-        // where points may sleep: some piles would not come to rest.
+        // Skipped if light points between heavy ones and a shape would be pushed back and forth. Also skipped, like
+        // over-relaxation, if points may sleep, because some piles would not come to rest.
         const bool recovers_deep = !heavy_.any() && !sleep_.sleep();
         deep_.resize(std::max(deep_.size(), blocks_.size()));
         blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
@@ -467,7 +468,7 @@ void Contacts::add_forces(const Substep& step)
     sweep([&](const ContactPack& pack) { add_pack_forces(pack, step); });
 }
 
-// Friction is the same throughout the sub-step: its work is along the way that the points slip.
+// Friction is constant throughout the substep, so its work is along the slip of the points.
 void Contacts::add_pack_forces(const ContactPack& pack, const Substep& step)
 {
     ContactForces& forces = *step.forces;
@@ -518,7 +519,7 @@ Residual Contacts::close(Substep& step)
     });
     if (sleep_.sleep()) {
         sleep_.report(packs_, impulses_, material_, step);
-        // Pairs that sleep are in no pack.
+        // Sleeping pairs are in no pack.
         for (std::uint32_t k = 0; k < impulses_.pairs.size(); ++k) {
             const auto [i, j] = impulses_.pairs[k];
             if (sleep_.both_asleep(i, j)) count(i, j, material_.reach(i, j), k);

@@ -1,14 +1,13 @@
-// Contacts between points: spheres that keep each other out, with friction and restitution (paper §5.1; Macklin et al.
-// 2014).
+// Contacts between points: non-penetrating spheres with friction and restitution (paper §5.1; Macklin et al. 2014).
 //
 //   C = |P_i - P_j| - (r_i + r_j) >= 0
 //
-// Gauss-Seidel begins with the impulses of the sub-step before, normal and tangential, so that sweeps have to find
-// changes only. A pile at rest is then solved before it is iterated, by one sweep a sub-step, however high it is;
-// without warm starting it would sink by 2 N g dt².
+// Gauss-Seidel starts with the normal and tangential impulses of the previous substep, so its sweeps only have to find
+// changes. A pile at rest is then already solved, and one sweep per substep suffices at any height; without warm
+// starting it would sink by 2 N g dt².
 //
-// An overlap that was there at the sub-step's beginning is not to be made deeper; it is recovered without giving speed.
-// So points that are born in one another part, and do not fly.
+// An overlap that exists at the beginning of a substep must not become deeper. It is recovered without adding speed,
+// so overlapping newborn points separate gently.
 #pragma once
 
 #include <cstdint>
@@ -32,13 +31,13 @@ namespace rapid {
 
 class Contacts : public Coupling, public CarriedImpulses {
 public:
-    // Before a frame; impulses are kept by the ids of points. Error: see ContactMaterial.
+    // Is called before a frame. Impulses are matched by the points' ids. Throws as ContactMaterial does.
     void follow(const PointSet& points, const ContactOptions& options, const std::string& group);
 
     void join(Sleep* sleep) override;
     bool bounces() const override { return material_.bounces; }
     const ContactMaterial* turns() const override { return material_.turns() ? &material_ : nullptr; }
-    bool only_dissipates() const override { return !material_.turns(); }  // but for mass scaling, whose gain is told
+    bool only_dissipates() const override { return !material_.turns(); }  // except by mass scaling
     bool keeps_momentum() const override { return !scaling_.is_set(); }
     std::span<const float> recorded() const override;
     void link(EnergyIslands& islands) const override;
@@ -52,7 +51,7 @@ public:
     void correct_penetration(Substep& step) override;
     Residual close(Substep& step) override;
 
-    // All that the search of the last frame has found, as the next may do without one.
+    // Stores all results of the last frame's search, because the next frame may reuse them.
     template <class Archive>
     void serialize(Archive& keep)
     {
@@ -64,7 +63,7 @@ public:
     }
 
 private:
-    // Of a snapshot: whether all indices are of what is there.
+    // Returns true if all indices of a loaded snapshot are in range.
     bool is_consistent() const;
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
     void search(const Substep& step);
@@ -96,24 +95,24 @@ private:
     NeighbourList list_;
     StrayPairs strays_;
     PairBlocks blocks_;
-    PairImpulses impulses_, previous_;  // in the order of the blocks; and of the list before
-    // Of each pair, whether an impact has hit it in this sub-step; and those of the lists before that it has hit.
+    PairImpulses impulses_, previous_;  // in the order of the blocks; and of the previous list
+    // Marks pairs hit by an impact in this substep. hit_before_ has the hit pairs of earlier lists.
     std::vector<std::uint8_t> hit_;
     std::vector<ContactPair> hit_before_;
-    std::vector<float> reach_;  // m, of each pair; padded for whole packs
+    std::vector<float> reach_;  // m, by pair; padded for whole packs
     ContactPacks packs_;
-    std::vector<std::vector<const ContactPack*>> deep_;  // by block, those with an overlap that a sweep leaves deep
+    std::vector<std::vector<const ContactPack*>> deep_;  // by block: overlaps that stay deep after a sweep
     MassScaling scaling_;
     HeavyContacts heavy_;
     ContactSleep sleep_;
 
     bool begins_frame_ = true, list_is_stale_ = true, backwards_ = false;
-    bool impacts_moved_ = false;            // points, since their contacts were found
-    double per_dt_ = 0;                     // 1/s, of the last sub-step
+    bool impacts_moved_ = false;            // impacts moved points after their contacts were found
+    double per_dt_ = 0;                     // 1/s, in the last substep
     double search_seconds_ = 0;             // in this frame
     std::vector<Vec3d> before_;             // positions before the warm start
-    std::span<const std::uint32_t> rods_;   // by point, the island that rods link it to; empty where there are none
-    std::vector<std::uint32_t> disturbed_;  // points that are changed, or have lost a neighbour that pressed them
+    std::span<const std::uint32_t> rods_;   // by point: its island of rods; empty if there are no rods
+    std::vector<std::uint32_t> disturbed_;  // points that changed, or that lost a neighbour pressing on them
 };
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Union-find over points; the least point of a set stands for it.
+// Union-find over points; the lowest index of a set is its root.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ public:
         while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
         return i;
     }
-    // False where both are in one set already.
+    // Joins two sets. Returns false if the points are already in one set.
     bool join(std::uint32_t i, std::uint32_t j)
     {
         i = root(i), j = root(j);

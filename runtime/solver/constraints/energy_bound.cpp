@@ -10,10 +10,10 @@
 namespace rapid {
 namespace {
 
-// Differences of energies are rounding below this part of them.
+// Relative difference below which energies are equal within rounding.
 constexpr double energy_rounding = 1e-12;
 
-// Rods and springs that leave a gain above this part of the energy available have found no solution.
+// A gain above this fraction of the available energy means that rods and springs have found no solution.
 constexpr double largest_gain = 0.5;
 
 template <class F>
@@ -25,7 +25,8 @@ void for_each_moving(const Substep& step, const F& f)
     });
 }
 
-// The largest t in [0, 1] with slope t + curvature t² + change <= 0; where there is none, that of the least.
+// Returns the largest t in [0, 1] with slope t + curvature t² + change <= 0 or, if none exists, the t with the
+// smallest value.
 double largest_part(double slope, double curvature, double change)
 {
     const double root2 = slope * slope - 4 * curvature * change;
@@ -34,8 +35,8 @@ double largest_part(double slope, double curvature, double change)
     return std::clamp((-slope + std::sqrt(root2)) / (2 * curvature), 0.0, 1.0);
 }
 
-// J: an upper bound of what forces can give a point in a sub-step, by acceleration from rest or from where it is drawn
-// to.
+// Returns an upper bound, J, of the energy that forces can give a point in a substep, accelerating it from rest or
+// towards the spring's center.
 double available_work(const Substep& step, std::size_t i, const Vec3d& P)
 {
     const bool own = !step.mobility.empty();
@@ -48,11 +49,11 @@ double available_work(const Substep& step, std::size_t i, const Vec3d& P)
 
 }  // namespace
 
-// A point that does not move separates those that are linked to it, as a wall does, and drives them.
+// A point that does not move separates the points linked to it, like a wall, and drives them.
 void EnergyIslands::link(std::span<const std::uint32_t> points)
 {
     const auto moves = [&](std::uint32_t i) { return step_.points[i].w > 0; };
-    // As sleepers do, whatever velocity they have fallen asleep with.
+    // Sleepers rest, whatever velocity they fell asleep with.
     const auto rests = [&](std::uint32_t i) { return step_.points[i].P == step_.start[i]; };
     const auto v_before = [&](std::uint32_t i) {
         const bool is_carried = !step_.carried_v.empty() && !step_.carried_v[i].isZero(0);
@@ -156,7 +157,7 @@ void EnergyBound::add(const Substep& step, std::uint32_t i, Island& island) cons
     add_turning(step, i, island);
 }
 
-// The same as it is seen from the frame of what drives it.
+// Adds the same as seen from the frame of its driver.
 void EnergyBound::add_seen(const Substep& step, std::uint32_t i, const EnergyIslands::Driven& by, Island& island) const
 {
     const Vec3d change = step.v[i] - v_[i], seen = v_[i] - by.mean.v, moved = step.points[i].P - P_[i];
@@ -249,7 +250,7 @@ void EnergyBound::move_stalled(Substep& step, EnergyIslands& islands, const Rigi
     }
 }
 
-// What drives them may have moved what it holds by a jump, and stretched rows that this restores.
+// The driver may have moved the held points by a jump and stretched rows, which restores that energy.
 ContactEnergy EnergyBound::stalled_change(EnergyIslands& islands)
 {
     std::map<std::uint32_t, double> changes;

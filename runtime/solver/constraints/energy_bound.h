@@ -1,26 +1,26 @@
-// The bound on energy: what constraints do to points in a sub-step gives them none.
+// The energy bound: constraints add no energy to points in a substep.
 //
-// Rows that have not converged, warm starts that do not fit any more and corrections of positions may each leave an
-// island of points with more than it had. From the velocities before (v) and after (v'), with the potential energy ΔU
-// that the points' places have gained meanwhile,
+// Unconverged rows, outdated warm starts and position corrections may each leave an island of points with more energy
+// than it had. With the velocities before (v) and after (v'), and the increase ΔU in the potential energy of the
+// points' positions, the bound sets the velocities to
 //
 //   v + t (v' - v),   0 <= t <= 1 the largest for which   Σ m |.|²/2 - Σ m |v|²/2 + ΔU <= 0
 //
-// which keeps momentum, as all points of the island take the same t. Where no t suffices, as corrections of positions
-// have lifted a point or stretched a spring, the one that gives least is taken, and the rest is told. Rods and springs
-// whose rest is of the size of the energy that there was have found no solution: their island moves as a rigid body
-// (rigid_fallback.h), and is told.
+// This conserves momentum, because all points of the island share t. If no t suffices, because position corrections
+// lifted a point or stretched a spring, the t with the least gain is taken and the rest is reported. Rods and springs
+// have found no solution if that rest is of the order of the initial energy. Their island then moves as a rigid body
+// (rigid_fallback.h), and this is reported.
 //
-// What moves by itself, as pins and shapes do, gives energy. Seen from the frame that goes along with it, at V with the
-// acceleration A, it gives none: there the same holds of Σ m |v - V|²/2, and of U + Σ m A·P. Where an island has
-// several drivers, V is their mean, and what they may give besides is what a wall at the greatest difference from it
-// would,
+// Drivers such as pins and shapes move by themselves and supply energy. They supply none in the frame that moves along
+// with them, at V with the acceleration A: there, the same bound holds for Σ m |v - V|²/2 and U + Σ m A·P. If an
+// island has several drivers, V is their mean, and their additional supply is bounded by that of a wall at the largest
+// difference from V,
 //
 //   Σ 2 m s (|v - V| + s),   s = max |V_k - V|
 //
-// Drag and springs to places are at rest in the world, and give points that they hold back otherwise than in their free
-// motion the energy |V| times the difference of their impulses at most; springs to surfaces that of their velocity from
-// V.
+// Drag and springs to fixed positions are at rest in the world. If they hold points back differently than in free
+// motion, they supply at most |V| times the difference of their impulses. For springs to surfaces, use the surface's
+// velocity relative to V.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@
 
 namespace rapid {
 
-// J: of the forces that draw a point, where these do not depend on its velocity.
+// Returns the potential energy of the velocity-independent forces on a point, J.
 inline double potential_energy(const Substep& step, std::size_t i, const Vec3d& P)
 {
     if (step.mobility.empty()) return -step.acceleration.dot(P) / step.inverse_mass[i];
@@ -47,7 +47,7 @@ inline double potential_energy(const Substep& step, std::size_t i, const Vec3d& 
     return energy / step.inverse_mass[i];
 }
 
-// What drives points: its velocity at the end of the sub-step, m/s, and its way in it, m, jumps aside.
+// Motion of a driver: its velocity at the end of the substep, m/s, and its path in it, m, without jumps.
 struct Drive {
     Vec3d v = Vec3d::Zero(), way = Vec3d::Zero();
 
@@ -56,39 +56,39 @@ struct Drive {
     Vec3d acceleration(double dt) const { return 2 / (dt * dt) * (dt * v - way); }
 };
 
-// The points that rows link in a sub-step; and what they are linked to that no row moves, at rest or not.
+// Islands of points linked by rows in a substep, with the moving or resting drivers that they are linked to.
 class EnergyIslands {
 public:
     explicit EnergyIslands(const Substep& step) : sets_(step.size()), step_(step) {}
 
     void link(std::span<const std::uint32_t> points);
-    // rolling: m/s, what turns a point gives its surface besides.
+    // rolling: m/s, the additional surface speed of a turning point.
     void drive(std::uint32_t i, const Drive& by, double rolling = 0) { drivers_.push_back({i, none, by, rolling}); }
-    // How a point goes that no row moves, where not at its velocity throughout.
+    // Sets the motion of a point that no row moves, if it is not uniform.
     void move(std::uint32_t i, const Drive& by)
     {
         kinematic_.resize(step_.size());
         kinematic_[i] = by;
     }
-    // Once all are linked.
+    // Closes the islands after all points are linked.
     void close();
 
     struct Driven {
         Drive mean;
-        double spread = 0;          // m/s, of the drivers about it
-        std::uint32_t drivers = 0;  // 0: none; nothing holds the island, either
-        bool moves = false;         // one of them does
+        double spread = 0;          // m/s, of the drivers around the mean
+        std::uint32_t drivers = 0;  // 0: nothing drives or holds the island
+        bool moves = false;         // one of the drivers moves
     };
 
     std::uint32_t root(std::uint32_t i) { return sets_.root(i); }
-    // Of the island of a root.
+    // Returns the drivers of the island with this root.
     const Driven& driven(std::uint32_t root) const { return driven_[root]; }
     bool any_moves() const { return any_moves_; }
 
 private:
     static constexpr std::uint32_t none = ~0u;
     struct Driver {
-        std::uint32_t i, point;  // of the island; that drives it, or none
+        std::uint32_t i, point;  // a point of the island; its driver, or none
         Drive by;
         double rolling;
     };
@@ -96,15 +96,15 @@ private:
     DisjointSets sets_;
     const Substep& step_;
     std::vector<Driver> drivers_;
-    std::vector<std::optional<Drive>> kinematic_;  // by point; empty where none is told
+    std::vector<std::optional<Drive>> kinematic_;  // by point; empty if none was set
     std::vector<Driven> driven_;
     bool any_moves_ = false;
 };
 
 class EnergyBound {
 public:
-    // What the points have now. add_stored(sign, energy): adds what rows store, times the sign, to the points'
-    // energies.
+    // Records the initial state. add_stored(sign, energy) adds the energy stored in rows, times the sign, to the
+    // points' energies.
     template <class F>
     void begin(const Substep& step, const F& add_stored)
     {
@@ -112,19 +112,21 @@ public:
         add_stored(1.0, std::span<double>(stored_));
         for (std::size_t i = 0; i < stored_.size(); ++i) change_[i] -= stored_[i];
     }
-    // J: what rows store at first, seen from what drives them, where that differs. Valid once it has begun.
+    // Returns, for filling, the energy stored in rows at first as seen from their drivers, J, if it differs. Valid
+    // after begin().
     std::span<double> stored_in_frame()
     {
         stored_in_frame_.assign(stored_.size(), 0.0);
         return stored_in_frame_;
     }
-    // J, where drag and springs act: by how much the points had more at the beginning of the sub-step. They may have it
-    // back, as what acts against their motion leaves drag less to take. Rows are to be added. Once it is closed: what
-    // islands could have had back, at one of their points; changes are told without it.
+    // Returns, J, how much more energy points had at the beginning of the substep while drag and springs act. Points
+    // may regain it, because a force against their motion leaves drag less to take. Callers add the rows' part. After
+    // close(), it holds at one point of each island the energy that the island could have regained; reported changes
+    // exclude it.
     std::span<double> credit() { return credit_; }
-    // J: what islands that something drives have gained, or lost, when it was last closed.
+    // Returns the energy that driven islands gained or lost in the last close(), J.
     double driven() const { return driven_; }
-    // What all points have gained or lost together.
+    // Returns the total gain or loss of all points.
     template <class F>
     ContactEnergy measure(const Substep& step, const F& add_stored)
     {
@@ -132,8 +134,8 @@ public:
         add_stored(1.0, std::span<double>(change_));
         return change(step);
     }
-    // Limits the velocities. link(islands): links the points that rows link. fallback: where rods and springs have
-    // acted; stalled() then has the points that it has moved. Returns what all have gained or lost.
+    // Limits the velocities. link(islands) links the points that rows link. fallback: not null if rods and springs
+    // acted; stalled() then marks the points that it moved. Returns the total gain or loss.
     template <class F, class G>
     ContactEnergy close(Substep& step, const F& add_stored, const G& link, const RigidFallback* fallback)
     {
@@ -148,17 +150,17 @@ public:
         add_stored(1.0, std::span<double>(change_));
         return energy += stalled_change(islands);
     }
-    // By point: whether its island had no solution; empty where none has stalled.
+    // Marks by point whether its island had no solution; empty if none stalled.
     std::span<const std::uint8_t> stalled() const { return stalled_; }
 
 private:
     struct Island {
-        double slope = 0, curvature = 0;  // J: of the kinetic energy by t, at t = 0
+        double slope = 0, curvature = 0;  // J: coefficients of the kinetic energy in t, from t = 0
         double change = 0;                // J, of the potential energy
-        double credit = 0;                // J, what drag has taken
-        double size = 0;                  // J: of what these are differences
-        double available = 0;             // J, in motion, in rows, and what forces can give in the sub-step
-        double given = 0;                 // J: what drivers, drag and springs to places give at most, in the frame
+        double credit = 0;                // J, taken by drag
+        double size = 0;                  // J: magnitude of the terms, which cancel
+        double available = 0;             // J: kinetic, stored in rows, and the most that forces can supply
+        double given = 0;                 // J: bound on the supply of drivers, drag and springs, in the frame
         double part = 1;                  // t
         bool stalled = false;
 
@@ -173,20 +175,20 @@ private:
     void add(const Substep& step, std::uint32_t i, Island& island) const;
     void add_seen(const Substep& step, std::uint32_t i, const EnergyIslands::Driven& by, Island& island) const;
     void add_turning(const Substep& step, std::uint32_t i, Island& island) const;
-    // Moves stalled islands; change_ then has what their points have gained, without rows.
+    // Moves stalled islands. change_ then holds their points' gain, without rows.
     void move_stalled(Substep& step, EnergyIslands& islands, const RigidFallback& fallback);
     ContactEnergy stalled_change(EnergyIslands& islands);
 
-    std::vector<Vec3d> v_;        // m/s, before
-    std::vector<Vec3d> P_;        // m, before
-    std::vector<Vec3d> s_;        // m/s, of spins; empty where there are none
-    std::vector<double> change_;  // J, of the potential energy of each point and of the rows that are counted with it
-    std::vector<double> stored_;  // J, in rows at first
-    std::vector<double> stored_in_frame_;  // J; empty where that is the same
+    std::vector<Vec3d> v_;                 // m/s, before
+    std::vector<Vec3d> P_;                 // m, before
+    std::vector<Vec3d> s_;                 // m/s, of spins; empty if there are none
+    std::vector<double> change_;           // J: potential energy of each point and of the rows counted with it
+    std::vector<double> stored_;           // J, initially in rows
+    std::vector<double> stored_in_frame_;  // J; empty if equal to stored_
     std::vector<double> credit_;           // J
     double driven_ = 0;                    // J
     std::vector<std::uint8_t> stalled_;
-    std::vector<Island> islands_, seen_;  // in the world; from drivers that move, empty where none does
+    std::vector<Island> islands_, seen_;  // in the world; relative to moving drivers, empty if there are none
 };
 
 }  // namespace rapid

@@ -6,7 +6,7 @@
 
 namespace rapid {
 
-// The rows at each point, and what a traversal has visited.
+// The rows at each point, and the state of the traversal.
 struct Forest::Incidence {
     std::vector<std::uint32_t> begin, end, row;  // row[begin[i]] to row[end[i]] are those at i
     std::vector<std::uint8_t> visited;
@@ -17,7 +17,7 @@ Forest::Forest(std::span<const std::uint32_t> ends, std::size_t size, std::span<
 {
     const std::size_t rows = ends.size() / 2;
     DisjointSets components(size);
-    std::vector<std::uint32_t> closing;  // a point of each row that closes a cycle
+    std::vector<std::uint32_t> closing;  // one point of each row that closes a cycle
     for (std::uint32_t r = 0; r < rows; ++r)
         if (!components.join(ends[2 * r], ends[2 * r + 1])) closing.push_back(ends[2 * r]);
     std::vector<std::uint8_t> cyclic(size);
@@ -44,7 +44,7 @@ Forest::Forest(std::span<const std::uint32_t> ends, std::size_t size, std::span<
     for (std::uint32_t i = 0; i < size; ++i) grow(i, ends, incidence);
 }
 
-// Adds the tree of this root, breadth first.
+// Adds the tree with this root, breadth first.
 void Forest::grow(std::uint32_t root, std::span<const std::uint32_t> ends, Incidence& at)
 {
     if (at.visited[root] || at.begin[root] == at.end[root]) return;

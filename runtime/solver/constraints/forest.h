@@ -1,4 +1,4 @@
-// Rows over two points each that form trees: chains, ropes, branches. These are solved directly (tree_solver.h).
+// Rows over two points that form trees (chains, ropes, branches) and are solved directly (tree_solver.h).
 #pragma once
 
 #include <cstdint>
@@ -19,20 +19,20 @@ public:
 
         // For the solution of the tree (tree_solver.h).
         Vec3d gradient, gradient_above;  // of the residual, by the child's and the parent's position
-        double e, s;                     // residual and compliance; then with those of what is joined already
+        double e, s;                     // residual and compliance; after elimination, including the subtree's
         double lambda;                   // multiplier
         Vec3d shift;                     // of the child
-        Vec3d reach;                     // shift of the parent by the link's impulse
-        Eigen::Matrix3d mobility;        // of the child with its subtree
+        Vec3d reach;                     // shift of the parent due to the link's impulse
+        Eigen::Matrix3d mobility;        // of the child including its subtree
     };
 
-    // ends: two points a row. fixed: 1 for points of infinite mass; where a tree has one it is rooted there. Rows of a
-    // component with a cycle are in no tree.
+    // Builds the trees. ends: two points per row. fixed: 1 for points of infinite mass; a tree that contains one is
+    // rooted there. Rows of a component with a cycle are in no tree.
     Forest(std::span<const std::uint32_t> ends, std::size_t size, std::span<const std::uint8_t> fixed);
     Forest() = default;
 
-    std::vector<Link> links;              // tree by tree; parents come before their children
-    std::vector<std::uint32_t> begin;     // of each tree, and the end of the last
+    std::vector<Link> links;              // tree by tree; parents precede their children
+    std::vector<std::uint32_t> begin;     // index of each tree's first link, then the end of the last
     std::vector<std::uint32_t> leftover;  // rows in no tree
 
 private:

@@ -7,7 +7,7 @@ namespace rapid {
 
 GraphColouring::GraphColouring(std::span<const std::uint32_t> points, std::size_t arity, std::size_t size)
 {
-    constexpr std::size_t most = 64;  // bits of a word; what is left over are the rows of hubs
+    constexpr std::size_t most = 64;  // bits of a word; only rows of hubs are left over
     const std::size_t rows = points.size() / arity;
     std::vector<std::uint64_t> taken(size);
     std::vector<std::uint8_t> colour(rows);

@@ -8,13 +8,13 @@
 namespace rapid {
 namespace {
 
-// An overlap that is corrected, as a part of the smaller radius.
+// Overlap above which a contact is corrected, relative to the smaller radius.
 constexpr double too_deep = 0.05;
 
-// An overlap of which a sub-step leaves more than this part, where four fifths are to be recovered, is stuck.
+// An overlap is stuck if a substep leaves more than this fraction of it; four fifths should have been recovered.
 constexpr double stuck = 0.9;
 
-// Ratio of masses above which iterations are too few.
+// Mass ratio above which the iterations do not suffice.
 constexpr double uneven = 2;
 
 void pass_on(Substep& step, std::uint32_t from, std::uint32_t to)
@@ -44,10 +44,10 @@ void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
     }
 }
 
-// The lighter one is a wall where it is better supported; or where the heavy one wedges it against its support: what
-// parts them then moves the light one, and that is put back. Of the heavy one's velocity, as seen from what supports
-// the lighter, what is its own into that is taken off; a light one that is squeezed out, or thrown, does not give it
-// more than weight takes, which is what a shape that lifts both has to.
+// The lighter point is a wall if it is better supported, or if the heavy one wedges it against its support. The heavy
+// point also loses its velocity into the lighter one: at most its own velocity relative to the lighter one's support, or
+// the resting speed. A light point that is squeezed out or thrown thus gives it no more, and a shape that lifts both
+// still takes away the speed due to weight.
 void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
 {
     const bool first = step.points[contact.i].w < step.points[contact.j].w;  // is the heavier

@@ -1,8 +1,8 @@
 // Final penetration correction of contacts between points of very different masses.
 //
-// A heavy point on a light one that a shape bears, itself or through others, would sink into it: in a sweep the shape
-// gives back no more than the lighter weighs, and iterations would have to be as many as the ratio of the masses. What
-// is left too deep is moved out, with the lighter point as a wall.
+// A heavy point on a light one that a shape supports, directly or through others, would sink into it: in one sweep,
+// the shape returns at most the impulse of the lighter point, so the iterations needed grow with the mass ratio.
+// Remaining deep penetration is removed by moving the heavier point, with the lighter one as a wall.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ namespace rapid {
 
 class HeavyContacts {
 public:
-    // Before a frame: whether masses differ by more than iterations can do.
+    // Is called before a frame. Finds out if masses differ by more than iterations can handle.
     void begin(const Substep& step);
     bool any() const { return any_; }
 
-    // A point that presses on a supported one is supported, through one point more.
+    // Marks a point that presses on a supported one as supported, one point further away.
     static void pass_on_support(const ContactPack& pack, Substep& step);
 
     static void correct(const PairContact& contact, const ContactMaterial& material, Substep& step);

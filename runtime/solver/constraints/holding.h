@@ -1,27 +1,27 @@
-// Constraints that hold single points by springs, alike along all axes.
+// Constraints that hold single points by isotropic springs.
 //
-// To an impulse p of contacts, shapes and rods a spring of softness s (Row::keep) gives way by
+// Under an impulse p from contacts, shapes or rods, a spring of softness s (Row::keep) yields by
 //
-//   w p dt / (1 + w/s)      as a point of the inverse mass 1/(1/w + 1/s) does
+//   w p dt / (1 + w/s)      like a point of inverse mass 1/(1/w + 1/s)
 //
-// and its point has that mass while these act. They then find at once what the spring bears: row by row, a heavy point
-// on a light one that is held would take as many iterations as the ratio of their masses.
+// and its point has that mass while these act, so they account for the spring's support at once. Row by row, a heavy
+// point on a light one that is held would take iterations in proportion to the mass ratio.
 #pragma once
 
 #include "runtime/solver/constraints/constraint.h"
 
 namespace rapid {
 
-// What a Coupling is, too, that holds points so.
+// An interface that such a Coupling also implements.
 class Holding {
 public:
     virtual ~Holding() = default;
 
-    // Before detect(): points count as heavier from here on.
+    // Is called before detect(). Makes the points count as heavier from here on.
     virtual void hold(Substep& step) = 0;
-    // After project(): springs have the forces that have come of it.
+    // Is called after project(). Updates the springs' forces with the result.
     virtual void settle(Substep& step) = 0;
-    // After solve_velocities(): points have their own masses again.
+    // Is called after solve_velocities(). Restores the points' masses.
     virtual void release(Substep& step) = 0;
 };
 

@@ -28,7 +28,7 @@ void Islands::close()
     std::vector<std::uint32_t> island(linked_.size()), count;
     for (std::uint32_t i = 0; i < linked_.size(); ++i) {
         if (!linked_[i]) continue;
-        const std::uint32_t root = sets_->root(i);  // comes before all others of its island
+        const std::uint32_t root = sets_->root(i);  // lowest index of its island
         if (root == i) island[i] = static_cast<std::uint32_t>(count.size()), count.push_back(0);
         island[i] = island[root];
         ++count[island[i]];

@@ -1,4 +1,4 @@
-// Islands: points that fall asleep and wake together, as the rows between them carry forces from one to all.
+// Islands: points that fall asleep and wake together, because rows carry forces between them.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace rapid {
 
 class Islands {
 public:
-    // weight: inverse masses; a point of infinite mass separates what is linked to it, as a wall does.
+    // weight: inverse masses. A point of infinite mass separates the points linked to it, like a wall.
     explicit Islands(std::span<const double> weight) : weight_(weight) {}
 
-    // A row acts between these points.
+    // Links points that a row acts between.
     void link(std::span<const std::uint32_t> points);
-    // This point is kinematic: it is in an island, but no row moves it.
+    // Makes a point kinematic: it belongs to an island, but no row moves it.
     void make_kinematic(std::uint32_t i);
-    // Numbers the islands, in the order of their first points.
+    // Numbers the islands in the order of their first points.
     void close();
 
     std::size_t size() const { return begin_.size() - 1; }
@@ -32,8 +32,8 @@ public:
 
 private:
     std::span<const double> weight_;
-    std::optional<DisjointSets> sets_;              // once points are linked
-    std::vector<std::uint8_t> linked_, kinematic_;  // empty where none is
+    std::optional<DisjointSets> sets_;              // set after points are linked
+    std::vector<std::uint8_t> linked_, kinematic_;  // empty if no point is
     std::vector<std::uint32_t> begin_{0}, points_;
 };
 

@@ -1,12 +1,12 @@
-// Mass scaling (Macklin et al. 2014): of two points in contact the upper one counts as lighter.
+// Mass scaling (Macklin et al. 2014): in a contact of two points, the upper one counts as lighter.
 //
-// With c = n·up, the upper point is taken as e^(k c) times lighter than the lower: in touch, as if mass fell by
-// e^(-k h / (r_i + r_j)) with the height h. Loads then do not add up. A contact bears
+// With c = n·up, the upper point counts as e^(k c) times lighter than the lower one, as if mass decreased by e^(-k h /
+// (r_i + r_j)) with the height h. Loads then do not add up. A contact carries
 //
 //   p = m g dt / (2 c sinh(k c / 2)),   as   w e^(k c / 2) c p = g dt + w e^(-k c / 2) c p
 //
-// under a stack of any height, w = 1/m. What the warm start has above that, as a fall leaves it, is not carried over:
-// released, it would throw the light ones, as a whip does its end.
+// under a stack of any height, w = 1/m. A warm-start impulse beyond that, as left by a fall, is dropped: its release
+// would throw the light points upwards, like the end of a whip.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace rapid {
 
 class MassScaling {
 public:
-    // k, at least 0.
+    // Sets k, at least 0.
     void set(double k) { k_ = k; }
     bool is_set() const { return k_ > 0; }
     void begin(const Substep& step) { active_ = k_ > 0 && !step.up.isZero(0); }
@@ -38,8 +38,8 @@ public:
         }
     }
 
-    // Calls f(weights), where weights(pack, a, b) are the inverse masses of the contacts' points. Of another type where
-    // masses are not scaled: that costs nothing.
+    // Calls f(weights), with weights(pack, a, b) the inverse masses of the contacts' points. Unscaled masses use a
+    // separate type, at no cost.
     template <class F>
     void with_weights(const F& f) const
     {
@@ -57,7 +57,7 @@ public:
 
 private:
     double k_ = 0;
-    bool active_ = false;  // in this sub-step
+    bool active_ = false;  // in this substep
 };
 
 }  // namespace rapid

@@ -12,14 +12,14 @@
 namespace rapid {
 namespace {
 
-// How far points may move before they are strays, as a part of their radius: at least, at most, and between these as
-// far as they go in so many sub-steps. More pairs to look at, or more searches.
+// Slack relative to a point's radius: lower and upper bound, and in between the distance that it moves in this many
+// substeps. A trade-off between more pairs to check and more searches.
 constexpr double least_slack = 0.25, most_slack = 0.5, slack_substeps = 3;
 
-// The part of the points that may be strays: their pairs take longer to find, one by one, and are solved on one thread.
+// The largest fraction of strays: their pairs take longer to find, one by one, and are solved on one thread.
 constexpr double most_strays = 0.02;
 
-// What a pair takes: in the search, the blocks, two sets of impulses, and packs that are full.
+// Memory per pair: the search, the blocks, two sets of impulses, and full packs.
 constexpr double bytes_a_pair = 160;
 
 }  // namespace
@@ -54,7 +54,7 @@ void NeighbourList::store_positions(const Substep& step, std::span<const float> 
     }
     const std::size_t n = step.size();
     const double widest = 2.001 * (1 + most_slack) * largest;
-    // Of some hundred pairs where all radii are alike.
+    // A block of some hundred pairs if all radii are equal.
     edge_ = std::max(widest + largest, 8.0 * least);
     far_ = edge_ - widest;
     at_.resize(n);
@@ -69,7 +69,7 @@ void NeighbourList::store_positions(const Substep& step, std::span<const float> 
     });
 }
 
-// Which points are in each block, and which blocks are neighbours.
+// Assigns points to blocks, and finds neighbouring blocks.
 void NeighbourList::cut_blocks(std::span<const float> radius)
 {
     const auto key = [](std::int64_t i, std::int64_t j, std::int64_t k) {
@@ -109,7 +109,7 @@ void NeighbourList::cut_blocks(std::span<const float> radius)
                 }
 }
 
-// displacement(i): m, of a point.
+// displacement(i): of a point, m.
 template <class F>
 void NeighbourList::move_frames(const F& displacement)
 {
@@ -133,7 +133,7 @@ void NeighbourList::move_frames(const F& displacement)
 void NeighbourList::choose_slack(const Substep& step, std::span<const float> radius)
 {
     const std::size_t n = step.size();
-    // m, by which a point leaves its frame in a sub-step, or its neighbours' frames leave it.
+    // Returns the distance, m, by which a point leaves its frame, or its neighbours' frames leave it, in a substep.
     const auto leaves = [&](std::size_t i) {
         const Frame& frame = frames_[block_of_[i]];
         return (step.dt * step.v[i] - frame.shift).norm() + frame.parting;

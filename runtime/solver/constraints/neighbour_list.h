@@ -1,17 +1,18 @@
-// A Verlet list: the pairs of points that may touch, with some slack, and for which points it is still valid.
+// A Verlet list: pairs of points that may touch, within some slack, and the points for which it is still valid.
 //
-// A pair is listed that is nearer than the points' reaches, each a radius and a slack. Others cannot touch as long as
-// no two points have approached by more than their slacks. A common motion does not count, and neighbours mostly move
-// together, in a fall as in a slide: so displacements are measured in frames that move with blocks of space. With c the
-// mean displacement of a block's points, and x a point's displacement from that, a point is a stray once
+// A pair is listed if it is closer than the points' reaches, each a radius plus a slack. Other pairs cannot touch
+// unless two points approach by more than their slacks. A common motion does not matter, and neighbours mostly move
+// together, both in a fall and in a slide. Displacements are therefore measured in frames that move with blocks of
+// space. With c the mean displacement of a block's points, and x a point's displacement relative to it, a point is a
+// stray once
 //
 //   |x| + max |c_a - c_b|/2 > slack      over the neighbouring blocks b of its block a
 //
-// The list holds all pairs that may touch of which neither is a stray, as long as blocks that are no neighbours have
+// The list holds all pairs that may touch and contain no stray, as long as blocks that are not neighbours satisfy
 //
-//   |c_a - c_b| <= edge - 2 reach        as they are a block apart
+//   |c_a - c_b| <= edge - 2 reach        because they are a block apart
 //
-// Those of strays are found apart (stray_pairs.h): a few fast points do not cost a search of all.
+// Pairs with strays are found separately (stray_pairs.h), so a few fast points do not force a full search.
 #pragma once
 
 #include <array>
@@ -26,20 +27,21 @@ namespace rapid {
 
 class NeighbourList {
 public:
-    // Finds all pairs. Points of radius 0 take no part. Radii stay the same until the next call; grids are theirs.
+    // Finds all pairs. Points of radius 0 take no part. The radii must not change until the next call; grids are built
+    // from them.
     void build(const Substep& step, std::span<const float> radius, const RadiusGrids& grids);
 
-    // Finds the strays. True where there are so many that the list is to be built again, or where blocks have moved too
+    // Finds the strays. Returns true if the list must be rebuilt, because there are too many or blocks have moved too
     // far.
     bool expired(const Substep& step);
 
     const Pairs& pairs() const { return pairs_; }
-    std::span<const float> reach() const { return reach_; }  // m, radius and slack
+    std::span<const float> reach() const { return reach_; }  // m, radius plus slack
 
     std::span<const std::uint32_t> strays() const { return strays_; }  // ascending
     bool is_stray(std::size_t i) const { return is_stray_[i] != 0; }
 
-    // Blocks are wider than the points of any pair are apart. Block coordinates of a point:
+    // Block coordinates of a point. Blocks are wider than the distance of any pair.
     const std::array<std::int32_t, 3>& block(std::size_t i) const { return coordinates_[i]; }
     std::size_t blocks() const { return frames_.size(); }
     std::span<const std::uint32_t> points_of(std::size_t block) const
@@ -47,7 +49,7 @@ public:
         return std::span(points_).subspan(begin_[block], begin_[block + 1] - begin_[block]);
     }
 
-    // Blocks whose points are handed to a thread together.
+    // Blocks processed by a thread in one task.
     static constexpr std::size_t blocks_a_task = 16;
 
     template <class Archive>
@@ -56,7 +58,7 @@ public:
         keep(pairs_, edge_, far_, at_, reach_, slack_, coordinates_, block_of_, begin_, points_, neighbouring_,
              frames_);
     }
-    // Of a snapshot: whether it is a list of so many points.
+    // Returns true if a loaded list is for this number of points.
     bool is_of(std::size_t points) const;
 
 private:
@@ -71,19 +73,19 @@ private:
     Pairs pairs_;
     ContactSearch search_;
 
-    double edge_ = 0, far_ = 0;         // m: of a block; what blocks that are no neighbours may approach by
-    std::vector<Vec3d> at_;             // where the points were
+    double edge_ = 0, far_ = 0;         // m: edge of a block; approach allowed for blocks that are not neighbours
+    std::vector<Vec3d> at_;             // positions of the points when the list was built
     std::vector<float> reach_, slack_;  // m
     std::vector<std::array<std::int32_t, 3>> coordinates_;
 
-    // Blocks that are 32 apart along an axis are taken as one.
+    // Blocks that are 32 apart along an axis count as the same block.
     static constexpr std::uint32_t across = 32, none = 0xffffffff;
-    std::vector<std::uint32_t> block_of_;                     // each point; blocks in the order in which they occur
-    std::vector<std::uint32_t> begin_, points_;               // of each block
-    std::vector<std::array<std::uint32_t, 2>> neighbouring_;  // blocks
+    std::vector<std::uint32_t> block_of_;                     // of each point; blocks in order of occurrence
+    std::vector<std::uint32_t> begin_, points_;               // points by block
+    std::vector<std::array<std::uint32_t, 2>> neighbouring_;  // pairs of blocks
     struct Frame {
         Vec3d shift = Vec3d::Zero();  // m, the mean displacement of its points
-        double parting = 0;           // m, half of the most by which that of a neighbour differs
+        double parting = 0;           // m, half of the largest difference from a neighbour's shift
 
         template <class Archive>
         void serialize(Archive& keep)
@@ -91,7 +93,7 @@ private:
             keep(shift, parting);
         }
     };
-    std::vector<Frame> frames_;  // of the blocks
+    std::vector<Frame> frames_;  // by block
 
     std::vector<std::uint8_t> is_stray_;
     std::vector<std::uint32_t> strays_;

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// Blocks that are 32 apart along an axis are taken as one: 16 of each colour along each.
+// Blocks that are 32 apart along an axis count as the same block, so each colour has 16 along each axis.
 constexpr std::size_t blocks_a_colour = 16 * 16 * 16, blocks = 8 * blocks_a_colour;
 
 constexpr std::size_t points_a_task = 2048;  // with their pairs: tens of microseconds
@@ -95,12 +95,12 @@ void PairBlocks::begin_blocks()
     begin_.push_back(static_cast<std::uint32_t>(owner_.size()));
 }
 
-// In each block the first pairs of all points, then the second, and so on: consecutive pairs then seldom share a point,
-// and the processor need not wait for one to begin the next.
+// Orders a block by taking the first pairs of all points, then the second, and so on. Consecutive pairs then seldom
+// share a point, so the processor can overlap them.
 void PairBlocks::take_turns(std::size_t block, const Pairs& pairs, std::span<ContactPair> ordered)
 {
     thread_local OfThread<std::vector<std::array<std::uint32_t, 2>>> kept;
-    std::vector<std::array<std::uint32_t, 2>>& going = *kept;  // of each point, what is left of its pairs
+    std::vector<std::array<std::uint32_t, 2>>& going = *kept;  // the remaining pairs of each point
     const std::uint32_t first = begin_[block], last = begin_[block + 1];
     going.clear();
     for (std::uint32_t t = first; t < last; ++t) {

@@ -1,9 +1,9 @@
-// The order in which Gauss-Seidel goes through contact pairs: by blocks of space, in eight colours.
+// The Gauss-Seidel order of contact pairs: by blocks of space, in eight colours.
 //
-// A pair belongs to the block that its points are in, or to the least of their blocks along each axis: it then touches
-// points of that block and of those after it. Blocks of one colour are two apart along some axis and share no point, so
-// that they are solved at the same time, to the same bits on any number of threads. Pairs that are not in the list make
-// a block and a colour of their own.
+// A pair belongs to the block of its points or, if they differ, to the lowest of their blocks along each axis. It
+// therefore touches only points of that block and its successors. Blocks of one colour are two apart along some axis
+// and share no point, so they are solved in parallel, bit-identically for any number of threads. Pairs that are not in
+// the list form a block and a colour of their own.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -23,19 +23,19 @@ namespace rapid {
 
 class PairBlocks {
 public:
-    // Orders the pairs of the list: colour by colour, block by block.
+    // Orders the listed pairs colour by colour, block by block.
     void build(const NeighbourList& list, std::vector<ContactPair>& ordered);
-    // So many pairs follow those of the list, in place of those that did so before.
+    // Sets the number of pairs that follow the listed ones, replacing the earlier number.
     void set_unlisted(std::size_t pairs);
     void clear();
 
     std::size_t size() const { return begin_.size() - 1; }
     std::uint32_t begin(std::size_t block) const { return begin_[block]; }
     std::uint32_t end(std::size_t block) const { return begin_[block + 1]; }
-    // Of each pair of the list, its index among the ordered ones.
+    // The index of each listed pair in the ordered ones.
     std::span<const std::uint32_t> slots() const { return slot_; }
 
-    // Calls f(block) for all blocks: at the same time for those of a colour.
+    // Calls f(block) for all blocks, in parallel within a colour.
     template <class F>
     void for_each_coloured(bool backwards, const F& f) const
     {
@@ -53,7 +53,8 @@ public:
         keep(begin_, colours_, some_unlisted_);
         if constexpr (Archive::is_loading::value) StateReader::expect(!begin_.empty());
     }
-    // Of a snapshot: whether they are blocks of so many pairs, in colours; and whether so many of these are listed.
+    // Check a loaded snapshot: are_of() returns true if the blocks hold this number of pairs, in colours;
+    // have_listed() if this number of pairs is listed.
     bool are_of(std::size_t pairs) const;
     bool have_listed(std::size_t pairs) const;
 
@@ -77,14 +78,14 @@ private:
     void begin_blocks();
     void take_turns(std::size_t block, const Pairs& pairs, std::span<ContactPair> ordered);
 
-    std::vector<std::uint32_t> begin_{0};  // of each block's pairs, and the end
-    std::vector<std::uint32_t> colours_;   // the first of each colour's blocks, and the end
+    std::vector<std::uint32_t> begin_{0};  // index of each block's first pair, then the end
+    std::vector<std::uint32_t> colours_;   // the first block of each colour, then the end
     std::vector<std::uint32_t> slot_;
     bool some_unlisted_ = false;
 
-    // While it is built.
-    std::vector<std::uint16_t> owner_;  // of each pair, its block, empty ones counted
-    std::vector<std::uint32_t> next_;   // of each of these blocks, where its next pair goes
+    // Used during construction.
+    std::vector<std::uint16_t> owner_;  // block of each pair, counting empty blocks
+    std::vector<std::uint32_t> next_;   // index of the next pair of each of these blocks
     struct PointAndPair {
         std::uint32_t point, pair;
     };

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t samples = 64;
 
-// The spheres of a grid that touch one of the set, itself included where it is in the grid.
+// Returns the number of spheres in a grid that touch this one, including itself if it is in the grid.
 double neighbours(const CellGrid& grid, const SpheresView& spheres, std::uint32_t sphere)
 {
     const Vec3d at = spheres.in_grid(spheres.P[sphere]);
@@ -23,7 +23,7 @@ double neighbours(const CellGrid& grid, const SpheresView& spheres, std::uint32_
     return static_cast<double>(found);
 }
 
-// Σ n_c² of stretches of cells.
+// Returns Σ n_c² for each stretch of cells.
 std::vector<double> squares(const CellGrid& grid)
 {
     std::vector<double> sums((grid.cells() + chunk_size - 1) / chunk_size);
@@ -44,7 +44,7 @@ double estimate_within(const CellGrid& grid, const SpheresView& spheres)
 {
     const std::vector<double> sums = squares(grid);
     const double all = sum_of(sums);
-    double mean = 0, before = 0;  // before: Σ n_c² of the stretches before this one
+    double mean = 0, before = 0;  // before: Σ n_c² of the preceding stretches
     std::size_t stretch = 0;
     for (std::size_t s = 0; s < samples; ++s) {
         const double wanted = (static_cast<double>(s) + 0.5) / samples * all;

@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// How many of these, which ascend, are less. Lists are short, mostly: counted, without a branch that is mispredicted.
+// Counts the values below `value`. Most lists are short, and counting them avoids a mispredicted branch.
 std::size_t count_below(std::span<const std::uint32_t> ascending, std::uint32_t value)
 {
     constexpr std::size_t few = 32;

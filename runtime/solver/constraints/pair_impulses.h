@@ -1,5 +1,5 @@
-// Persistent contact pairs: what the two points of each have exerted on each other, kept from sub-step to sub-step for
-// warm starting.
+// Persistent contact pairs: the impulses between the two points of each pair, carried between substeps for warm
+// starting.
 #pragma once
 
 #include <array>
@@ -18,25 +18,25 @@ using ContactPair = std::array<std::uint32_t, 2>;  // indices of points
 struct PairImpulses {
     std::vector<ContactPair> pairs;
     std::vector<float> normal;      // N s, along the normal, at least 0
-    std::vector<Vec3f> tangential;  // N s, by friction, on the first point
-    // N s, on the first point: the whole impulse at the end of the last frame in which both were awake. Empty until
+    std::vector<Vec3f> tangential;  // N s, of friction on the first point
+    // N s, on the first point: the total impulse at the end of the last frame in which both were awake. Empty until
     // points may sleep.
     std::vector<Vec3f> resting;
-    std::vector<Vec3f> rolling;  // N m s, by rolling friction, on the first point; empty where points do not turn
+    std::vector<Vec3f> rolling;  // N m s, of rolling friction on the first point; empty if points do not turn
 
-    // A sub-step of another length begins with the same forces.
+    // Scales all impulses, so that a substep of another length starts with the same forces.
     void scale(float factor);
 
-    // Points are at other indices, index[old], or gone: IdIndex::none. Pairs that have lost a point are forgotten; the
-    // other is added to `bereft` if it was pressed. The pairs that are kept ascend.
+    // Updates point indices to index[old]; IdIndex::none marks removed points. Pairs that lost a point are dropped;
+    // their other point is added to `bereft` if it was pressed. The remaining pairs ascend.
     void renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& bereft);
 
-    // Takes over the impulses of the pairs before a search that are listed still; pairs[slot[k]] is the k-th of the
-    // list. Others have been moved apart by a node: sleepers among them wake.
+    // Copies the impulses of pairs from before a search that are still listed; pairs[slot[k]] is the k-th of the list.
+    // Pairs missing from the list were moved apart by a node: sleepers among them wake.
     void take_over(const PairImpulses& before, const Pairs& list, std::span<const std::uint32_t> slot, Sleep* sleep);
 
-    // The pairs beyond the first `listed` become these, which ascend, and those of before that press. False where they
-    // are so already.
+    // Replaces the pairs after the first `listed` by these, which ascend, and by the earlier ones under pressure.
+    // Returns false if nothing changes.
     bool set_unlisted(std::size_t listed, std::span<const ContactPair> found);
 };
 

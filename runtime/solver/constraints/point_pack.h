@@ -1,4 +1,4 @@
-// Points of the projection in simd packs of eight.
+// Projected points in SIMD packs of eight.
 #pragma once
 
 #include "runtime/simd.h"
@@ -22,7 +22,7 @@ struct alignas(sizeof(Doubles)) PointPack {
     return {{c.x, c.y, c.z}, c.w};
 }
 
-// Of the first `count` lanes.
+// Stores the first `count` lanes.
 [[gnu::always_inline]] inline void scatter(const PointPack& pack, std::span<ProjectedPoint> at, const Indices& i,
                                            std::uint32_t count)
 {

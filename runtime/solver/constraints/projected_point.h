@@ -1,4 +1,4 @@
-// The points that constraints act on, as the projection sees them.
+// The representation of points in the projection.
 #pragma once
 
 #include <cstdint>
@@ -7,23 +7,23 @@
 
 namespace rapid {
 
-// A position, m, and an inverse mass, 1/kg: 0 of a point that no constraint moves, or that sleeps. A cache line holds
+// A position, m, and an inverse mass, 1/kg: 0 for a point that no constraint moves, or that sleeps. A cache line holds
 // two.
 struct alignas(32) ProjectedPoint {
     Vec3d P;
     double w;
 };
 
-// A point's motion in a sub-step since its last impact; kept where something bounces (impact.h).
+// A point's motion in a substep since its last impact; used if something bounces (impact.h).
 struct FreePath {
     Vec3d acceleration;       // m/s², of the point
-    Vec3d reaction;           // m/s², the part of it by the shape on which the point lies
-    double since = 0;         // s, until the end of the sub-step; the whole of it where there was no impact
-    std::uint32_t sweep = 0;  // in which the impact was solved, from 1; 0 for none
+    Vec3d reaction;           // m/s², the part of it due to the shape that supports the point
+    double since = 0;         // s, until the end of the substep; the whole substep without an impact
+    std::uint32_t sweep = 0;  // the sweep that solved the impact, from 1; 0 for none
 };
 
-// What a constant acceleration of 1 m/s² does to a point in a sub-step: to its velocity, m/s, and to its position, m:
-// dt and dt²/2, but for drag and springs. And what draws the point, at P, m/s²: pull - stiffness P.
+// The changes in velocity, m/s, and position, m, due to a constant acceleration of 1 m/s² over a substep: dt and dt²/2
+// without drag and springs. The force on the point at P, m/s², is pull - stiffness P.
 struct Mobility {
     double v, x;
     Vec3d pull = Vec3d::Zero();

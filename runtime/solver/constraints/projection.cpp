@@ -10,10 +10,10 @@
 namespace rapid {
 namespace {
 
-// In a cradle an impact takes one; in a gas two or three.
+// An impact in a cradle takes one sweep, in a gas two or three.
 constexpr std::uint32_t most_impact_sweeps = 32;
 
-// Whether some point moves that no row does.
+// Returns true if some point moves that no row moves.
 bool has_kinematic(const Substep& step)
 {
     for (std::size_t i = 0; i < step.size(); ++i)
@@ -39,7 +39,7 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
                                               [](const Obstacle& obstacle) { return obstacle.moves; })),
       free_(step.size())
 {
-    // Rods and springs keep what they have come to before contacts push their points, whichever node comes first.
+    // Rods and springs fix their reference before contacts push their points, whichever node comes first.
     std::stable_partition(constraints_.begin(), constraints_.end(),
                           [](const LocalConstraint& local) { return local.coupling->has_forces(); });
     if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
@@ -82,8 +82,8 @@ void Projection::advance(Substep& step)
         P.resize(step.size());
         each_point([&](std::size_t i) { P[i] = step.points[i].P; });
     };
-    // Shapes are asked about where the free motion of each point alone has ended, which is outside of them; but moved
-    // by what has only been corrected since, which is to give no velocity.
+    // Shapes are queried at the end of each point's own free motion, which is outside of them, plus later
+    // position-only corrections, which must not add velocity.
     require_finite(step);
     if (has_forces_) {
         free_.resize(step.size());
@@ -97,7 +97,7 @@ void Projection::advance(Substep& step)
     if (step.forces) step.forces->begin(step, sleep_);
     each([&](Coupling& coupling) { coupling.detect(step); });
     if (has_forces_)
-        each_point([&](std::size_t i) { free_[i] += step.points[i].P - linked_[i]; });  // of woken sleepers
+        each_point([&](std::size_t i) { free_[i] += step.points[i].P - linked_[i]; });  // for woken sleepers
     else
         keep_positions(free_);
     if (shapes_) shapes_->detect(step, free_);
@@ -108,7 +108,7 @@ void Projection::advance(Substep& step)
         add_stored(step, {}, -1, credit);
     }
     if (!step.paths.empty()) solve_impacts(step);
-    const bool moved = has_forces_ || !step.paths.empty();  // since the free motion
+    const bool moved = has_forces_ || !step.paths.empty();  // by rods, springs or impacts since the free motion
     if (moved) keep_positions(linked_);
     const std::vector<Vec3d>& before = moved ? linked_ : free_;
     follow_rods(step);
@@ -120,7 +120,7 @@ void Projection::advance(Substep& step)
     }
     for (Holding* holding : holdings_) holding->settle(step);
     each_point([&](std::size_t i) { step.v[i] += (step.points[i].P - before[i]) / step.dt; });
-    // Rods carry what shapes do to one point on to others, and back.
+    // Rods pass the effect of shapes on one point to others, and back.
     for (int k = has_forces_ && shapes_ ? 0 : step.iterations - 1; k < step.iterations; ++k) {
         each([&](Coupling& coupling) { coupling.solve_velocities(step); });
         if (shapes_) shapes_->solve_velocities(step);
@@ -139,7 +139,7 @@ void Projection::advance(Substep& step)
     require_finite(step);
 }
 
-// J: what changes are told without, as drag has taken it before.
+// Returns the energy, J, that reported changes exclude because drag took it before.
 double Projection::credited()
 {
     if (!may_gain_) return 0;
@@ -147,13 +147,13 @@ double Projection::credited()
     return std::accumulate(credit.begin(), credit.end(), 0.0);
 }
 
-// J: what it took to put points out of shapes in their free motion, against rows as they were before.
+// Returns the work, J, of moving points out of shapes in their free motion, against rows in their earlier state.
 double Projection::work_of_displacements(const Substep& step) const
 {
     return has_forces_ && !step.born.empty() ? stored_change(step, step.born, step.start) : 0;
 }
 
-// Where rows begin: with what shapes carry at the end of its way.
+// Sets the initial positions of rows: points carried by shapes are at the end of their path.
 void Projection::begin_rows(const Substep& step)
 {
     begun_.assign(step.start.begin(), step.start.end());
@@ -163,13 +163,13 @@ void Projection::begin_rows(const Substep& step)
             begun_[i] = step.points[i].P, carries_ = true;
 }
 
-// J: what rows store more as shapes carry points that are glued to them.
+// Returns the increase in energy stored in rows, J, due to shapes that carry points glued to them.
 double Projection::work_of_carrying(const Substep& step) const
 {
     return has_forces_ && carries_ ? stored_change(step, step.start, begun_) : 0;
 }
 
-// J: what rows store more at some places than at others.
+// Returns the increase in energy stored in rows, J, between two sets of positions.
 double Projection::stored_change(const Substep& step, std::span<const Vec3d> from, std::span<const Vec3d> to) const
 {
     std::vector<double> stored(step.size());
@@ -178,7 +178,7 @@ double Projection::stored_change(const Substep& step, std::span<const Vec3d> fro
     return std::accumulate(stored.begin(), stored.end(), 0.0);
 }
 
-// What pins move gains what they do, and so do the rows that they stretch, before these act.
+// Counts as energy of pins the change of the points that they move, and of the rows stretched before these act.
 void Projection::move_kinematic(Substep& step)
 {
     const double before = is_driven_ ? driven_energy(step) : 0;
@@ -189,7 +189,7 @@ void Projection::move_kinematic(Substep& step)
     changes_.pins += driven_energy(step) - before;
 }
 
-// J, of the points, and in rows where these begin.
+// Returns the energy, J, of the points and of rows at their initial positions.
 double Projection::driven_energy(const Substep& step) const
 {
     std::vector<double> energy(step.size());
@@ -203,7 +203,7 @@ double Projection::driven_energy(const Substep& step) const
     return sum;
 }
 
-// Rods and springs act. carrying: J, what shapes have stored in them, which drive them where no pin does.
+// Applies rods and springs. carrying: J, stored in them by shapes, which drive them if no pin does.
 void Projection::advance_linked(Substep& step, double carrying)
 {
     stored_.assign(step.size(), 0.0);
@@ -226,7 +226,7 @@ void Projection::advance_linked(Substep& step, double carrying)
     changes_.rods += change.added - change.lost + credited() - driven;
 }
 
-// What rows store at first, where their points have gone along with what drives them.
+// Computes the energy stored in rows at first, with their points moved along with the drivers.
 void Projection::store_in_frame(const Substep& step)
 {
     EnergyIslands islands(step);
@@ -255,14 +255,14 @@ bool Projection::keeps_momentum() const
                                    [](const LocalConstraint& local) { return local.coupling->keeps_momentum(); });
 }
 
-// What rows store, at these positions or, where there are none, where points are.
+// Adds the energy stored in rows at these positions or, if empty, at the current ones.
 void Projection::add_stored(const Substep& step, std::span<const Vec3d> at, double factor,
                             std::span<double> energy) const
 {
     for (const LocalConstraint& local : constraints_) local.coupling->add_stored_energy(step, at, factor, energy);
 }
 
-// of_rods: where only rods and springs have acted.
+// of_rods: true if only rods and springs have acted.
 ContactEnergy Projection::close_bound(Substep& step, bool of_rods)
 {
     const auto stored = [&](double factor, std::span<double> energy) { add_stored(step, {}, factor, energy); };
@@ -283,7 +283,7 @@ void Projection::link(EnergyIslands& islands, const Substep& step, bool of_rods)
     if (shapes_ && !of_rods) shapes_->drive(islands, step);
 }
 
-// J: what rows store, and the potential energy of points that have yielded.
+// Returns the energy stored in rows plus the potential energy of points that have yielded, J.
 double Projection::energy_of_places(const Substep& step) const
 {
     double sum = elastic_energy(step);
@@ -292,7 +292,7 @@ double Projection::energy_of_places(const Substep& step) const
     return sum;
 }
 
-// As single precision holds them, in which they are stored. What is found here would be looked up in grids next.
+// Checks values as single precision stores them. Without this check, the next step would look them up in grids.
 void Projection::require_finite(const Substep& step) const
 {
     constexpr double surely_finite = 1e38;
@@ -305,7 +305,7 @@ void Projection::require_finite(const Substep& step) const
     });
 }
 
-// One impact leads to others: what is still closing after so many sweeps is left to the rows, which let nothing bounce.
+// One impact leads to others. Pairs still closing after the last sweep are left to the rows, without bounce.
 void Projection::solve_impacts(Substep& step)
 {
     for_each_chunk(step.size(), [&](std::size_t begin, std::size_t end) {
@@ -317,7 +317,7 @@ void Projection::solve_impacts(Substep& step)
         hit = false;
         each([&](Coupling& coupling) { hit |= coupling.solve_impacts(step, sweep); });
         if (!shapes_) continue;
-        // Sleepers that impacts have woken come to have contacts with shapes.
+        // Sleepers woken by impacts get contacts with shapes.
         if (sleep_ && woken != sleep_->woken_now()) {
             woken = sleep_->woken_now();
             shapes_->detect(step, free_);
@@ -326,7 +326,7 @@ void Projection::solve_impacts(Substep& step)
     }
 }
 
-// Points that no constraint moves support others, as shapes do.
+// Points that no constraint moves support others, like shapes.
 void Projection::begin_support(Substep& step)
 {
     support_.resize(step.size());

@@ -1,5 +1,5 @@
-// The coupled part of a sub-step, once each point has moved freely: all constraints, and the shapes that these push
-// points into (constraint.h says in which order).
+// The coupled part of a substep, after each point has moved freely: all constraints, and the shapes that these push
+// points into (constraint.h gives the order).
 #pragma once
 
 #include <memory>
@@ -24,22 +24,22 @@ struct LocalConstraint {
 
 class Projection {
 public:
-    // sleep: null where no point may sleep; the constraints join it. loads: of the frame before; null for none.
+    // sleep: null if no point may sleep; the constraints join it. loads: from the previous frame; null for none.
     Projection(std::span<const LocalConstraint> constraints, std::span<const Obstacle> obstacles, const Substep& step,
                Sleep* sleep, const ShapeLoads* loads, const PointErrors& errors);
 
-    // Whether it has impacts to solve; Substep::paths are needed then.
+    // Returns true if it has impacts to solve, which need Substep::paths.
     bool bounces() const;
-    // Error: a point's P or v is not finite any more.
+    // Throws Error if a point's P or v is no longer finite.
     void advance(Substep& step);
     Residual close(Substep& step, ShapeLoads* loads);
 
-    // What has been added so far, by corrections of positions where no velocity paid for it (energy_bound.h) and by
-    // what moves by itself; and what contacts, shapes and rows have taken after rods and springs.
+    // The energy added so far, by position corrections that no velocity paid for (energy_bound.h) and by drivers; and
+    // the energy that contacts, shapes and rows took after rods and springs.
     const ContactEnergy& energy() const { return energy_; }
-    // J: by rods and springs; by all that follows them; by what pins move.
+    // J: changes by rods and springs, by the steps after these, and by pins.
     const EnergyChanges& changes() const { return changes_; }
-    // J, in rows, where points are now, or at these places.
+    // Returns the energy in rows, J, at the current positions or at these.
     double elastic_energy(const Substep& step, std::span<const Vec3d> at = {}) const;
     bool keeps_momentum() const;
 
@@ -65,14 +65,14 @@ private:
     void solve_impacts(Substep& step);
 
     std::vector<LocalConstraint> constraints_;
-    std::vector<Holding*> holdings_;          // of the constraints
-    std::vector<CarriedImpulses*> carrying_;  // of the constraints
+    std::vector<Holding*> holdings_;          // those of constraints_ that implement it
+    std::vector<CarriedImpulses*> carrying_;  // those of constraints_ that implement it
     Sleep* sleep_;
     const PointErrors& errors_;
     bool has_forces_;       // some constraint (Coupling::has_forces)
-    bool may_gain_;         // some constraint does not only take energy, or springs draw points
+    bool may_gain_;         // some constraint may add energy, or springs draw points
     bool is_driven_;        // some constraint moves points by itself
-    bool carries_ = false;  // shapes do, points that are glued to them
+    bool carries_ = false;  // shapes carry points that are glued to them
     bool follows_;          // or some point that no row moves has a velocity
     bool moving_support_;   // or a shape moves
     EnergyBound bound_;
@@ -80,13 +80,13 @@ private:
     ContactEnergy energy_;
     EnergyChanges changes_;
     std::optional<ShapeContacts> shapes_;
-    std::vector<Vec3d> free_;                           // where the points' free motion has ended
-    std::vector<Vec3d> linked_;                         // where the projection begins, if elsewhere
-    std::vector<Vec3d> begun_;                          // where rows begin: with what pins move where they move it
-    std::vector<double> stored_;                        // J, in rows, there
+    std::vector<Vec3d> free_;                           // positions after the points' free motion
+    std::vector<Vec3d> linked_;                         // positions at the start of the projection, if different
+    std::vector<Vec3d> begun_;                          // positions at the start of rows, after kinematic motion
+    std::vector<double> stored_;                        // J, in rows, at begun_
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
     std::vector<Vec3d> support_v_, next_support_v_;     // Substep::support_v
-    std::vector<std::uint32_t> rods_;                   // by point, the island that rods and springs link it to
+    std::vector<std::uint32_t> rods_;                   // by point: its island of rods and springs
 };
 
 }  // namespace rapid

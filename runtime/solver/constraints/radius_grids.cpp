@@ -22,7 +22,7 @@ RadiusGrids::RadiusGrids(Strided<float> radius, std::size_t size, std::optional<
     const bool some_without = !(sorted.back() > 0);
     while (!sorted.empty() && !(sorted.back() > 0)) sorted.pop_back();
 
-    std::vector<float> least;  // radius of each grid
+    std::vector<float> least;  // lower bound of the radii in each grid
     cluster(sorted, max_difference, max_grids, least);
     if (grids.size() > 1 || some_without)
         assign(radius, size, least);

@@ -1,5 +1,5 @@
-// Which points share a grid of cells, by their radii (paper §5.2, Algorithm 1): cells as wide as the largest sphere in
-// them hold too many of the smallest, so that several sizes go into several grids.
+// Assigns points to grids of cells by their radii (paper §5.2, Algorithm 1). Cells as wide as the largest sphere in
+// them hold too many of the smallest, so several sizes use several grids.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@ namespace rapid {
 
 class RadiusGrids {
 public:
-    // max_difference: m, between the radii in a grid; where it is not given, half of the largest in it. Points of
-    // radius 0 touch nothing, and are in no grid.
+    // max_difference: m, between the radii in a grid; default: half of its largest radius. Points of radius 0 touch
+    // nothing and are in no grid.
     RadiusGrids(Strided<float> radius, std::size_t size, std::optional<double> max_difference, int max_grids);
 
     struct Grid {
@@ -22,11 +22,11 @@ public:
         std::size_t points;
     };
     std::vector<Grid> grids;       // from coarse to fine
-    std::vector<std::uint8_t> of;  // the grid of each point; empty where there is at most one grid, and all are in it
+    std::vector<std::uint8_t> of;  // grid of each point; empty if there is at most one grid, with all points
     static constexpr std::uint8_t none = 255;
 
-    // How much larger the cells are than their spheres, m³ (paper, eq. 5): Σ s³ - 4/3 π r³, with s = 2 R; and as a part
-    // of cells made to measure: Σ (s³ - (2r)³) / Σ (2r)³, which is 0 where all radii in a grid are equal.
+    // Excess volume of the cells over their spheres, m³ (paper, eq. 5): Σ s³ - 4/3 π r³, with s = 2 R; and relative to
+    // cells of the exact size: Σ (s³ - (2r)³) / Σ (2r)³, which is 0 if all radii in each grid are equal.
     double error = 0, excess = 0;
 
 private:

@@ -1,15 +1,15 @@
-// What counts as resting contact.
+// Thresholds for resting contact.
 #pragma once
 
 #include "runtime/solver/constraints/constraint.h"
 
 namespace rapid {
 
-// m/s, closing: a slower contact does not bounce, nor wake sleepers. Twice what the accelerations give a point at rest
-// in a sub-step.
+// Closing speed, m/s, below which a contact neither bounces nor wakes sleepers: twice the speed that accelerations
+// give a point at rest in a substep.
 inline double resting_speed(const Substep& step) { return 2.0 * step.max_acceleration * step.dt; }
 
-// Points that are as near as this, in parts of the sum of their radii, may come to touch in the projection.
+// Distance below which points may come into contact in the projection, relative to the sum of their radii.
 constexpr double near_contact = 1.02;
 
 }  // namespace rapid

@@ -10,10 +10,10 @@
 namespace rapid {
 namespace {
 
-// ω of an angular momentum; about axes without inertia there is none.
+// Returns ω for an angular momentum; its component is 0 along axes without inertia.
 Vec3d angular_velocity(const Eigen::Matrix3d& inertia, const Vec3d& momentum)
 {
-    constexpr double least = 1e-12;  // of the largest
+    constexpr double least = 1e-12;  // relative to the largest
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(inertia);
     Vec3d along = axes.eigenvectors().transpose() * momentum;
     for (int k = 0; k < 3; ++k) {
@@ -43,7 +43,8 @@ void RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, 
         move(step, points);
 }
 
-// How what draws the points goes: the mean of the surfaces, at rest where only places do; nothing where none are drawn.
+// Returns the mean motion of the surfaces that points are attached to, at rest if springs attach to positions only;
+// nothing if there are no springs.
 std::optional<Drive> RigidFallback::resting_place(const Substep& step, std::span<const std::uint32_t> points) const
 {
     if (step.mobility.empty()) return {};
@@ -96,7 +97,7 @@ void RigidFallback::move(Substep& step, std::span<const std::uint32_t> points) c
         place(step, i, start_[i] + displacement, velocity + omega.cross(start_[i] - middle));
 }
 
-// As the free motion leaves a point.
+// Places a point as if free motion had left it there.
 void RigidFallback::place(Substep& step, std::uint32_t i, const Vec3d& P, const Vec3d& v) const
 {
     step.displacement[i] += step.dt * (v - step.v[i]);

@@ -1,14 +1,14 @@
-// What is left where rods and springs find no solution in a sub-step: the points that they link move as one rigid body.
+// The fallback if rods and springs find no solution in a substep: the points that they link move as one rigid body.
 //
-// From where the points are at the beginning of the sub-step,
+// From the points' positions at the beginning of the substep,
 //
 //   x' = x + d,   v' = V + ω × (x - X)
 //
-// with d the mean displacement of their free motion, X and V their middle and mean velocity by mass, ω that of their
-// angular momentum. Both momenta stay; what rows store stays, as no distance changes; of the energy of motion all that
-// is not of a rigid body is lost. The body does not turn within the sub-step, which would change one of these. Points
-// that are linked to what no row moves go along with that; those that springs draw, with the places or surfaces that
-// draw them, by the mean of these.
+// with d the mean displacement of their free motion, X and V their center and velocity of mass, and ω from their
+// angular momentum. Both momenta are conserved, as is the energy stored in rows, because no distance changes. All
+// kinetic energy beyond that of the rigid body is lost. The body does not turn within the substep, because that would
+// change one of these. Points linked to something that no row moves follow it. Points on springs follow the mean
+// motion of the positions or surfaces that the springs attach to.
 #pragma once
 
 #include <cstdint>
@@ -24,10 +24,10 @@ struct Drive;
 
 class RigidFallback {
 public:
-    // Keeps where points begin the sub-step, and where their free motion has taken them.
+    // Stores the positions at the beginning of the substep and those after free motion.
     void begin(const Substep& step);
-    // Moves the points given, which rows link, in place of what these have done. driver: what holds some of them, null
-    // where nothing does.
+    // Moves the given points, which rows link, and discards the rows' result. driver: holds some of them; null if
+    // there is none.
     void apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
 
 private:

@@ -1,10 +1,10 @@
-// One row: a scalar constraint C(x) = 0, or C(x) >= 0, between a few points. What its impulse does to them is
+// One row: a scalar constraint C(x) = 0, or C(x) >= 0, between a few points. Its impulse changes their velocities by
 //
 //   Δv = w ∇C p
 //
-// with w their inverse masses. Two-sided rows carry their own force through a sub-step (tree_motion.h, row_system.h),
-// which neither gives nor takes energy; here is what they do where contacts, shapes and other constraints have pushed
-// their points since. One-sided rows do all of their work here, as contacts do.
+// with w their inverse masses. Two-sided rows apply their own force over a substep first, without adding or removing
+// energy (tree_motion.h, row_system.h). The code here then accounts for contacts, shapes and other constraints that
+// pushed their points since. One-sided rows do all of their work here, like contacts.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace rapid {
 
-// What a constraint function says of itself (rows.h).
+// Optional properties of a constraint function (rows.h).
 template <class Function>
 struct FunctionTraits {
     static constexpr int arity = Function::points;
@@ -34,7 +34,7 @@ struct FunctionTraits {
     }();
 };
 
-// 1/kg: what C of a spring gives way by, times dt, for each N s that others move its points by.
+// Returns the change of a spring's C divided by dt, per N s of impulses of others on its points, 1/kg.
 inline double softness_of(double compliance, bool is_resolved, double dt)
 {
     return (is_resolved ? 4 : 2) * compliance / (dt * dt);
@@ -46,24 +46,25 @@ struct Row {
     using Traits = FunctionTraits<Function>;
     using Ids = std::array<std::int64_t, arity>;
     using Points = std::array<std::uint32_t, arity>;
-    using Vectors = std::array<Vec3d, arity>;  // one a point
+    using Vectors = std::array<Vec3d, arity>;  // one per point
 
     Function function;
     double compliance;  // m/N
     Ids ids;
     Points points = filled(IdIndex::none);
-    double impulse = 0;          // N s along the gradient, of the last sub-step; at least 0 where it is one-sided
-    double first = 0;            // C where the sub-step begins
-    double reference = 0;        // C that its points are kept at, once the row's own force has acted
-    double added = 0;            // N s, the part of the impulse that is due to others, as far as it moves positions
-    bool has_yielded = false;    // in a sub-step of this frame
-    bool is_resolved = false;    // by the sub-step: velocities along the row stay
-    double softness = 0;         // 1/kg: what C - reference gives way by, times dt, for each N s of `added`
-    Vectors direction = zero();  // the gradient that it acts along
+    double impulse = 0;          // N s along the gradient, of the last substep; at least 0 if one-sided
+    double first = 0;            // C at the beginning of the substep
+    double reference = 0;        // target of C after the row's own force has acted
+    double added = 0;            // N s, the part of the impulse due to others, as far as it moves positions
+    bool has_yielded = false;    // in a substep of this frame
+    bool is_resolved = false;    // by the substep: velocities along the row remain
+    double softness = 0;         // 1/kg: change of C - reference divided by dt, per N s of `added`
+    Vectors direction = zero();  // the gradient along which it acts
     bool active = true, was_active = false;
-    bool asleep = false;  // in this sub-step: none of its points moves, as one of them sleeps
+    bool asleep = false;  // in this substep: none of its points moves, because one of them sleeps
 
-    // The residual that the last frame ended with; exact where it is of points without velocity, as the frame began.
+    // The residual at the end of the last frame; exact if measured at the start of a frame for points without
+    // velocity.
     double resting_residual = std::numeric_limits<double>::quiet_NaN();
     bool resting_residual_exact = false;
 
@@ -74,7 +75,7 @@ struct Row {
              direction, active, was_active, asleep, resting_residual, resting_residual_exact);
     }
 
-    // Of a snapshot: whether it is one between different points.
+    // Returns true if a loaded row is between different points and has a valid compliance.
     bool is_possible() const
     {
         for (int k = 1; k < arity; ++k)
@@ -82,7 +83,7 @@ struct Row {
         return compliance >= 0 && std::isfinite(compliance);
     }
 
-    // Finds its points by id. It acts while all of them are in the group. True where it acts otherwise than before.
+    // Finds its points by id. It acts only if all of them are in the group. Returns true if its points have changed.
     bool find_points(const IdIndex& index, const Strided<std::uint8_t>& members)
     {
         bool changed = false;
@@ -108,15 +109,15 @@ struct Row {
         return P;
     }
 
-    // Before the sub-step.
+    // Measures C at the beginning of the substep.
     void measure(const Substep& step)
     {
         Vectors P, gradient;
         for (int k = 0; k < arity; ++k) P[k] = step.start[points[k]];
         first = function.residual(P, gradient);
     }
-    // From here on the row keeps its points as they are now. What others do to them changes its force throughout the
-    // sub-step, as the force itself goes by C: α ΔF = -θ ΔC (tree_motion.h). Of the impulse ΔF dt half moves positions.
+    // Makes the row keep its points at their current positions. Changes by others affect its force throughout the
+    // substep, as the force follows C: α ΔF = -θ ΔC (tree_motion.h). Half of the impulse ΔF dt moves positions.
     void keep(const Substep& step)
     {
         Vectors gradient;
@@ -125,7 +126,7 @@ struct Row {
         is_resolved = !is_stiff(inverse_mass(step, gradient), step.dt);
         softness = softness_of(compliance, is_resolved, step.dt);
     }
-    // Of the points that have been held against others by their mass (holding.h): what the force has come to.
+    // Updates the force of a row whose points held against others by their mass (holding.h).
     void settle(Substep& step)
     {
         Vectors gradient;
@@ -135,7 +136,7 @@ struct Row {
         for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
     }
 
-    // The rate of the residual: by the points' motion, and by that of what the function holds them to.
+    // Returns the rate of the residual, due to the motion of the points and of the function's target.
     double rate(const Substep& step, const Vectors& gradient) const
     {
         double sum = 0;
@@ -143,7 +144,7 @@ struct Row {
         for (int k = 0; k < arity; ++k) sum += gradient[k].dot(step.v[points[k]]);
         return sum;
     }
-    // Of the residual by an impulse, 1/kg.
+    // Returns the change in the residual's rate per impulse, 1/kg.
     double inverse_mass(const Substep& step, const Vectors& gradient) const
     {
         double sum = 0;
@@ -151,11 +152,12 @@ struct Row {
         return sum;
     }
 
-    // Whether a spring is too stiff for the sub-step to resolve: then it acts as a rod that gives way. W: inverse mass.
+    // Returns true if a spring is too stiff for the substep to resolve. It then acts as a compliant rod. W: inverse
+    // mass.
     bool is_stiff(double W, double dt) const { return compliance < W * dt * dt; }
 
-    // A one-sided row begins with half of its last impulse on positions, and with all of it on velocities, as a force
-    // that is the same throughout the sub-step.
+    // Starts a one-sided row with half of its last impulse on positions, and all of it on velocities, like a constant
+    // force throughout the substep.
     void warm_start(Substep& step)
     {
         Vectors P;
@@ -163,7 +165,7 @@ struct Row {
         reference = compliance > 0 ? 0 : std::min(0.0, function.residual(P, direction));
         softness = compliance / (step.dt * step.dt);
         residual(step, direction);
-        added = 0.5 * impulse;  // what the velocities get with the positions (Projection::advance)
+        added = 0.5 * impulse;  // velocities get this part with the positions (Projection::advance)
         for (int k = 0; k < arity; ++k) {
             ProjectedPoint& point = step.points[points[k]];
             point.P += point.w * step.dt * added * direction[k];
@@ -171,7 +173,7 @@ struct Row {
         }
     }
 
-    // Keeps C at the reference, or above it. A residual that was there before is not made worse, and gives no speed.
+    // Keeps C at the reference, or above it. An earlier residual is not made worse and adds no speed.
     void project(Substep& step)
     {
         const Vectors P = positions(step);
@@ -181,7 +183,8 @@ struct Row {
         double along = 0;
         for (int k = 0; k < arity; ++k) along += step.points[points[k]].w * gradient[k].dot(direction[k]);
         if (!(along + softness > 0)) return;
-        // What its direction has turned away from needs a larger impulse along it, up to any size: never above twice.
+        // A direction that has turned needs a larger impulse along it, which is unbounded; limit it to twice the
+        // normal one.
         const double stiffness = softness + std::max(along, 0.5 * inverse_mass(step, gradient));
         const double total = Traits::one_sided ? impulse : added;
         double change = (-C / step.dt - softness * total) / stiffness;
@@ -194,14 +197,14 @@ struct Row {
             if (is_resolved) step.v[points[k]] += shift;
         }
     }
-    // Counts an impulse that moves positions.
+    // Records an impulse that moves positions.
     void take(double change)
     {
         added += change;
         impulse += !Traits::one_sided && compliance > 0 ? 2 * change : change;
     }
 
-    // Takes off the velocity that is left along a rigid row.
+    // Removes the velocity along a rigid row.
     void solve_velocity(Substep& step)
     {
         Vectors gradient;
@@ -216,7 +219,7 @@ struct Row {
         for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
     }
 
-    // Moves the points to where C = 0, which gives no velocity.
+    // Moves the points to C = 0 without adding velocity.
     void correct_position(Substep& step) const
     {
         if (compliance > 0) return;
@@ -231,7 +234,7 @@ struct Row {
         }
     }
 
-    // How far it is off, m, where C is `residual`: a spring from what its own force has come to.
+    // Returns the position error, m, if C is `residual`; for a spring, relative to the length that fits its own force.
     double error(double residual, double dt) const
     {
         if (Traits::one_sided) return std::min(residual + compliance * impulse / dt, 0.0);
@@ -253,9 +256,9 @@ private:
     }
 };
 
-// The gradient along which a force that is the same throughout a sub-step does the work F (C(to) - C(from)), and turns
-// nothing (Gonzalez 1996): of a distance |d| it is (d + d')/(|d| + |d'|). Of functions that do not give it, the
-// gradient in the middle, which is so to second order.
+// Computes the gradient along which a force that is constant throughout a substep does the work F (C(to) - C(from))
+// and exerts no torque (Gonzalez 1996); for a distance |d| it is (d + d')/(|d| + |d'|). Functions without one use the
+// gradient at the midpoint, which has these properties to second order.
 template <class Function>
 void discrete_gradient(const Function& function, const typename Row<Function>::Vectors& from,
                        const typename Row<Function>::Vectors& to, typename Row<Function>::Vectors& gradient)

@@ -1,5 +1,5 @@
-// In which order rows are projected: those that form trees directly, tree by tree; all others by Gauss-Seidel, colour
-// by colour.
+// The order of row projection: rows that form trees are solved directly, tree by tree; all others by Gauss-Seidel,
+// colour by colour.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -18,7 +18,7 @@ namespace rapid {
 class RowSchedule {
 public:
     RowSchedule() = default;
-    // rows: those to be projected; points: `arity` of each. fixed: 1 for points of infinite mass.
+    // rows: those to project; points: `arity` of each. fixed: 1 for points of infinite mass.
     RowSchedule(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> points, std::size_t arity,
                 std::span<const std::uint8_t> fixed, bool trees);
 
@@ -39,10 +39,10 @@ public:
                           [&](const auto& range) { solve_trees(range.begin(), range.end()); });
     }
 
-    // The rows that are in no tree.
+    // The rows in no tree.
     std::span<const std::uint32_t> others() const { return others_; }
 
-    // Calls project(k) for them, by their places in others().
+    // Calls project(k) for each row in no tree, with its index in others().
     template <class Project>
     void for_each_coloured(const Project& project) const
     {

@@ -1,4 +1,4 @@
-// Sleep of the points that rows hold together: which rows sleep, and what wakes their points.
+// Sleep of points that rows hold together: finds sleeping rows and wakes their points.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +15,14 @@ namespace rapid {
 template <class Function>
 class RowSleep {
 public:
-    // Null where no point may sleep in this frame.
+    // Null if no point may sleep in this frame.
     void join(Sleep* sleep) { sleep_ = sleep; }
 
     using Row = rapid::Row<Function>;
     using Traits = FunctionTraits<Function>;
 
-    // A frame begins: wakes the points of rows that act otherwise than before, and of those whose residual is not what
-    // the last frame left: a point that no row moves has been moved.
+    // Begins a frame. check() wakes the points of rows that have changed, and of those whose residual differs from the
+    // one at the end of the last frame, because a point that no row moves has then been moved.
     void begin() { disturbed_.clear(); }
     void check(Row& row, bool acts_otherwise, const PointSet& points)
     {
@@ -33,7 +33,7 @@ public:
         for (const std::uint32_t i : row.points)
             if (i != IdIndex::none) disturbed_.push_back(i);
     }
-    // Points that are awake in this frame, even where no row is left.
+    // Points that stay awake in this frame, even if no row is left.
     const std::vector<std::uint32_t>& disturbed() const { return disturbed_; }
 
     bool is_asleep(const Row& row, const Substep& step) const
@@ -47,7 +47,7 @@ public:
         return any;
     }
 
-    // A point of infinite mass that moves wakes the sleepers that are linked to it.
+    // Wakes the sleepers linked to a moving point of infinite mass.
     void wake_by_motion(const Row& row, const Substep& step) const
     {
         const bool moves = std::any_of(row.points.begin(), row.points.end(),
@@ -56,18 +56,18 @@ public:
         for (const std::uint32_t i : row.points) sleep_->wake(i);
     }
 
-    // A one-sided row wakes sleepers that it begins to load.
+    // Wakes the sleepers that a one-sided row begins to load.
     void wake_by_load(const Row& row, const Substep& step) const
     {
         if (!sleep_ || !sleep_->any()) return;
-        constexpr double disturbing = 0.1;  // of what they bear
+        constexpr double disturbing = 0.1;  // relative to their burden
         for (int k = 0; row.active && !row.asleep && row.impulse > 0 && k < Row::arity; ++k) {
             const std::uint32_t i = row.points[k];
             if (sleep_->asleep(i) && row.impulse > disturbing * step.dt * sleep_->burden(i)) sleep_->wake(i);
         }
     }
 
-    // The points of a row that is gone do not fall asleep in this frame.
+    // Keeps the points of a removed row awake in this frame.
     void release(const Row& row) const
     {
         if (sleep_)

@@ -35,7 +35,7 @@ void RowSystem::begin(std::size_t rows, std::size_t arity, std::size_t size)
         v->resize(rows);
 }
 
-// y = (G w Gᵀ + s) x, and sum_ = Gᵀ x.
+// Computes y = (G w Gᵀ + s) x, and sum_ = Gᵀ x.
 void RowSystem::multiply(const RowSchedule& schedule, std::span<const double> x, std::span<double> y)
 {
     for (const std::uint32_t i : points) sum_[i].setZero();
@@ -51,7 +51,7 @@ void RowSystem::multiply(const RowSchedule& schedule, std::span<const double> x,
     });
 }
 
-// The first direction is that of the λ given, so that a load that has not changed is found at once.
+// The first direction is that of the given λ, so an unchanged load is found immediately.
 void RowSystem::solve(const RowSchedule& schedule, double tolerance, int most_iterations)
 {
     const std::size_t n = size();

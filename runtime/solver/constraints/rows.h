@@ -1,22 +1,23 @@
-// Rows of one constraint function, which XPBD solves from its residual and gradient alone (row.h). A function is
+// Rows of one constraint function; XPBD needs only its residual and gradient (row.h). A function looks like this:
 //
 //   struct Tie {
 //       static constexpr int points = 2;
 //       double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const;   m, or a unit with a
 //                                                                                       compliance to match
-//       static constexpr bool one_sided = true;   where C >= 0 satisfies it (pushes only); false if not said
-//       bool breaks(double residual, double pull) const;   where it can: asked at the end of every sub-step; pull:
-//                                                          the force against the gradient, N
-//       static constexpr bool rests = true;       where its points may sleep (sleep.h): the residual depends on nothing
-//                                                 but their positions and its own members; false if not said
+//       static constexpr bool one_sided = true;   if C >= 0 satisfies it (pushes only); default false
+//       bool breaks(double residual, double pull) const;   optional; called at the end of every substep; pull: the
+//                                                          force against the gradient, N
+//       static constexpr bool rests = true;       if its points may sleep (sleep.h): the residual depends only on their
+//                                                 positions and its own members; default false
 //       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
-//                              std::array<Vec3d, 2>& gradient) const;   where it has one (row.h)
+//                              std::array<Vec3d, 2>& gradient) const;   optional (row.h)
 //       template <class Archive> void serialize(Archive&);       its members, for snapshots (points/state_archive.h)
 //   };
 //
-// Two-sided rows carry their forces first, as part of the points' free motion: those over two points that form trees
-// directly (tree_motion.h), all others by conjugate gradients (row_system.h). Then, and one-sided rows altogether, they
-// take part in the projection beside contacts and shapes, by Gauss-Seidel in colours (row_schedule.h).
+// Two-sided rows first apply their forces as part of the points' free motion: rows over two points that form trees are
+// solved directly (tree_motion.h), all others by conjugate gradients (row_system.h). They then take part in the
+// projection alongside contacts and shapes, by Gauss-Seidel in colours (row_schedule.h). One-sided rows act only in
+// the projection.
 #pragma once
 
 #include <algorithm>
@@ -58,11 +59,11 @@ public:
     }
 
     std::size_t size() const { return rows_.size(); }
-    // Whether there is a row of these points, in this order. Of rows that follow() has seen.
+    // Returns true if there is a row of these points, in this order. Considers the rows at the last follow().
     bool has(const Ids& ids) const { return std::binary_search(known_.begin(), known_.end(), ids); }
 
-    // Finds the rows' points, by id; rows that have lost one are gone. A row acts while all of its points are in the
-    // group.
+    // Finds the rows' points by id, and removes rows that have lost one. A row acts only if all of its points are in
+    // the group.
     void follow(const PointSet& points, const std::string& group)
     {
         const IdIndex index(points.id());
@@ -83,7 +84,7 @@ public:
         std::sort(known_.begin(), known_.end());
     }
 
-    // Removes the rows that have acted with more than `force` (N) in the sub-step, and calls removed(ids).
+    // Removes the rows that acted with more than `force` (N) in the substep, and calls removed(ids) for each.
     template <class F>
     void break_above(double force, const Substep& step, const F& removed)
     {
@@ -96,7 +97,7 @@ public:
         });
     }
 
-    // Whether there are points to be woken in this frame, even where no row is left.
+    // Returns true if there are points to wake in this frame, even if no row is left.
     bool wakes() const { return !sleep_.disturbed().empty(); }
     // Wakes the points of all rows.
     void wake_all()
@@ -120,7 +121,7 @@ public:
 
     bool has_forces() const override { return !Traits::one_sided; }
 
-    // The schedule follows from the rows.
+    // The schedule is not stored; it is rebuilt from the rows.
     template <class Archive>
     void serialize(Archive& keep)
     {
@@ -133,7 +134,7 @@ public:
     }
 
     bool keeps_momentum() const override { return arity > 1; }
-    // at: positions; where these are empty, of the points as they are.
+    // at: positions; if empty, uses the current ones.
     void add_stored_energy(const Substep& step, std::span<const Vec3d> at, double factor,
                            std::span<double> energy) const override
     {
@@ -199,7 +200,7 @@ public:
     void warm_start(Substep& step) override
     {
         leave_out_dead(step);
-        // A shock may have woken points since.
+        // A shock may have woken points in the meantime.
         for (Row& row : rows_) row.asleep = row.asleep && sleep_.is_asleep(row, step);
         schedule(step);
         for (Row& row : rows_) {
@@ -222,7 +223,7 @@ public:
         schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].project(step); });
     }
 
-    // Of rows that hold points (holding.h).
+    // Is called for rows that hold points (holding.h).
     void settle(Substep& step)
     {
         for (Row& row : rows_)
@@ -291,7 +292,7 @@ private:
         return *kept;
     }
 
-    // A sub-step of another length begins with the same forces.
+    // A substep of another length starts with the same forces.
     void keep_impulses(double dt)
     {
         if (dt_ > 0 && dt_ != dt)
@@ -313,7 +314,7 @@ private:
         if (std::erase_if(rows_, gone) > 0) changed_ = true, known_is_complete_ = false;
     }
 
-    // Where rows have come or gone, or points have become fixed or free.
+    // Rebuilds the schedule if rows were added or removed, or points became fixed or free.
     void schedule(const Substep& step)
     {
         std::vector<std::uint8_t> fixed(step.size());
@@ -332,9 +333,9 @@ private:
     std::vector<Row> rows_;
     std::vector<Ids> known_;          // sorted
     bool known_is_complete_ = false;  // all rows are in known_
-    bool changed_ = true;             // since the schedule was made
-    std::uint64_t broken_ = 0;        // rows, in this frame
-    double dt_ = 0;                   // s, of the last sub-step
+    bool changed_ = true;             // after the schedule was built
+    std::uint64_t broken_ = 0;        // rows broken in this frame
+    double dt_ = 0;                   // s, of the last substep
     std::vector<std::uint8_t> fixed_;
     RowSchedule schedule_;
     SystemMotion<Function> system_;

@@ -6,8 +6,8 @@
 namespace rapid {
 namespace {
 
-// How far a point may be pushed within a sub-step and still be kept out of a shape that it was not near: this part of
-// its radius, and its own motion once more. One that is pushed farther is found inside at the next sub-step.
+// How far a point may be pushed within a substep and still be kept out of a shape that it was not near: this fraction
+// of its radius plus its own motion. A point pushed farther is found inside in the next substep.
 constexpr double push = 0.5;
 
 }  // namespace
@@ -31,7 +31,7 @@ void ShapeClearance::begin(std::span<const Vec3d> free)
     if (asked_at_.empty()) asked_at_.assign(free.begin(), free.end());
 }
 
-// Most are known to be far from all shapes, or close to one for long: without a branch.
+// Branchless, because most points are known to be far from all shapes, or close to one for a long time.
 void ShapeClearance::open(ShapeQuery& query, const Substep& step, std::size_t end)
 {
     const std::span<const Vec3d> free = query.free;
@@ -39,7 +39,7 @@ void ShapeClearance::open(ShapeQuery& query, const Substep& step, std::size_t en
     open.resize(end - query.begin + 1);
     std::size_t count = 0;
     for (std::size_t i = query.begin; i < end; ++i) {
-        // At least (|moved| + |moved since asked|)².
+        // An upper bound of (|moved| + |moved since the last query|)².
         const double moved2 = 2 * ((free[i] - step.start[i]).squaredNorm() + (free[i] - asked_at_[i]).squaredNorm());
         open[count] = static_cast<std::uint32_t>(i);
         count += any_moves_ | !(room_[i] > 0 && double(room_[i]) * double(room_[i]) > moved2);
@@ -62,7 +62,7 @@ void ShapeClearance::ask(ShapeQuery& query, std::size_t obstacle, const Substep&
     query.time.assign(query.P.size(), query.since);
     if (query.asked.empty()) return;
     obstacles_[obstacle].shape->distance_at(query.P, query.time, query.phi, query.gradient);
-    // Measured from where the point is now: what it is off asked_at_ is taken off.
+    // Subtracts the point's displacement from asked_at_, because the distance was measured at its current position.
     for (std::size_t k = 0; k < query.asked.size(); ++k) {
         const std::uint32_t i = query.asked[k];
         const double gap = query.phi[k] - obstacles_[obstacle].radius[i];
@@ -70,7 +70,7 @@ void ShapeClearance::ask(ShapeQuery& query, std::size_t obstacle, const Substep&
     }
 }
 
-// The points that no bound keeps away from the shape.
+// Lists the points that no bound keeps away from the shape.
 void ShapeClearance::list(ShapeQuery& query, std::size_t o, const Substep& step)
 {
     const Obstacle& obstacle = obstacles_[o];

@@ -17,15 +17,16 @@
 namespace rapid {
 namespace {
 
-// A point lies on a shape that is as near to it as this, in radii.
+// Distance, in radii, below which a point lies on a shape.
 constexpr double flush = 0.01;
 
-// Points that are handled together.
+// Points processed together.
 constexpr std::size_t points_a_chunk = 2048;
 
 bool turns(const Substep& step, std::uint32_t i) { return !step.spins.empty() && step.spins[i].k > 0; }
 
-// rad/s: of the body at a place, half of the curl of its velocity, which is linear over a length of the point's size.
+// Returns the angular velocity of the body at a position, rad/s: half the curl of its velocity, which is taken as
+// linear over the size of the point.
 Vec3d turning_of(const Obstacle& obstacle, const Vec3d& P, double length, double time)
 {
     Vec3d along[3];
@@ -104,7 +105,7 @@ void ShapeContacts::solve_impacts(Substep& step, std::uint32_t sweep)
     });
 }
 
-// Of a point that another has hit: back along the normal, to where it met the shape.
+// Moves a point that another has hit back along the normal, to the position at which it met the shape.
 void ShapeContacts::solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const
 {
     const std::uint32_t i = contact.i;
@@ -153,7 +154,7 @@ void ShapeContacts::warm_start(Substep& step)
     for_each_chunk(size_, start_chunk, points_a_chunk);
 }
 
-// What impacts have left inside, and parting, is moved out by no impulse.
+// No impulse moves out a point that impacts have left inside but separating.
 void ShapeContacts::leave_parting(ShapeContact& contact, const Substep& step)
 {
     const std::uint32_t i = contact.i;
@@ -210,7 +211,7 @@ ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std:
     return contact;
 }
 
-// A point that turns feels the surface where it touches, and how the body turns.
+// A turning point uses the surface velocity at its contact and the body's angular velocity.
 void ShapeContacts::follow_turning(ShapeContact& contact, const Vec3d& P, double time) const
 {
     const Obstacle& obstacle = obstacles_[contact.obstacle];
@@ -220,7 +221,7 @@ void ShapeContacts::follow_turning(ShapeContact& contact, const Vec3d& P, double
     contact.vc = obstacle.shape->velocity_at(P - radius * contact.n, time);
 }
 
-// The contacts of sleepers with a shape: as they were, and out of use.
+// Keeps the contacts of sleepers with a shape unchanged and inactive.
 void ShapeContacts::keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before,
                                      std::size_t obstacle) const
 {
@@ -281,7 +282,7 @@ void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
         }
 }
 
-// What shapes did to points in their free motion, among the contacts that they are found in at its end.
+// Distributes the impulses of shapes in free motion among the contacts found at its end.
 void ShapeContacts::share_reactions(const Substep& step)
 {
     tbb::parallel_for(std::size_t{0}, contacts_.size(), [&](std::size_t c) {
@@ -321,7 +322,7 @@ void ShapeContacts::share_reaction(std::span<ShapeContact* const> contacts, std:
         contacts[k]->free_friction = parts[k] / whole * tangential;
     }
     if (whole > 0) return;
-    // It has bounced, and is out of reach by now.
+    // The point has bounced and is out of reach by now.
     if (!turns(step, i)) {
         if (step.forces) step.forces->add(i, impulse.norm(), 0);
         return;
@@ -336,7 +337,7 @@ void ShapeContacts::share_reaction(std::span<ShapeContact* const> contacts, std:
         (*same)->free_impulse = impulse.norm();
 }
 
-// With the shape that is nearest.
+// Builds a contact with the nearest shape.
 std::optional<ShapeContacts::ShapeContact> ShapeContacts::missed_contact(std::uint32_t i, const Vec3d& impulse,
                                                                          const Substep& step) const
 {
@@ -383,8 +384,8 @@ void ShapeContacts::add_forces(const Substep& step) const
     });
 }
 
-// The velocity that is left into the shape is taken off; then Coulomb friction acts by the whole normal impulse.
-// Friction acts throughout the sub-step, and so half of it on the position: else a point that is held would creep.
+// Removes the remaining velocity into the shape, then applies Coulomb friction from the total normal impulse. Friction
+// acts throughout the substep, so half of it also moves the position; otherwise a held point would creep.
 void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
 {
     const double w = step.points[contact.i].w, before = contact.normal_impulse + contact.carried_impulse;
@@ -407,7 +408,7 @@ void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
     contact.tangential_impulse = tangential;
 }
 
-// The warm start of friction and rolling friction, as far as these turn the point. What bears nothing holds nothing.
+// Starts friction and rolling friction, as far as they turn the point. A contact without load holds nothing.
 void ShapeContacts::start_spinning(ShapeContact& contact, Substep& step)
 {
     if (contact.normal_impulse + contact.free_impulse > 0) {
@@ -419,7 +420,8 @@ void ShapeContacts::start_spinning(ShapeContact& contact, Substep& step)
     }
 }
 
-// The same of a point that turns, on which free motion had no friction: the shape bears it by what it did there, too.
+// Solves the same for a turning point, which had no friction in free motion, so the load includes the shape's impulse
+// there.
 void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
 {
     const double w = step.points[contact.i].w;

@@ -1,11 +1,12 @@
 // Contacts with shapes within the projection: shapes keep out points that other constraints push into them.
 //
-// The free motion of a point has been taken around all shapes before (collisions.h); what is left to a shape here is
-// what the other points press on it: along the normal, and by Coulomb friction of that. A contact is
-// C = n·x - level >= 0, with the shape's tangent plane where the point's free motion ended; at the end of the sub-step
-// what is inside of the shape itself is moved out.
+// Free motion has already taken each point around all shapes (collisions.h). The impulses here only balance the
+// pressure of other points, along the normal and by the Coulomb friction that follows from it. A contact is C = n·x -
+// level >= 0, with the shape's tangent plane at the end of the point's free motion. At the end of the substep, points
+// inside the shape itself are moved out.
 //
-// Each sub-step begins with the impulses of the one before, across frames too: a pile at rest is then solved before it
+// Each substep starts with the impulses of the previous one, even across frames, so that a pile at rest is already
+// solved before the first iteration.
 // is iterated.
 #pragma once
 
@@ -22,7 +23,7 @@
 
 namespace rapid {
 
-// What shapes bore at the end of a frame: the warm start of the next.
+// The loads on shapes at the end of a frame: the warm start of the next one.
 struct ShapeLoads {
     struct Load {
         std::int64_t id;
@@ -36,40 +37,41 @@ struct ShapeLoads {
 
 class ShapeContacts {
 public:
-    // sleep: null where no point may sleep.
+    // sleep: null if no point may sleep.
     ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep);
 
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
     void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, const Substep& step) const;
 
-    // free: where the points' free motion has ended.
+    // free: positions after the points' free motion.
     void detect(const Substep& step, std::span<const Vec3d> free);
-    // One sweep, over the points that others hit in this one or in that before.
+    // Runs one sweep over the points that were hit by others in this sweep or the previous one.
     void solve_impacts(Substep& step, std::uint32_t sweep);
     void warm_start(Substep& step);
     void project(Substep& step);
     void solve_velocities(Substep& step);
-    // To step.forces: with what shapes did to points in their free motion.
+    // Adds to step.forces, including the impulses of shapes during free motion.
     void add_forces(const Substep& step) const;
-    // Shapes drive the points that they bear.
+    // Makes shapes the drivers of the points that they support.
     void drive(EnergyIslands& islands, const Substep& step) const;
 
 private:
     struct ShapeContact {
         std::uint32_t i, obstacle;
-        Vec3d n, vc;                    // unit normal out of the shape; its velocity, m/s
-        double level;                   // m: on the shape's outer side n·x is more
-        double friction;                // μ
-        double normal_impulse;          // N s along n: at first of the projection of positions, then the whole
-        double carried_impulse;         // N s along n: that the warm start gives to velocities alone
-        Vec3d turning = Vec3d::Zero();  // rad/s, of the shape; 0 for points that do not turn
+        Vec3d n, vc;                               // unit normal out of the shape; its velocity, m/s
+        double level;                              // m: n·x is larger on the shape's outer side
+        double friction;                           // μ
+        double normal_impulse;                     // N s along n: first for the projection of positions, then the total
+        double carried_impulse;                    // N s along n: given by the warm start to velocities only
+        Vec3d turning = Vec3d::Zero();             // rad/s, of the shape; 0 for points that do not turn
         Vec3d tangential_impulse = Vec3d::Zero();  // N s along the surface
         Vec3d rolling_impulse = Vec3d::Zero();     // N s: torque / radius, of rolling friction
-        // N s: what the shape did in the free motion, along n and along the surface. Known where Substep::reaction is.
+        // N s: the impulse of the shape in free motion, along n and along the surface. Known if Substep::reaction is
+        // set.
         double free_impulse = 0;
         Vec3d free_friction = Vec3d::Zero();
     };
-    using Batch = std::vector<ShapeContact>;  // of a chunk of points, by obstacle and then by point
+    using Batch = std::vector<ShapeContact>;  // of a chunk of points, sorted by obstacle and then by point
     static bool is_before(const ShapeContact& a, const ShapeContact& b)
     {
         return std::pair(a.obstacle, a.i) < std::pair(b.obstacle, b.i);
@@ -95,7 +97,7 @@ private:
     std::size_t size_;
     const Sleep* sleep_;
     ShapeClearance clearance_;
-    std::vector<Batch> contacts_, before_;  // a chunk of points each
+    std::vector<Batch> contacts_, before_;  // by chunk of points
 };
 
 }  // namespace rapid

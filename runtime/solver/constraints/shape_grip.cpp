@@ -7,10 +7,10 @@
 namespace rapid {
 namespace {
 
-// The change of a normal without waking: a slope of 0.06 degrees.
+// The largest change of a normal that does not wake: a slope of 0.06 degrees.
 constexpr float same_normal = 1e-3f;
 
-// A step of FNV-1a.
+// One step of FNV-1a.
 std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) { return (hash ^ value) * 0x100000001b3u; }
 
 }  // namespace

@@ -15,27 +15,29 @@
 namespace rapid {
 namespace {
 
-// A point is still that goes no faster through a frame, and is no faster at its end, than these parts of what the
-// accelerations give it in a sub-step (0.03 m/s at 12 sub-steps of 24 frames a second). Solving leaves a heap of 10,000
-// grains 0.03 of it a second after it has stopped; more would hold a slope that still slides, less be reached much
-// later.
+// A point is still if its mean speed in a frame and its speed at the end are below these fractions of the speed that
+// accelerations give it in a substep (0.03 m/s at 12 substeps of 24 frames a second). Solving leaves 0.03 of it in a
+// heap of 10,000 grains a second after the heap has stopped. Larger values would hold a slope that still slides;
+// smaller values are reached much later.
 constexpr double still_shift = 0.05, still_speed = 0.25;
 
-// An island that hangs is still if, in the time that it takes to fall asleep, it gains no more speed than this part of
-// what the accelerations would give it. So a pendulum stays awake that is off by 2e-4 of its length, by any number of
-// sub-steps.
+// A hanging island is still if, in the time that it takes to fall asleep, it gains at most this fraction of the speed
+// that accelerations would give it. A pendulum with a deflection of 2e-4 of its length thus stays awake with any
+// number of substeps.
 constexpr double still_hanging = 1e-4;
 
-// What no other point presses or holds comes to rest exactly, or slides: as a part of what the accelerations give it in
-// a sub-step. Above rounding, so that what drag slows down for ever falls asleep, too.
+// The limit for points that nothing presses or holds, which come to rest exactly or slide, relative to the speed that
+// accelerations give them in a substep. Above rounding, so that a point that drag slows down forever also falls
+// asleep.
 constexpr double still_alone = 1e-6;
 
-// The part by which an acceleration may change without waking: friction may just have held what lies.
+// The relative change of an acceleration that does not wake: friction may only just have held the point.
 constexpr double same_acceleration = 1e-3;
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
-// What gains speed in a frame is not held by friction, however slow it is: it falls asleep when it does no longer.
+// A point that gains speed in a frame is not held by friction, however slow it is. It falls asleep once it no longer
+// gains speed.
 float just_before(double after) { return std::nextafter(static_cast<float>(after), 0.0f); }
 
 }  // namespace
@@ -86,7 +88,7 @@ void Sleep::open(const SleepRecords& records)
     for (std::size_t k = 0; k < islands_.size(); ++k) wake_island(k);
 }
 
-// Unless all of it sleeps.
+// Unless the whole island sleeps.
 void Sleep::wake_island(std::size_t k)
 {
     const std::span<const std::uint32_t> island = islands_[k];
@@ -148,7 +150,7 @@ void Sleep::begin(const Substep& step, std::span<const Obstacle> obstacles)
     count_sleepers(step, sleepers);
 }
 
-// Wakes points whose shapes are not what they fell asleep on.
+// Wakes points whose shapes have changed since they fell asleep.
 void Sleep::wake_by_grips(std::span<const std::uint32_t> sleepers, std::span<const Obstacle> obstacles,
                           std::span<const Vec3d> P)
 {
@@ -160,7 +162,7 @@ void Sleep::wake_by_grips(std::span<const std::uint32_t> sleepers, std::span<con
     }
 }
 
-// Wakes points that the shape touches, or may in the next sub-step, where it moves faster than what is still.
+// Wakes points that the shape touches, or may touch in the next substep, if it moves faster than a still point.
 void Sleep::wake_by_motion_of(const Obstacle& obstacle, std::span<const std::uint32_t> sleepers, const Substep& step)
 {
     const double end = (step.index + 1) * step.dt;
@@ -195,7 +197,7 @@ void Sleep::clear_loads()
         if (!asleep_[i]) load_[i] = 0;
 }
 
-// Points of islands in which nothing lies on a shape or on another point.
+// Marks the points of islands in which nothing lies on a shape or on another point.
 std::vector<std::uint8_t> Sleep::find_hanging(const Substep& step) const
 {
     std::vector<std::uint8_t> hangs(islands_.size() > 0 ? asleep_.size() : 0);
@@ -212,7 +214,7 @@ void Sleep::close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f
 {
     const auto h = static_cast<float>(lived.h);
     const std::span<float> still = points_.column<float>("still").write();
-    const double gained = step.max_acceleration * step.dt;  // m/s, in a sub-step
+    const double gained = step.max_acceleration * step.dt;  // m/s, in a substep
     const double hanging = still_hanging * step.max_acceleration * after_;
     for (std::size_t k = 0; k < islands_.size(); ++k) wake_island(k);
     const std::vector<std::uint8_t> hangs = find_hanging(step);
@@ -230,7 +232,7 @@ void Sleep::close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f
                 shift <= std::min(still_shift * gained, most) * lived.h &&
                 step.v[i].norm() <= std::min(still_speed * gained, most) &&
                 (step.spins.empty() || step.spins[i].s.norm() <= std::min(still_speed * gained, most));
-            // A sleeper that has woken begins at 0.
+            // A woken sleeper starts at 0.
             still[i] = is_still && (linked || still[i] < after_) ? still[i] + h : 0;
             if (linked || still[i] < after_) continue;
             if (step.v[i].cast<float>().squaredNorm() > v[i].squaredNorm())

@@ -1,21 +1,22 @@
-// Sleep: points at rest are left out of the sub-steps until something acts on them.
+// Sleep: points at rest are skipped in substeps until something acts on them.
 //
-// A point falls asleep when it has been still for some time: in each frame of it the point has moved by less than the
-// error of solving, a part of what the accelerations on it give a point in a sub-step. From then on it has infinite
-// mass for the others, and costs nothing. It wakes, with an effect from the next sub-step on unless said otherwise,
+// A point falls asleep after a period of stillness: in each frame of it, the point has moved by less than the solver's
+// error, a fraction of the motion that accelerations cause in a substep. It then has infinite mass for the others and
+// costs nothing. It wakes, with effect from the next substep unless stated otherwise,
 //
-//   when another hits it: at once, and with it those that the shock reaches (contact_sleep.h);
-//   when its load, or the acceleration on it, is no longer what it fell asleep under;
-//   when a shape comes or goes, or moves, where it touches it (shape_grip.h);
-//   when a node moves it, gives it a velocity, or changes what it is;
-//   when a row that acts on it comes, goes or changes, or what holds it moves (row_sleep.h).
+//   when another point hits it: immediately, and with it those that the shock reaches (contact_sleep.h);
+//   when its load, or the acceleration on it, differs from the one with which it fell asleep;
+//   when a shape that touches it is added, removed or moved (shape_grip.h);
+//   when a node moves it, gives it a velocity, or changes its properties;
+//   when a row that acts on it is added, removed or changed, or its anchor moves (row_sleep.h).
 //
-// Points that rows link (islands.h) fall asleep when all of an island is still, and wake when any of it wakes. If an
-// island only hangs, it has to be stiller than one that lies, which friction holds: a pendulum is slow where it turns,
-// too. Points of rows whose function does not say that it rests (rows.h) never sleep.
+// Points that rows link (islands.h) fall asleep when the whole island is still, and wake when any of it wakes. An
+// island that hangs must be stiller than one that lies and is held by friction, because a pendulum is also slow at its
+// turning points. Points of rows whose function does not declare `rests` (rows.h) never sleep.
 //
-// How long a point has been still is the column `still` (s), which alone decides who sleeps. What a sleeper fell asleep
-// under is kept by id from frame to frame (sleep_records.h); where it is lost, what is found is taken for it.
+// The column `still` (s) holds how long a point has been still, and alone decides which points sleep. The conditions
+// under which a point fell asleep are stored by id between frames (sleep_records.h); if they are lost, the current
+// ones are used.
 #pragma once
 
 #include <atomic>
@@ -37,15 +38,15 @@ struct Substep;
 
 class Sleep {
 public:
-    // inverse_mass: 1/kg; 0 for points that do not move, and so do not sleep. after: s.
+    // inverse_mass: 1/kg; 0 for points that do not move and thus do not sleep. after: s.
     Sleep(PointSet& points, std::span<const double> inverse_mass, double after);
 
     // Before the first sub-step, from constraints:
-    void keep_awake(std::size_t i) { kept_awake_[i] = 1, wake(i); }  // in this frame; later, too
+    void keep_awake(std::size_t i) { kept_awake_[i] = 1, wake(i); }  // in this frame; may be called later, too
     void keep_all_awake();
-    void link(std::span<const std::uint32_t> points) { islands_.link(points); }  // by a row that acts between them
-    void make_kinematic(std::uint32_t i) { islands_.make_kinematic(i); }         // a point whose position is prescribed
-    // Then: who sleeps.
+    void link(std::span<const std::uint32_t> points) { islands_.link(points); }  // by a row between them
+    void make_kinematic(std::uint32_t i) { islands_.make_kinematic(i); }         // has a prescribed position
+    // Determines which points sleep, after the calls above.
     void open(const SleepRecords& records);
 
     std::size_t size() const { return asleep_.size(); }
@@ -56,34 +57,34 @@ public:
         woken_.store(true, std::memory_order_relaxed);
     }
     double inverse_mass(std::size_t i) const { return inverse_mass_[i]; }
-    // What a sleeper fell asleep under, N: its weight, and what the others press it by.
+    // The force under which a sleeper fell asleep, N: its weight plus the pressure of others.
     double burden(std::size_t i) const { return acceleration_[i].norm() / inverse_mass_[i] + load_[i]; }
 
-    // Before a sub-step: wakes those whose shapes have changed; then counts.
+    // Is called before a substep. Wakes points whose shapes have changed, then counts the sleepers.
     void begin(const Substep& step, std::span<const Obstacle> obstacles);
-    // In this sub-step.
+    // In this substep.
     bool any() const { return count_ > 0; }
-    bool all() const { return still_ == size() && !woken_; }  // or stays where it is
+    bool all() const { return still_ == size() && !woken_; }  // and stays in place
 
-    // The acceleration of the point's free motion in this sub-step, m/s² (that of a velocity it is given, too): a
-    // sleeper wakes where it is another.
+    // Wakes a sleeper if the acceleration of its free motion in this substep, m/s², has changed. An assigned velocity
+    // counts as an acceleration.
     void check_acceleration(std::size_t i, const Vec3d& acceleration);
 
-    // Within a sub-step: wakes a sleeper, which makes up for its free motion; and all of the islands of which any point
-    // has woken, but that a kinematic point stays where it is.
+    // Wakes a sleeper within a substep and makes up for its free motion; then wakes all islands with any woken point,
+    // except that kinematic points stay in place.
     void wake_now(std::size_t i, Substep& step);
     void wake_islands_now(Substep& step);
     std::size_t woken_now() const { return woken_now_; }  // points so far
 
-    // After the last sub-step: loads are summed again, of those that are awake.
+    // Is called after the last substep. Loads are summed again, for points that are awake.
     void clear_loads();
     void add_load(std::size_t i, double force)  // N
     {
         if (!asleep_[i]) load_[i] += static_cast<float>(force);
     }
-    // Then, with P and v as they were at the beginning of the frame: points that have been still fall asleep.
+    // Then puts points that have been still to sleep, with P and v as at the beginning of the frame.
     void close(Substep& step, std::span<const Vec3f> P, std::span<const Vec3f> v, const OwnTime& lived);
-    // After rounding.
+    // Stores the sleep records, after rounding.
     void remember(SleepRecords& records, const Substep& step, std::span<const Obstacle> obstacles);
 
 private:
@@ -105,10 +106,10 @@ private:
     double after_;  // s
     Islands islands_;
     std::vector<std::uint8_t> asleep_, kept_awake_;
-    std::vector<std::uint8_t> slept_;             // of each island, whether it came to this frame asleep
-    std::atomic<bool> woken_ = false;             // any point, since the beginning of the sub-step
-    std::vector<Vec3d> acceleration_;             // m/s²; NaN where it is not known
-    std::vector<std::optional<ShapeGrip>> grip_;  // of the sleepers, where it is known
+    std::vector<std::uint8_t> slept_;             // by island: whether it was asleep at the start of this frame
+    std::atomic<bool> woken_ = false;             // any point, since the beginning of the substep
+    std::vector<Vec3d> acceleration_;             // m/s²; NaN if unknown
+    std::vector<std::optional<ShapeGrip>> grip_;  // of the sleepers, if known
     std::vector<float> load_;                     // N
     std::size_t count_ = 0, still_ = 0, woken_now_ = 0;
 };

@@ -1,4 +1,4 @@
-// What sleeping points fell asleep under, kept from frame to frame.
+// The conditions under which sleeping points fell asleep, stored between frames.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct SleepRecords {
         double inverse_mass;  // 1/kg
         Vec3f acceleration;   // m/s²
         ShapeGrip grip;       // of the shapes that it touches
-        float load;           // N, the sum of what other points press it by
+        float load;           // N, the total pressure of other points
     };
     std::vector<Record> records;
 };

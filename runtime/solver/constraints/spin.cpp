@@ -13,7 +13,7 @@ namespace {
 
 constexpr double solid_sphere = 2.5;  // m r²/I
 
-// Rounding may leave an impulse, and so what limits friction, below 0.
+// Rounding may leave an impulse, and thus the limit of friction, below 0.
 Vec3d limited(const Vec3d& x, double most)
 {
     if (!(most > 0)) return Vec3d::Zero();
@@ -21,18 +21,18 @@ Vec3d limited(const Vec3d& x, double most)
     return size > most ? Vec3d(most / size * x) : x;
 }
 
-// Friction at an impact: at most to stop the sliding velocity u, of the effective mass.
+// Returns the friction of an impact: at most the impulse that stops the sliding velocity u, with the effective mass.
 Vec3d impact_friction(const Vec3d& u, double mass, double most) { return limited(-mass * u, most); }
 
 Vec3d across(const Vec3d& x, const Vec3d& n) { return x - n.dot(x) * n; }
 
-// What an impulse q at the contact does to a spin; w: 1/kg.
+// Applies an impulse q at the contact to a spin; w: 1/kg.
 void apply(Spin& spin, double w, double lever, const Vec3d& n, const Vec3d& q)
 {
     spin.s -= lever * spin.k * w * n.cross(q);
 }
 
-// What a torque impulse does, N m s.
+// Applies a torque impulse, N m s, to a spin.
 void twist(Spin& spin, double w, const Vec3d& torque)
 {
     if (spin.k > 0) spin.s += spin.k * w / spin.radius * torque;

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// The points of a block that are no strays.
+// Bounding box of the points of a block that are not strays.
 struct Box {
     Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
     float largest = 0;  // m, radius

@@ -1,7 +1,7 @@
-// The pairs of points that a neighbour list does not hold any more, as one of them has strayed.
+// Pairs of points that a neighbour list no longer covers, because one of them has strayed.
 //
-// Strays are few: each block of the list looks for those that are near the box of its other points, and strays look for
-// each other along x.
+// Strays are few: each block of the list searches for those near the box of its other points, and strays are compared
+// with each other along x.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace rapid {
 
 class StrayPairs {
 public:
-    // Finds the pairs that are nearer than near_contact times the sum of their radii, one of them a stray, and are not
-    // listed: ascending. Points of radius 0 take no part.
+    // Finds the unlisted pairs with a stray that are closer than near_contact times the sum of their radii, ascending.
+    // Points of radius 0 take no part.
     const std::vector<ContactPair>& find(const Substep& step, std::span<const float> radius, const NeighbourList& list);
 
 private:
@@ -29,9 +29,9 @@ private:
                        std::vector<ContactPair>& found) const;
     void find_among_strays(std::span<const float> radius);
 
-    std::vector<Stray> strays_;                    // by x
+    std::vector<Stray> strays_;                    // sorted by x
     double largest_ = 0;                           // m, radius of a stray
-    std::vector<std::vector<ContactPair>> found_;  // by tasks
+    std::vector<std::vector<ContactPair>> found_;  // by task
     std::vector<ContactPair> pairs_;
 };
 

@@ -1,6 +1,6 @@
-// The motion of points that two-sided rows link to nets, through a sub-step: as in trees (tree_motion.h), with all rows
-// solved at once by conjugate gradients (row_system.h), to a part of 1e-8 or as far as `iterations` allow. The discrete
-// gradient is towards where the forces of the sub-step before would take the points.
+// The motion of points that two-sided rows link into nets, over a substep: as in trees (tree_motion.h), but with all
+// rows solved at once by conjugate gradients (row_system.h), to a relative 1e-8 or as far as `iterations` allow. The
+// discrete gradient points to the positions that the previous substep's forces would give.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ class SystemMotion {
 public:
     using Row = rapid::Row<Function>;
 
-    // Takes the points of the rows in no tree from the end of their free motion to where the rows take them.
+    // Moves the points of the rows in no tree from the end of their free motion to the solution of the rows.
     void advance(std::span<Row> rows, const RowSchedule& schedule, Substep& step)
     {
         rows_ = rows, schedule_ = &schedule, step_ = &step;
@@ -41,16 +41,15 @@ public:
 private:
     static constexpr int arity = Row::arity;
     static constexpr double accuracy = 1e-8;
-    static constexpr int iterations = 20, corrections = 10;  // for one of the step's
-    // A small net is solved whatever its masses: in exact arithmetic n rows take n iterations.
+    static constexpr int iterations = 20, corrections = 10;  // per iteration of the step
+    // A small net is solved for any masses: in exact arithmetic n rows take n iterations.
     static constexpr std::size_t small = 100;
     static constexpr int rounds = 4;
-    // Of the energy of motion, what springs that are off their length may store.
+    // Energy that springs with a wrong length may store, relative to the kinetic energy.
     static constexpr double enough = 1e-2;
-    static constexpr double coarse = 0.1;  // accuracy of a step of Newton's, of its iterations
+    static constexpr double coarse = 0.1;  // accuracy of a Newton step's linear solve
     static constexpr int newton_steps = 20, halvings = 6;
-    // Compliance of a rigid row, as a part of its points' inverse mass: rows that contradict each other get a finite
-    // load.
+    // Compliance of a rigid row, relative to its points' inverse mass, so that contradicting rows get a finite load.
     static constexpr double least_compliance = 1e-9;
 
     template <class F>
@@ -66,7 +65,7 @@ private:
         const int all = system_.size() <= small ? rounds * static_cast<int>(system_.size()) : 0;
         system_.solve(*schedule_, accuracy, std::max(all, iterations * step_->iterations));
     }
-    // A row with this gradient, residual and compliance; a row that does not act has a gradient of 0.
+    // Sets a row's gradient, residual and compliance. An inactive row has a gradient of 0.
     void set(std::size_t r, const typename Row::Vectors& gradient, double e, double s)
     {
         std::copy(gradient.begin(), gradient.end(), system_.gradient.begin() + static_cast<std::ptrdiff_t>(r * arity));
@@ -130,7 +129,8 @@ private:
         return sum;
     }
 
-    // With the discrete gradients towards `to`; moved_ is then what the forces add to the free motion.
+    // Solves with the discrete gradients towards `to`. moved_ is then the displacement that the forces add to free
+    // motion.
     void solve_forces(const std::vector<Vec3d>& to)
     {
         Substep& step = *step_;
@@ -160,7 +160,7 @@ private:
         });
     }
 
-    // Takes off the velocities along rigid rows.
+    // Removes the velocities along rigid rows.
     void solve_velocities()
     {
         Substep& step = *step_;
@@ -179,8 +179,9 @@ private:
         each_row([&](std::size_t r, Row& row) { row.impulse += system_.lambda[r]; });
     }
 
-    // Moves the points to where rigid rows have C = 0, and springs that no sub-step resolves the length that goes with
-    // their force, row by row. Not where a spring draws a point, which would take energy from it.
+    // Moves the points, row by row, until rigid rows have C = 0 and springs too stiff for the substep have the length
+    // that fits their force. Skips rows with a point drawn by a spring, because that would take energy from the
+    // spring.
     void correct_positions()
     {
         Substep& step = *step_;
@@ -194,7 +195,7 @@ private:
                     shift(row.points[l], -inverse_mass_[row.points[l]] * (C / W) * gradient[l]);
             });
     }
-    // m, how far a row is from the length that goes with its force.
+    // Returns the difference of a row's length from the one that fits its force, m.
     double off(std::size_t r, const Row& row, typename Row::Vectors& gradient) const
     {
         return row.residual(*step_, gradient) - stretch_[r];
@@ -205,8 +206,8 @@ private:
         step_->start[i] += by;
     }
 
-    // What springs are still off stores energy, the more the stiffer they are: Newton's steps for all rows at once,
-    // each as far as it brings them nearer, since a net that is nearly flat would be thrown.
+    // Springs that still have a wrong length store energy, more so the stiffer they are. Newton steps for all rows at
+    // once reduce it, with a line search, because a nearly flat net would be thrown.
     void correct_together()
     {
         const std::span<const std::uint32_t> others = schedule_->others();

@@ -1,20 +1,19 @@
-// The motion of points that two-sided rows link to trees, through a sub-step.
+// The motion of points that two-sided rows link into trees, over a substep.
 //
-// The force F of a row is the same throughout a step of length h, and acts along the discrete gradient D between the
-// points' places at its beginning and its end (row.h). With s the displacement of the free motion, X and V what a
-// constant acceleration of 1 does to place and velocity (h²/2 and h in free flight),
+// The force F of a row is constant throughout a step of length h. It acts along the discrete gradient D between the
+// points' positions at its beginning and its end (row.h). With s the displacement of the free motion, and X and V the
+// changes in position and velocity due to a constant acceleration of 1 (h²/2 and h in free flight),
 //
 //   Δx = s + w X Σ D F,   Δv = w V Σ D F
 //   rigid       D·Δx = 0
-//   compliant   α F + C + θ D·Δx = 0        θ = 1/2; 1 where α < Σ w |D|² h², which no step resolves
+//   compliant   α F + C + θ D·Δx = 0        θ = 1/2; 1 if α < Σ w |D|² h², which no step resolves
 //
-// (the energy-momentum method; Gonzalez 1996, 1999). A rigid row does no work, whatever h, F and the masses; a
-// compliant one gives its points what its C²/2α loses, or less. Then the velocities along rigid rows are taken off,
-// which only loses energy, and what is left of their residual is corrected without giving speed. So a tree gains no
-// energy.
+// (the energy-momentum method; Gonzalez 1996, 1999). A rigid row does no work for any h, F and masses; a compliant one
+// gives its points at most the energy that its C²/2α loses. Velocities along rigid rows are then removed, which only
+// loses energy, and their remaining residual is corrected without adding speed. A tree therefore gains no energy.
 //
-// Order 2. Where D does not converge, or the velocities lose too much, the tree takes steps of half the length: a light
-// point between heavy ones turns much faster than they do.
+// Order 2. If D does not converge, or removing velocities loses too much energy, the tree takes steps of half the
+// length: a light point between heavy ones turns much faster than they do.
 #pragma once
 
 #include <cmath>
@@ -31,13 +30,13 @@ class TreeMotion {
 public:
     using Row = rapid::Row<Function>;
 
-    // One tree of rows; first: the index of its first link. Call it before the others.
+    // Selects one tree of rows; first: the index of its first link. Must be called before the functions below.
     void begin(std::span<Forest::Link> tree, std::size_t first, std::span<Row> rows)
     {
         tree_ = tree, first_ = first, rows_ = rows;
     }
 
-    // Takes the points from the end of their free motion to where the rows take them.
+    // Moves the points from the end of their free motion to the solution of the rows.
     void advance(Substep& step)
     {
         read(step);
@@ -60,7 +59,7 @@ public:
         write(step);
     }
 
-    // Keeps C at the rows' reference where others have pushed the points since.
+    // Restores C to the rows' reference after others have pushed the points.
     void project(Substep& step)
     {
         double residuals = 0;
@@ -86,7 +85,7 @@ public:
         }
     }
 
-    // Takes off the velocities that are left along rigid rows.
+    // Removes the remaining velocities along rigid rows.
     void solve_velocities(Substep& step)
     {
         for (Forest::Link& link : tree_) {
@@ -106,17 +105,17 @@ public:
     }
 
 private:
-    static constexpr double absent = std::numeric_limits<double>::infinity();  // compliance of a row that does not act
+    static constexpr double absent = std::numeric_limits<double>::infinity();  // compliance of an inactive row
 
-    // A sub-step is halved up to so many times; where a step has not found D to this part of a row's length within so
-    // many solutions, or its velocities lose more than this part of the energy in the sub-step.
+    // Limits on halving a substep. A step is halved if it has not found D to `largest_error`, relative to a row's
+    // length, within `most_solutions`, or if its velocities lose more than `largest_loss` of the substep's energy.
     static constexpr int most_halvings = 8, most_solutions = 4, most_corrections = 3;
     static constexpr double largest_error = 1e-6, largest_loss = 1e-5;
 
     struct Point {
-        Vec3d P, v, a;    // where a step begins; a: of the free motion, m/s²
+        Vec3d P, v, a;    // at the beginning of a step; a: of the free motion, m/s²
         double w;         // 1/kg
-        Vec3d corrected;  // m, so far in this sub-step
+        Vec3d corrected;  // m, so far in this substep
     };
 
     // Points are numbered by link: the root is 0, the child of link k is k + 1.
@@ -163,7 +162,7 @@ private:
             const Mobility mobility = step.mobility_of(i);
             const bool moves = at.w > 0;
             const Vec3d s = moves ? step.displacement[i] : Vec3d(at.P - step.start[i]);
-            // The parabola that ends there, with this velocity.
+            // The parabola that ends there with this velocity.
             from_[k] = {at.P - s, 2 / h_ * s - step.v[i], 2 / h_ * (step.v[i] - s / h_),
                         moves ? step.inverse_mass[i] : 0, Vec3d::Zero()};
             x_[k] = mobility.x, u_[k] = mobility.v;
@@ -178,7 +177,7 @@ private:
         }
     }
 
-    // From where from_ is to to_.
+    // Computes to_ from from_.
     void take_step()
     {
         if (is_ballistic_) {
@@ -204,7 +203,7 @@ private:
         correct_positions();
     }
 
-    // One solution for the forces, along the discrete gradients towards to_.
+    // Solves once for the forces, along the discrete gradients towards to_.
     void solve_motion()
     {
         for (std::size_t k = 0; k < tree_.size(); ++k) {
@@ -240,7 +239,7 @@ private:
         }
     }
 
-    // Takes off the velocities along rigid rows; returns the energy that they lose, J.
+    // Removes the velocities along rigid rows. Returns the energy lost, J.
     double project_velocities(std::vector<Point>& points)
     {
         for (std::size_t k = 0; k < tree_.size(); ++k) {
@@ -262,7 +261,7 @@ private:
         return lost;
     }
 
-    // Newton's steps to where the rigid rows have C = 0.
+    // Takes Newton steps until the rigid rows have C = 0.
     void correct_positions()
     {
         for (int n = 0; n < most_corrections; ++n) {
@@ -291,8 +290,8 @@ private:
         }
     }
 
-    // Of a step of Newton's: no point goes further than the residuals are together. Pins that no tree can join, and
-    // links that are nearly folded, would throw points about.
+    // Returns the fraction of a Newton step for which no point moves much farther than the sum of the residuals. Pins
+    // that no tree can connect, and nearly folded links, would otherwise throw points around.
     double reasonable_part(double residuals, const Vec3d& root) const
     {
         double farthest = root.norm();
@@ -300,7 +299,7 @@ private:
         return farthest > 2 * residuals ? 2 * residuals / farthest : 1;
     }
 
-    // As far as the springs of the points' free motion do not take energy from a correction.
+    // Returns the largest fraction of a correction that takes no energy from the springs of the points' free motion.
     double largest_free_part(const Vec3d& root) const
     {
         double slope = 0, curvature = 0;
@@ -335,12 +334,12 @@ private:
     std::size_t first_ = 0;
     std::span<Row> rows_;
     std::vector<Point> from_, to_;
-    std::vector<double> x_, u_;   // what an acceleration of 1 m/s² does to place and velocity in a step, s² and s
+    std::vector<double> x_, u_;   // changes in position and velocity due to 1 m/s² in a step, s² and s
     std::vector<double> forces_;  // N, of the links
-    std::vector<Vec3d> pull_;     // Mobility's
+    std::vector<Vec3d> pull_;     // Mobility::pull
     std::vector<double> stiffness_;
     Vec3d root_shift_;
-    double h_ = 0;                   // s, of the step
+    double h_ = 0;                   // s, length of the step
     double kinetic_ = 0, lost_ = 0;  // J, at the end of the step
     bool is_ballistic_ = true, is_rigid_ = true, converged_ = false;
 };

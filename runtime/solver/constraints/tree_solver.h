@@ -1,9 +1,9 @@
 // Direct solution of a tree of links.
 //
-// One sweep of Gauss-Seidel carries a correction one link far, so that a chain of 1,000 links would need as many. The
-// linear system of a tree is solved in one pass from the leaves to the root and one back, in linear time (Baraff 1996).
-// What each point can still do, once its subtree is joined to it, is a 3 by 3 mobility, to which a link is joined by an
-// update of rank one: no matrix is inverted, and rigid links to points that do not move need no care.
+// One sweep of Gauss-Seidel propagates a correction by one link, so a chain of 1,000 links would need 1,000 sweeps.
+// The linear system of a tree is solved in one pass from the leaves to the root and one back, in linear time (Baraff
+// 1996). The mobility that a point has left after its subtree is joined to it is a 3 by 3 matrix. A link joins it by a
+// rank-one update: no matrix is inverted, and rigid links to fixed points need no special case.
 #pragma once
 
 #include <algorithm>
@@ -15,20 +15,20 @@ namespace rapid {
 
 // Solves one tree for the multipliers λ of its links and the shifts of its points:
 //
-//   Δ = w Σ g λ           of each point, over its links
-//   Σ g·Δ + s λ = -e      of each link, over its two ends
+//   Δ = w Σ g λ           per point, over its links
+//   Σ g·Δ + s λ = -e      per link, over its two ends
 //
-// Given are each link's gradients g, e and s >= 0 (infinite: the link does not act), and by w(k) the weights: of the
-// root for k = 0, of the child of link k - 1 else. A weight of 0 is a point that does not move. Returns the root's
-// shift; link.lambda and link.shift are set. `first` is the index of the tree's first link.
+// Each link provides gradients g, e and s >= 0 (infinite: the link does not act). w(k) provides the weights: of the
+// root for k = 0, else of the child of link k - 1. A point with weight 0 does not move. Returns the root's shift, and
+// sets link.lambda and link.shift. `first` is the index of the tree's first link.
 template <class Weight>
 Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const Weight& w)
 {
-    // A link that what is joined already leaves no way to go gives by this part of what its ends would: pins that no
-    // tree can reach get a finite load.
+    // Compliance of a link that the joined part leaves no freedom, relative to the freedom of its ends alone, so that
+    // pins that no tree can reach get a finite load.
     constexpr double least_compliance = 1e-9;
 
-    // From the leaves: `mobility` is what an impulse shifts a point by, `shift` what its subtree does.
+    // From the leaves: `mobility` is the shift of a point per impulse, `shift` that due to its subtree.
     Eigen::Matrix3d root_mobility = w(0) * Eigen::Matrix3d::Identity();
     Vec3d root_shift = Vec3d::Zero();
     for (std::size_t k = 0; k < tree.size(); ++k) {
@@ -52,7 +52,7 @@ Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const Weight& 
         shift -= link.e / link.s * link.reach;
     }
 
-    // Back: `shift` is the sum of the impulses on a point, of its links so far.
+    // Back to the leaves: `shift` accumulates the impulses of its links on a point.
     root_shift.setZero();
     for (std::size_t k = 0; k < tree.size(); ++k) {
         Forest::Link& link = tree[k];

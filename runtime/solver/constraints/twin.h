@@ -1,4 +1,4 @@
-// Twins of constraints (Constraint::twin), for those whose memory is a member of the constraint.
+// Twins of constraints (Constraint::twin), for constraints that store their memory as a member.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,8 @@
 
 namespace rapid {
 
-// A constraint like `constraint`, whose `memory` is that of `before`, or else a copy.
+// Returns a copy of `constraint` that continues the `memory` of `before`, or a copy of its own memory if `before` is
+// null.
 template <class C, class Memory>
 std::shared_ptr<const Constraint> twin_of(const C& constraint, std::shared_ptr<Memory> C::*memory,
                                           const Constraint* before)
@@ -19,7 +20,7 @@ std::shared_ptr<const Constraint> twin_of(const C& constraint, std::shared_ptr<M
     return twin;
 }
 
-// Of a constraint with a state: that of what it remembers.
+// Interface of a constraint that saves and loads its memory.
 class Remembering {
 public:
     virtual ~Remembering() = default;
@@ -27,7 +28,7 @@ public:
     virtual void load(StateReader& from) const = 0;
 };
 
-// The base of a constraint C whose memory is its node's.
+// Base of a constraint C whose memory belongs to its node.
 template <class C, class Memory>
 class RememberingConstraint : public Constraint, public Remembering {
 public:

@@ -1,4 +1,4 @@
-// Which points of a block may come near which obstacle on their free paths, by bounding boxes.
+// Finds the points of a block that may come near each obstacle on their free paths, using bounding boxes.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ class BroadPhase {
 public:
     explicit BroadPhase(const CollisionBlock& block) : block_(block) {}
 
-    // A new block.
+    // Starts a new block.
     void begin()
     {
         near_.resize(block_.obstacles.size());
@@ -22,7 +22,7 @@ public:
             largest_radius_.push_back(obstacle.largest_radius(block_.indices));
     }
 
-    // Only obstacles that look for contacts on paths are near anything.
+    // Skips obstacles that do not look for contacts on paths.
     void find(const FreePaths& paths)
     {
         obstacles_near_.assign(block_.size(), 0);
@@ -36,7 +36,7 @@ public:
 
     const std::vector<std::uint32_t>& points_near(std::size_t obstacle) const { return near_[obstacle]; }
     int obstacles_near(std::size_t i) const { return obstacles_near_[i]; }
-    // Of the block's points at this obstacle, m.
+    // The largest radius of the block's points at this obstacle, m.
     double largest_radius(std::size_t obstacle) const { return largest_radius_[obstacle]; }
 
 private:

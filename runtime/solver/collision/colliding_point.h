@@ -1,5 +1,5 @@
-// A point that has met a shape in this sub-step: what is left of the sub-step, the surfaces that bear it, and its next
-// path.
+// The state of a point that has met a shape in this substep: the remaining time, the surfaces that support it, and its
+// next path.
 #pragma once
 
 #include <cmath>
@@ -11,11 +11,11 @@
 
 namespace rapid {
 
-// What forces have done to a point, J/kg, by the accelerations that stand for them: the rest of what its energy of
-// motion has changed by is the work of contacts.
+// The work of forces on a point, J/kg, computed from the accelerations that represent them. The rest of the change in
+// kinetic energy is the work of contacts.
 struct ForceWork {
-    double kinetic = 0;  // J/kg, that it had at first
-    double work = 0;     // J/kg, up to the place `from`
+    double kinetic = 0;  // J/kg, initial
+    double work = 0;     // J/kg, up to the position `from`
     Vec3d from = Vec3d::Zero();
 
     void begin(const Vec3d& P, const Vec3d& v) { *this = {0.5 * v.squaredNorm(), 0, P}; }
@@ -28,11 +28,11 @@ struct ForceWork {
     }
 };
 
-// What a point may meet in one sub-step before the rest of it is dropped, counted in contacts and in pieces of a path
-// along a curved surface.
+// Limit of contacts, plus pieces of a path along a curved surface, that a point may have in one substep before the
+// rest is dropped.
 constexpr int max_contacts = 100000;
 
-// The shortest piece of a path along a curved surface whose shape has no smallest feature, as a part of the sub-step.
+// The shortest piece of a path along a curved surface whose shape has no smallest feature, relative to the substep.
 constexpr double min_piece = 1.0 / 4096;
 
 struct CollidingPoint {
@@ -40,7 +40,7 @@ struct CollidingPoint {
         Free,
         Straight,  // along flat surfaces
         Curved,    // along a curved surface; `path` is then the chord
-        Waits,     // its path is planned again, with what has become known of the surface
+        Waits,     // its path is planned again, using what is now known of the surface
     };
 
     // The end of a piece along a curved surface.
@@ -51,13 +51,13 @@ struct CollidingPoint {
     };
 
     std::uint32_t i = 0;  // in the block
-    double left = 0;      // s of the sub-step
+    double left = 0;      // s, remaining in the substep
     double piece = 0;     // s: the length of the next piece along a curved surface
-    int events = 0;       // towards max_contacts
-    int ejections = 0;    // times that it was taken out of a shape
-    ForceWork by_forces;  // since it met a shape; under linear forces alone
+    int events = 0;       // counted towards max_contacts
+    int ejections = 0;    // number of times that it was moved out of a shape
+    ForceWork by_forces;  // since it met a shape; only under linear forces
 
-    // Where it was, after how many events, when chatter was last looked for.
+    // Position and event count at the last check for chatter.
     int checked_events = 0;
     Vec3d checked_P = Vec3d::Constant(std::numeric_limits<double>::infinity());
 
@@ -69,7 +69,7 @@ struct CollidingPoint {
     PathKind kind = Free;
     bool stops = false;                                 // at the end of the path, on the surface
     PieceEnd end;                                       // of a curved path
-    Vec3d slip = Vec3d::Zero(), drive = Vec3d::Zero();  // of one that viscosity slows: velocity and acceleration
+    Vec3d slip = Vec3d::Zero(), drive = Vec3d::Zero();  // velocity and acceleration of a point slowed by viscosity
 
     void begin(std::uint32_t point, double dt)
     {
@@ -85,10 +85,10 @@ struct CollidingPoint {
     {
         return (supports > 0 && on[0].collider == obstacle) || (supports > 1 && on[1].collider == obstacle);
     }
-    // Flat along all the surfaces that it rests on.
+    // Returns true if all surfaces that it rests on are flat.
     bool is_on_flat() const { return on[0].flat && (supports < 2 || on[1].flat); }
 
-    // Ends the path after `duration`, unless it is over sooner.
+    // Ends the path after `duration` at the latest.
     void limit_path(double duration)
     {
         if (path.duration > duration) path.duration = duration, stops = false;

@@ -45,10 +45,10 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     }
 }
 
-// Between contacts the mean acceleration stands for springs: where these turn a point several times in the sub-step it
-// may come out with any energy. It keeps what it had, what displacements have given it, and what shapes that move can;
-// a place that this does not reach is not taken, and the point waits where the sub-step began. What has changed its
-// energy then is the work of contacts; drag, which may have taken part of it, gives none.
+// Between contacts, the mean acceleration represents springs. If springs turn a point several times in the substep,
+// its energy may come out arbitrary. The energy is therefore limited to what the point had, plus the work of
+// displacements and of moving shapes. A position beyond that energy is rejected, and the point waits at its initial
+// position. Its energy change is then the work of contacts; drag, which may have taken part of it, adds none.
 void Collisions::limit_energy(std::size_t displaced)
 {
     constexpr double rounding = 1e-12;
@@ -58,7 +58,7 @@ void Collisions::limit_energy(std::size_t displaced)
         Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
-        // As it is seen from the shape that a spring draws the point to, which goes with V.
+        // As seen from the shape that a spring attaches the point to, which moves with V.
         const Vec3d from = motion_.initial_P(i) + by, V = motion_.frame_velocity(i, from), way = block_.dt[i] * V;
         const Vec3d v0 = motion_.initial_v(i) - V;
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);
@@ -81,8 +81,8 @@ void Collisions::limit_energy(std::size_t displaced)
     }
 }
 
-// m/s: the fastest that a shape goes, as it is seen from what goes with V, where a spring may take the point, between
-// where it is and as far behind the place that draws it.
+// Returns the largest speed of a shape, m/s, relative to a frame that moves with V, in the region that the spring may
+// take the point to: between its position and the same distance beyond the spring's center.
 double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from, const Vec3d& V) const
 {
     constexpr double rounding = 1e-9;
@@ -101,13 +101,14 @@ double Collisions::speed_of_shapes(std::size_t i, const Vec3d& from, const Vec3d
     return fastest;
 }
 
-// J/kg: the most that a point on a spring has after shapes of the speed V have met it. Each time that the spring brings
-// it back they give it twice their speed at most, and they push it V t against the spring:
+// Returns an upper bound of the energy of a point on a spring after shapes of the speed V have met it, J/kg. Each time
+// the spring brings it back, they give it at most twice their speed, and they push it V t against the spring:
 //
 //   √(2E) <= √(2E0) + 2V (1 + Ωt)          E above the least potential energy
 //
-// which is that of where the forces balance, or, of a spring to a surface, of as far as the point may go along it.
-// Where the spring turns it by less than a radian in the sub-step, what stands for it is right, and has no bound.
+// The minimum is at the balance of forces or, for a spring to a surface, as far as the point may move along it. If the
+// spring turns the point by less than a radian in the substep, the mean acceleration is accurate and no bound is
+// needed.
 double Collisions::driven_energy(std::size_t i, const Vec3d& from, double energy, double speed) const
 {
     constexpr double unbounded = std::numeric_limits<double>::infinity();
@@ -126,7 +127,7 @@ double Collisions::driven_energy(std::size_t i, const Vec3d& from, double energy
     return least + 0.5 * root * root;
 }
 
-// By the paper's methods, which correct after the sub-step.
+// Applies the paper's methods, which correct after the substep.
 void Collisions::correct()
 {
     if (!motion_.is_damped()) return discrete_.correct();
@@ -135,7 +136,7 @@ void Collisions::correct()
     audit_.add_corrections(P, v, motion_);
 }
 
-// Points that meet nothing are then at the end of the sub-step.
+// Moves points to the end of the substep if they meet nothing.
 void Collisions::move_along_free_paths()
 {
     motion_.trace();
@@ -143,7 +144,7 @@ void Collisions::move_along_free_paths()
     broad_phase_.find(motion_.paths());
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o) find_first_contacts(o);
 
-    // All go to the ends of their free paths. Those that are stuck, or meet something, come back from there.
+    // All points go to the ends of their free paths. Those that are stuck, or meet something, go back.
     motion_.go_to_ends();
     for (const std::uint32_t i : stuck_.list()) motion_.go_back(i);
     for (const StuckPoints::Loose& loose : stuck_.loose()) {

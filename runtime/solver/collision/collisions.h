@@ -1,13 +1,14 @@
-// Moves a block of points along their paths through all shapes at once: to the first contact along each path, whichever
-// shape it is with; from there by the response, or along the surface where the point comes to rest on it; until the
-// sub-step is over (numerics.md, Collision). The motion of a point does not depend on the others.
+// Moves a block of points along their paths through all shapes at once: to the first contact of each path with any
+// shape, from there by the response, or along the surface if the point comes to rest on it, until the substep is over
+// (numerics.md, Collision). The motion of a point does not depend on the others.
 //
-// That a point rests is not stored: at the next step it is found touching the surface and pressed to it again.
+// A resting state is not stored: in the next step the point is again found touching the surface and pressed against
+// it.
 //
-// The parts of a sub-step, in order: StuckPoints are carried along; BroadPhase finds the free paths (FreeMotion) that
-// may come near a shape; PlaneContacts solves those near a plane in closed form, FirstContacts asks the shapes about
-// the others; ContactRounds takes the points that meet something to the end of the sub-step; DiscreteMethods correct
-// positions there. At the end of the frame come PenetrationCorrection and PositionRounding.
+// The parts of a substep, in order: StuckPoints are carried along; BroadPhase finds the free paths (FreeMotion) that
+// may come near a shape; PlaneContacts solves those near a plane in closed form, and FirstContacts queries the shapes
+// for the others; ContactRounds takes points with contacts to the end of the substep; DiscreteMethods corrects
+// positions there. PenetrationCorrection and PositionRounding follow at the end of the frame.
 #pragma once
 
 #include <cstdint>
@@ -37,29 +38,30 @@ public:
     Collisions(const Collisions&) = delete;
     Collisions& operator=(const Collisions&) = delete;
 
-    // A new block, of the points at these indices of the set.
+    // Starts a new block with the points at these indices of the set.
     void begin(std::span<const std::uint32_t> indices);
 
     void advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& drift);
 
-    // Rounds the positions to single precision; `rounded` holds those at the beginning of the frame. What is on a
-    // surface stays on its outer side. Returns the deepest that a point which has met a shape since begin() is in one
-    // of them, m.
+    // Rounds the positions to single precision; `rounded` holds those at the beginning of the frame. Points on a
+    // surface stay on its outer side. Returns the largest penetration, m, among points that have met a shape since
+    // begin().
     double round(std::span<Vec3d> P, std::span<Vec3f> rounded);
 
-    // Since begin(), of points of the block: whether one has met a shape; how far off a discrete method may have put
-    // it, m; whether it has gone along with a shape that holds it for good; those that were taken out of a shape at
-    // once, and by round().
+    // State of the block's points since begin(). has_met() returns true if a point has met a shape. position_error()
+    // bounds the error that a discrete method may have caused, m. is_carried() returns true if the point moved with a
+    // shape that holds it permanently. The displacements moved points out of a shape immediately, the corrections in
+    // round().
     bool has_met(std::size_t i) const { return touched_.has(i); }
     double position_error(std::size_t i) const { return discrete_.position_error(i); }
     bool is_carried(std::size_t i) const { return stuck_.holds_for_good(i); }
     std::span<const Ejection::Displacement> displacements() const { return ejection_.displacements(); }
     std::span<const Ejection::Displacement> corrections() const { return correction_.displacements(); }
 
-    // J/kg, by contacts in the motion of a point of the block under linear forces, since begin().
+    // Returns the work of contacts in the motion of a point under linear forces, J/kg, since begin().
     double contact_work(std::size_t i) const { return audit_.work().empty() ? 0 : audit_.work()[i]; }
 
-    // Of all blocks.
+    // Returns the counts of all blocks.
     const ContactCounts& counts() const { return audit_.counts(); }
 
 private:

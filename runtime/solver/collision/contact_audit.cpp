@@ -5,7 +5,7 @@
 namespace rapid {
 namespace {
 
-// Of a point that is displaced several times, by what it is altogether.
+// Sums the displacements of each point.
 std::map<std::uint32_t, Vec3d> by_point(std::span<const Ejection::Displacement> displacements)
 {
     std::map<std::uint32_t, Vec3d> sums;
@@ -31,7 +31,7 @@ void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
                                  static_cast<float>(impulse), records});
 }
 
-// A free path keeps v²/2 - a·P, so any change of it is the work of contacts.
+// A free path conserves v²/2 - a·P, so any change of it is the work of contacts.
 void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion)
 {
     for (const std::uint32_t i : touched.list()) {
@@ -44,7 +44,7 @@ void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& s
     }
 }
 
-// What carries a point gives it what its motion gains, and bears it against the acceleration of its forces.
+// A carrier supplies the point's gain in kinetic energy, and the work against its forces.
 void ContactAudit::add_carried(const StuckPoints& stuck, const FreeMotion& motion)
 {
     for (const StuckPoints::Carried& at : stuck.carried()) {

@@ -1,4 +1,4 @@
-// The audit of contacts: how many there were, what is written of them to the points, and what they did to the energy.
+// The audit of contacts: counts them, records them for the points, and sums their effect on energy.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@
 namespace rapid {
 
 struct ContactCounts {
-    std::uint64_t contacts = 0;  // faster than those that a point at rest has by rounding
-    std::uint64_t limited = 0;   // points that ran into the limit of contacts in a step
-    std::uint64_t trapped = 0;   // points that are in a shape at the end of the frame, with no way out
+    std::uint64_t contacts = 0;  // faster than those of a resting point, which are due to rounding
+    std::uint64_t limited = 0;   // points that reached the limit of contacts in a step
+    std::uint64_t trapped = 0;   // points inside a shape at the end of the frame, with no way out
     ContactEnergy energy;
 };
 
@@ -25,16 +25,16 @@ class ContactAudit {
 public:
     explicit ContactAudit(const CollisionBlock& block) : block_(block) {}
 
-    // An impact of a point of the block.
+    // Adds an impact of a point of the block.
     void add(std::size_t i, int obstacle, const Impact& impact);
     void add_limited() { ++counts_.limited; }
     void add_trapped(std::size_t points) { counts_.trapped += points; }
-    // At the end of a sub-step: of the points that have moved freely at first; of those that shapes carry.
+    // Are called at the end of a substep: for points that moved freely at first, and for points that shapes carry.
     void add_energy(const TouchedPoints& touched, const StuckPoints& stuck, const FreeMotion& motion);
     void add_carried(const StuckPoints& stuck, const FreeMotion& motion);
 
-    // Under linear forces: the work of contacts in the motion of a point, J/kg, which is known once its sub-step is
-    // over; the work of displacements, and of corrections after the sub-step from P and v.
+    // Under linear forces: the work of contacts in the motion of a point, J/kg, known when its substep is over; the
+    // work of displacements, and of corrections after the substep from P and v.
     void begin_work();
     void add_work(std::size_t i, double by) { work_[i] += by; }
     void set_work(std::size_t i, double work) { work_[i] = work; }
@@ -42,12 +42,12 @@ public:
     void count_work(const TouchedPoints& touched);
     void add_displacements(std::span<const Ejection::Displacement> displacements, const FreeMotion& motion);
     void add_corrections(std::span<const Vec3d> P, std::span<const Vec3d> v, const FreeMotion& motion);
-    // J/kg, by contacts in the motion of a point since the block began; empty without linear forces.
+    // Returns the work of contacts on each point since the block began, J/kg; empty without linear forces.
     std::span<const double> work() const { return all_work_; }
 
-    // A new block.
+    // Starts a new block.
     void begin() { all_work_.clear(); }
-    // The work of displacements that have led to P at the end of the frame.
+    // Adds the work of displacements that led to P at the end of the frame.
     void add_final_corrections(std::span<const Vec3d> P, std::span<const Ejection::Displacement> displacements,
                                const FreeMotion& motion);
 
@@ -56,7 +56,7 @@ public:
 private:
     const CollisionBlock& block_;
     ContactCounts counts_;
-    std::vector<double> work_, all_work_;  // J/kg, by point of the block: in this sub-step or half of it, and so far
+    std::vector<double> work_, all_work_;  // J/kg, by point of the block: in this substep or half of it, and in total
 };
 
 }  // namespace rapid

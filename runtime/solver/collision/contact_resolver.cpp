@@ -8,21 +8,21 @@
 namespace rapid {
 namespace {
 
-// The part of its size that a velocity after a bounce may have along the normal of a surface that the point rests on,
-// and leave the point on it: rounding.
+// Relative normal velocity after a bounce, due to rounding, up to which a point stays on the surface that it rests on.
 constexpr double tangential = 1e-9;
 
-// The part of its size that a velocity along one side of a valley may have out of the other side, for the point to stay
-// in the valley: what two responses leave of a velocity across it.
+// Relative velocity along one side of a valley and out of the other side up to which the point stays in the valley:
+// two responses leave this much of a velocity across it.
 constexpr double valley = 1e-6;
 
-// Impacts of a point in one sub-step that come soon after another, after which it rests where it is for what is left of
-// that: between shapes that close in on it there is no end of them. Those of a fast point that crosses a room, or of
-// one that comes to rest on a surface, are farther apart, or fewer.
-constexpr int max_impacts = 2000;  // more than after which chatter is looked for (path_planner.cpp)
-constexpr double soon = 1e-4;      // of the sub-step
+// Limit of impacts of a point in one substep that follow soon after another, after which it rests for the remaining
+// time: between closing shapes, impacts never end. Impacts of a fast point that crosses a room, or of one that comes
+// to rest on a surface, are farther apart, or fewer.
+constexpr int max_impacts = 2000;  // larger than the event count of a chatter check (path_planner.cpp)
+constexpr double soon = 1e-4;      // relative to the substep
 
-// Counts an impact towards max_contacts, as what it makes of max_impacts; chatter is looked for by the rest.
+// Counts an impact towards max_contacts with the weight that makes the limit max_impacts. Chatter checks ignore that
+// weight.
 bool is_jammed(CollidingPoint& point)
 {
     constexpr int weight = max_contacts / max_impacts;
@@ -61,8 +61,8 @@ void ContactResolver::resolve_on_path(CollidingPoint& point, const Contact& cont
         resolve(point, {path.at(s), path.v + s * path.a, path.a, path.v}, contact, o);
 }
 
-// A contact that was found on the chord of a piece along a curved surface: the arc is off the chord by
-// κ d²/2 u (1 - u).
+// Corrects a contact found on the chord of a piece along a curved surface: the arc deviates from the chord by κ d²/2 u
+// (1 - u).
 ContactResolver::Arrival ContactResolver::arrival_on_chord(CollidingPoint& point, double time) const
 {
     const Path& chord = point.path;
@@ -77,7 +77,7 @@ ContactResolver::Arrival ContactResolver::arrival_on_chord(CollidingPoint& point
     return {chord.P + u * d + 0.5 * end.curvature * d.squaredNorm() * u * (1 - u) * on.n, v, end.a, chord.v};
 }
 
-// The shape keeps the point, or ends its life: its sub-step is over.
+// Ends the substep of a point that the shape holds or kills.
 void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int o)
 {
     const Obstacle& obstacle = block_.obstacles[o];
@@ -99,10 +99,10 @@ void ContactResolver::capture(CollidingPoint& point, const Contact& contact, int
     point.on[0] = {o, contact.n, contact.vc, contact.curvature, 0, contact.flat, obstacle.feature};
 }
 
-// After a contact that leaves with the speed u, under the acceleration g into the surface, all further bounces together
-// take 2u/(g (1 - ε)). Where they would be over within this sub-step the point rests from now on. The momentum that
-// they would take from the tangent by friction is that of one contact with ε = 0 and the sliding after it, to the last
-// digit: μ (1 + ε) |vn| (1 + ε + ε² + ...) = μ |vn| + μ g 2u/(g (1 - ε)).
+// After a contact that leaves with the speed u, under the acceleration g into the surface, all further bounces
+// together take 2u/(g (1 - ε)). If they would be over within this substep, the point rests from now on. The momentum
+// that they would take from the tangent by friction equals, to the last digit, that of one contact with ε = 0 and the
+// subsequent sliding: μ (1 + ε) |vn| (1 + ε + ε² + ...) = μ |vn| + μ g 2u/(g (1 - ε)).
 void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o)
 {
     const Obstacle& obstacle = block_.obstacles[o];
@@ -117,7 +117,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     const double g = -(a - ac).dot(n) - contact.curvature * (along - contact.vc).squaredNorm();
     const double u = vn < 0 ? -epsilon * vn : vn;
     const double tolerance = obstacle.contact_tolerance(P, block_.radius(obstacle, i));
-    const double rising2 = g > 0 ? 2 * g * tolerance : 0;  // of a speed that lifts by less than rounding
+    const double rising2 = g > 0 ? 2 * g * tolerance : 0;  // for a speed that lifts by less than rounding
     const bool hits = vn < 0 && vn * vn > rising2;
     const double when = block_.time(i, point.left);
 
@@ -131,7 +131,7 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
                           ac,
                           obstacle.viscosity[block_.indices[i]],
                           obstacle.adhesion_to_sliding(block_.indices[i])};
-    // Of a surface that moves a velocity has the rounding of both.
+    // A velocity relative to a moving surface has the rounding of both.
     const double still = tangential * relative.norm() + 0x1p-50 * contact.vc.norm();
     if (g < -support.adhesion && vn >= -still)
         part(point, arrival, contact, o, (a - ac).norm());
@@ -149,18 +149,19 @@ void ContactResolver::respond(CollidingPoint& point, const Arrival& arrival, con
     if (hits) audit_.add(i, o, {P, n, contact.vc, -vn, v, block_.v[i] - v, when});
 }
 
-// The point touches the surface, and is pulled off it. pull: m/s², in the surface's frame.
+// Handles a point that touches the surface and is pulled off it. pull: m/s², in the surface's frame.
 void ContactResolver::part(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int o, double pull)
 {
     const std::size_t i = point.i;
     if (contact.flat) {
-        // An approach by rounding alone would be met again and again at the same moment. What the point rests on
-        // besides still bears it.
+        // An approach due to rounding would be met again and again at the same time. Other surfaces that the point
+        // rests on still support it.
         block_.v[i] -= std::min((arrival.v - contact.vc).dot(contact.n), 0.0) * contact.n;
         return;
     }
-    // It touches as far as a field can tell: the next moments belong to the path. They are long enough for a point that
-    // grazes an edge to pass it in some steps, and too short for one that a facet bears after all to sink into it.
+    // The point touches to within the accuracy of the field, so the next moments belong to the path. They are long
+    // enough for a point that grazes an edge to pass it in a few steps, and too short for a point that a facet does
+    // support to sink into it.
     const Obstacle& obstacle = block_.obstacles[o];
     const double speed = (arrival.v - contact.vc).norm();
     const double passes = obstacle.feature > 0 ? time_to_travel(obstacle.feature / 64, speed, pull) : 0;
@@ -184,7 +185,7 @@ void ContactResolver::bounce(CollidingPoint& point, const Support& support, doub
     if (point.left == 0 && point.supports == 0) point.on[0] = support, point.supports = 1;
 }
 
-// The point rests on one more surface: on one it slides, on two along their edge, on three nowhere.
+// Adds a support: on one surface the point slides, on two it moves along their edge, on three it stops.
 void ContactResolver::rest(CollidingPoint& point, const Support& support, const Vec3d& v)
 {
     Vec3d along = tangential_to(support, v) - support.vc;
@@ -207,8 +208,8 @@ void ContactResolver::rest(CollidingPoint& point, const Support& support, const 
     block_.v[point.i] = support.vc + along;
 }
 
-// Whether the last support goes on in this one. Two facets of one field are two surfaces where they make a valley, and
-// the point lies in it: neither moving out of it nor pulled out.
+// Returns true if the new support continues the last one. Two facets of one field are two surfaces if they form a
+// valley in which the point lies, neither moving out of it nor pulled out.
 bool ContactResolver::is_same_surface(const CollidingPoint& point, const Support& support, const Vec3d& along) const
 {
     if (point.supports == 0 || point.on[point.supports - 1].collider != support.collider) return false;

@@ -1,4 +1,4 @@
-// What a contact does to a point: it bounces, comes to rest on the surface, sticks, dies, or is taken out of the shape.
+// Resolves a contact of a point: it bounces, comes to rest on the surface, sticks, dies, or is moved out of the shape.
 #pragma once
 
 #include "runtime/solver/collision/colliding_point.h"
@@ -11,7 +11,7 @@ namespace rapid {
 
 class ContactResolver {
 public:
-    // The state with which a point arrives at a contact; path_v: the velocity of the path on which that was found.
+    // The state in which a point arrives at a contact; path_v: velocity of the path on which the contact was found.
     struct Arrival {
         Vec3d P, v, a, path_v;
     };
@@ -22,9 +22,9 @@ public:
     {
     }
 
-    // Takes a point to a contact on its path, and gives it the velocity that it leaves with.
+    // Moves a point to a contact on its path, and sets the velocity with which it leaves.
     void resolve(CollidingPoint& point, const Arrival& arrival, const Contact& contact, int obstacle);
-    // The contact is on the path that was planned.
+    // Resolves a contact on the planned path.
     void resolve_on_path(CollidingPoint& point, const Contact& contact, int obstacle);
 
 private:

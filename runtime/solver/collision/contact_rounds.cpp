@@ -51,8 +51,7 @@ void ContactRounds::run()
     started_ = 0;
 }
 
-// Plans the next path of a point, and takes the point along it where no shape has to be asked; false when its sub-step
-// is over.
+// Plans the next path of a point, and follows it if no shape has to be queried. Returns false if its substep is over.
 bool ContactRounds::goes_on(CollidingPoint& point)
 {
     while (planner_.plan(point)) {
@@ -78,13 +77,13 @@ bool ContactRounds::may_meet_shape(const CollidingPoint& point) const
     return false;
 }
 
-// Whether the path may lead to a shape that the point is not on.
+// Returns true if the path may lead to a shape that the point is not on.
 bool ContactRounds::may_meet(const CollidingPoint& point, std::size_t obstacle) const
 {
     return !point.rests_on(static_cast<int>(obstacle)) && block_.may_reach_obstacle(point.i, point.path, obstacle);
 }
 
-// After a bounce any shape may be in the way.
+// Searches all shapes, because a bounce may lead to any of them.
 void ContactRounds::find_contacts()
 {
     for (const std::uint32_t slot : going_) contacts_.clear(points_[slot].i);

@@ -1,5 +1,5 @@
-// Takes the points of a block that have met a shape through the rest of their sub-step. They go on together, round by
-// round, each by one path a round, so that a shape is called once a round and never once a point.
+// Takes points of a block that have met a shape through the rest of their substep. They proceed together, each by one
+// path per round, so that a shape is called once per round and never once per point.
 #pragma once
 
 #include <cstdint>
@@ -31,11 +31,11 @@ public:
     {
     }
 
-    // Takes a point, which is at the beginning of its sub-step, to the first contact on its free path.
+    // Takes a point, which is at the beginning of its substep, to the first contact on its free path.
     void start(std::uint32_t i);
-    // A point goes on freely, or along what bears it, for what is `left` of its sub-step, s.
+    // Lets a point continue freely, or along its support, for the `left` seconds of its substep.
     void resume(std::uint32_t i, double left, const std::optional<Support>& on);
-    // Takes all points that were started to the end of the sub-step.
+    // Takes all started points to the end of the substep.
     void run();
 
 private:
@@ -53,9 +53,10 @@ private:
     PathPlanner planner_;
     CurvedMotion curved_;
 
-    std::vector<CollidingPoint> points_;  // the first started_ are of this sub-step
+    std::vector<CollidingPoint> points_;  // the first started_ belong to this substep
     std::size_t started_ = 0;
-    std::vector<std::uint32_t> going_, going_on_;  // of points_, whose sub-step is not over: now and in the next round
+    std::vector<std::uint32_t> going_,
+        going_on_;  // indices in points_ of unfinished points: in this round and the next
 };
 
 }  // namespace rapid

@@ -9,22 +9,22 @@
 namespace rapid {
 namespace {
 
-// How far a surface may turn within a piece, as the cosine of 0.2 radians. The length of a path around a circle is then
-// right to 1e-5 a piece.
+// The largest turn of a surface within a piece, as the cosine of 0.2 radians. The length of a path around a circle is
+// then accurate to 1e-5 per piece.
 constexpr double min_cosine = 0.98;
 
-// A surface that curves inwards by a smaller radius than its field can show is a kink, at which a point bounces. A turn
-// of less than this, in radians, is the field's noise.
+// A surface that curves inwards by a smaller radius than its field can resolve is a kink, at which a point bounces. A
+// smaller turn than this, in radians, is noise of the field.
 constexpr double min_kink = 0.02;
 
-// The shortest piece, s.
+// Returns the shortest piece, s.
 double shortest_piece(const Obstacle& obstacle, const Path& path, double dt)
 {
     if (!(obstacle.feature > 0)) return min_piece * dt;
     return time_to_travel(obstacle.feature / 64, path.v.norm(), path.a.norm());
 }
 
-// Of a point that the surface bears, in the surface's frame.
+// Returns the tangential acceleration of a supported point, in the surface's frame.
 Vec3d tangential_acceleration(const Slide& slide, const Vec3d& pull, const Vec3d& n)
 {
     return slide.kind == Slide::Moves ? slide.a : Vec3d(pull - pull.dot(n) * n);
@@ -50,7 +50,7 @@ void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const s
     }
 }
 
-// The tangential pieces along one shape, and the question of where the surface is at their ends.
+// Begins the tangential pieces along one shape, and adds the query for the surface at their ends.
 void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> going, int o)
 {
     const double feature = block_.obstacles[o].feature;
@@ -61,7 +61,7 @@ void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<cons
         if (point.kind != CollidingPoint::Curved || on.collider != o) continue;
         Path& path = point.path;
         path.v -= on.vc + on.n.dot(path.v - on.vc) * on.n;  // along the surface, in its frame
-        // Beyond its smallest feature the field may have anything: a wall across, or an edge.
+        // Beyond its smallest feature the field may have anything, such as a wall across the path or an edge.
         if (feature > 0) point.limit_path(time_to_travel(2 * feature, path.v.norm(), path.a.norm()));
         point.slip = path.v, point.drive = path.a;
         if (on.viscosity > 0) {
@@ -72,7 +72,7 @@ void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<cons
     }
 }
 
-// Bends the piece to the chord of its arc. False where the surface does not let the point go as far as that.
+// Bends the piece to the chord of its arc. Returns false if the surface does not let the point go that far.
 bool CurvedMotion::follow_arc(CollidingPoint& point, std::size_t j)
 {
     const Path& path = point.path;
@@ -83,7 +83,7 @@ bool CurvedMotion::follow_arc(CollidingPoint& point, std::size_t j)
     const Vec3d n1 = slope > 0 ? Vec3d(query_.gradient[j] / slope) : n;
     const double cosine = n.dot(n1), turn = length > 0 ? (n1 - n).dot(d) / length : 0;
     double curvature = length > 0 ? turn / length : 0;
-    // What adheres is not flung off by creases that the field can't show.
+    // Creases that the field cannot resolve do not throw off an adhering point.
     if (on.adhesion > 0 && obstacle.feature > 0) curvature = std::min(curvature, 1 / obstacle.feature);
     const double shortest = shortest_piece(obstacle, path, block_.dt[point.i]);
     const bool leaves =
@@ -103,15 +103,15 @@ bool CurvedMotion::follow_arc(CollidingPoint& point, std::size_t j)
     return true;
 }
 
-// For the next round, with a shorter piece.
+// Postpones the piece to the next round, with a shorter length.
 void CurvedMotion::wait_for(CollidingPoint& point, double shortest) const
 {
     point.piece = std::max(point.path.duration / 4, shortest);
     point.kind = CollidingPoint::Waits;
 }
 
-// The next moments belong to the path: at an edge the surface may seem to curve less where the point touches than along
-// its path, and would be met at once again.
+// Moves the point a little along its path. At an edge the surface may seem to curve less at the point than along its
+// path, and would otherwise be met again immediately.
 void CurvedMotion::leave_surface(CollidingPoint& point) const
 {
     Vec3d &P = block_.P[point.i], &v = block_.v[point.i];
@@ -127,7 +127,7 @@ void CurvedMotion::leave_surface(CollidingPoint& point) const
     point.path = {P, v, a, point.left, point.path.radius};
 }
 
-// The surface turns up in front of the point, with the normal n.
+// Handles a surface that turns up in front of the point, with the normal n.
 void CurvedMotion::meet_kink(CollidingPoint& point, const Vec3d& n)
 {
     const Support& on = point.on[0];
@@ -141,7 +141,7 @@ void CurvedMotion::meet_kink(CollidingPoint& point, const Vec3d& n)
     point.kind = CollidingPoint::Waits;
 }
 
-// Onto the surface: two steps of Newton's method. Leaves the gradients at the last but one place.
+// Projects onto the surface by two Newton steps. Leaves the gradients at the last but one position.
 void CurvedMotion::project(std::span<const CollidingPoint> points, const Obstacle& obstacle)
 {
     for (int step = 0; step < 2; ++step) {
@@ -175,7 +175,7 @@ void CurvedMotion::end_piece(CollidingPoint& point, std::size_t j) const
     draw_chord(point);
 }
 
-// Other shapes are looked for along the chord.
+// Sets the path to the chord, along which other shapes are searched.
 void CurvedMotion::draw_chord(CollidingPoint& point) const
 {
     Path& path = point.path;
@@ -183,8 +183,8 @@ void CurvedMotion::draw_chord(CollidingPoint& point) const
     path.a.setZero();
 }
 
-// At the ends of the pieces, which were found in the frame of the surface at their beginnings, it has turned, and gone
-// another way than its velocity and acceleration say.
+// Corrects the ends of the pieces, which were found in the surface's initial frame: the surface has turned since, and
+// its path differs from its initial velocity and acceleration.
 void CurvedMotion::follow_surface(std::span<CollidingPoint> points, const Obstacle& obstacle)
 {
     for (std::size_t j = 0; j < query_.size(); ++j) {
@@ -206,7 +206,8 @@ void CurvedMotion::follow_surface(std::span<CollidingPoint> points, const Obstac
     }
 }
 
-// Of a surface that turns or speeds up, in the world's frame: by the mean of the accelerations at both ends.
+// Finds the final velocity on a surface that turns or accelerates, in the world frame, from the mean of the
+// accelerations at both ends.
 void CurvedMotion::find_end_velocity_on_moving(CollidingPoint& point) const
 {
     CollidingPoint::PieceEnd& end = point.end;
@@ -224,7 +225,8 @@ void CurvedMotion::find_end_velocity_on_moving(CollidingPoint& point) const
     end.v = tangential_to(there, v0 + 0.5 * s * (end.a + a1));
 }
 
-// In the surface's frame. False where the surface does not bear the point up to there: it waits.
+// Finds the final velocity in the surface's frame. Returns false if the surface does not support the point up to
+// there; the point then waits.
 bool CurvedMotion::find_end_velocity(CollidingPoint& point) const
 {
     const Path& path = point.path;
@@ -252,9 +254,9 @@ bool CurvedMotion::find_end_velocity(CollidingPoint& point) const
     }
     end.v = turned(path.v + 0.5 * s * path.a) + 0.5 * s * a1;
     end.v -= end.n.dot(end.v) * end.n;
-    // The energy is known better than the velocity, whose direction that leaves: the work of the weight along the path,
-    // less that of friction, which is the rest of the accelerations. A point that turns back is left out: its speed is
-    // the small difference of larger ones.
+    // The energy is more accurate than the speed, so it rescales the velocity: the work of the pull along the path,
+    // minus that of friction, which is the rest of the accelerations. Not applied to a point that turns back, whose
+    // speed is the small difference of larger ones.
     const double friction0 = (pull - path.a).dot(path.v), friction1 = (pull - a1).dot(end.v);
     const double speed2 = path.v.squaredNorm() + 2 * pull.dot(end.P - path.P) - s * (friction0 + friction1);
     const double scale2 = speed2 / end.v.squaredNorm();

@@ -1,8 +1,8 @@
 // Motion along curved surfaces, in pieces of second order in position and velocity: velocity Verlet in the plane that
 // turns with the surface. Points on the same shape take their pieces together.
 //
-// The piece d = v s + a s²/2 is tangential at its beginning. Where it ends the surface has turned by θ, so the chord of
-// the arc of this length is d (1 - θ²/24), halfway between the tangents of both ends. The remaining distance from the
+// The piece d = v s + a s²/2 is tangential at its beginning. At its end the surface has turned by θ, so the chord of
+// an arc of this length is d (1 - θ²/24), halfway between the tangents of both ends. The remaining distance from the
 // surface is removed along the gradient.
 #pragma once
 
@@ -24,9 +24,9 @@ public:
     {
     }
 
-    // Finds the ends of the curved paths among those of the points at the places `going`; each path is then the chord
-    // to its end, in the world's frame. Where the surface is too uneven for the piece the point waits; where it falls
-    // away, the point leaves it.
+    // Finds the ends of curved paths among the points with the indices `going`. Each path is then the chord to its
+    // end, in the world frame. A point waits if the surface is too uneven for the piece, and leaves if the surface
+    // falls away.
     void find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going);
 
 private:
@@ -46,7 +46,7 @@ private:
     const CollisionBlock& block_;
     const FreeMotion& motion_;
     ContactResolver& resolver_;
-    DistanceQuery query_;  // by place among the points
+    DistanceQuery query_;  // by index among the points
 };
 
 }  // namespace rapid

@@ -43,8 +43,8 @@ void DiscreteMethods::ask_about(const Obstacle& obstacle)
     }
 }
 
-// Where the field has no gradient a point goes back to where the step began. True where the point was backtracked; the
-// query then holds its new position.
+// Moves a point out of an obstacle. If the field has no gradient, the point returns to its position at the beginning
+// of the step. Returns true if the point was backtracked; the query then holds its new position.
 bool DiscreteMethods::move_out(std::size_t j, int o)
 {
     const Obstacle& obstacle = block_.obstacles[o];
@@ -80,7 +80,7 @@ bool DiscreteMethods::move_out(std::size_t j, int o)
     return backtracked;
 }
 
-// Back along the velocity to the surface, and on from there with the velocity after the contact. vc, time: of the
+// Moves back along the velocity to the surface, then forward with the velocity after the contact. vc, time: of the
 // surface, at the end of the step.
 void DiscreteMethods::backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, double time, const Vec3d& n,
                                 double depth)
@@ -96,7 +96,7 @@ void DiscreteMethods::backtrack(std::size_t i, const Obstacle& obstacle, const V
     v = after + back * a;
 }
 
-// Taken back by a time that the shape's curvature makes inexact, a point may still be below the surface.
+// Lifts points that are still below the surface, because a curved shape makes the backtracking time inexact.
 void DiscreteMethods::lift(const Obstacle& obstacle)
 {
     query_.find_gradients_at_times(*obstacle.shape);

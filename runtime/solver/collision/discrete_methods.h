@@ -1,4 +1,4 @@
-// The paper's methods, `backtrack` (§4.2) and `project` (§4.1): points that are in a shape at the end of a sub-step are
+// The paper's methods, `backtrack` (§4.2) and `project` (§4.1): points inside a shape at the end of a substep are
 // moved out of it (numerics.md, Collision).
 #pragma once
 
@@ -22,14 +22,14 @@ public:
     {
     }
 
-    // A new block.
+    // Starts a new block.
     void begin();
-    // Whether an obstacle uses one of the methods.
+    // Returns true if an obstacle uses one of the methods.
     bool is_used() const { return is_used_; }
 
-    // Before a sub-step.
+    // Is called before a substep.
     void begin_substep() { initial_P_.assign(block_.P.begin(), block_.P.end()); }
-    // At its end.
+    // Is called at its end.
     void correct();
 
     // How far off a contact that was found at the end of a sub-step, not on the path, may have put the point since

@@ -1,4 +1,4 @@
-// Points whose distance from one shape is asked for in one call.
+// Points whose distance from one shape is queried in one call.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 namespace rapid {
 
 struct DistanceQuery {
-    std::vector<std::uint32_t> point;  // as the caller counts them, mostly in the block
+    std::vector<std::uint32_t> point;  // the caller's index, mostly in the block
     std::vector<Vec3d> P;              // m
-    std::vector<double> time;          // s since the beginning of the frame; empty where points are added without it
+    std::vector<double> time;          // s since the beginning of the frame; empty if points are added without it
 
-    // The answers; gradients are not normalised, and zero where there is none.
+    // The results; gradients are not normalised, and zero if none exists.
     std::vector<double> phi;  // m
     std::vector<Vec3d> gradient;
 
@@ -37,7 +37,7 @@ struct DistanceQuery {
         time.push_back(when);
     }
 
-    // Keeps a few of the questions: moves question `from` to place `to`, then drops those from `count` on.
+    // Keep a few of the queries: move() moves entry `from` to index `to`, truncate() drops those from `count` on.
     void move(std::size_t from, std::size_t to)
     {
         point[to] = point[from];
@@ -51,7 +51,7 @@ struct DistanceQuery {
         time.resize(count);
     }
 
-    // At the end of the frame.
+    // Find values at the end of the frame.
     void find_distances(const Shape& shape)
     {
         phi.resize(size());
@@ -64,7 +64,7 @@ struct DistanceQuery {
         shape.distance(P, phi, gradient);
     }
 
-    // Each point at its own time.
+    // Find values with each point at its own time.
     void find_distances_at_times(const Shape& shape)
     {
         phi.resize(size());

@@ -14,7 +14,7 @@ void Ejection::eject(CollidingPoint& point, const Contact& contact, int obstacle
     point.by_forces.from += displacements_.back().by;
 }
 
-// False where there is no way out.
+// Returns false if there is no way out.
 bool Ejection::move_out(const CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v,
                         const Vec3d& a)
 {
@@ -27,7 +27,7 @@ bool Ejection::move_out(const CollidingPoint& point, const Contact& contact, int
         P -= contact.back * (path_v - contact.vc);
         return true;
     }
-    // It has not come in by itself: out against what pulls it, or upwards.
+    // The point has not moved in by itself, so it moves out against the acceleration on it, or upwards.
     const Obstacle& body = block_.obstacles[obstacle];
     const double pull = a.norm();
     const Vec3d down = pull > 0 ? Vec3d(a / pull) : Vec3d(-Vec3d::UnitY());

@@ -1,5 +1,5 @@
-// Points that a path finds inside a shape, because they were born there or the shape has swept over them, are taken out
-// at once, with the velocity that they have. Moving inwards, they then meet the surface as any other point does.
+// Points found inside a shape by a path, because they were born there or the shape swept over them, are moved out
+// immediately and keep their velocity. If they move inwards, they then meet the surface like any other point.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace rapid {
 
-// How often a point is taken out of shapes in one sub-step before it counts as trapped: out of one it may be in
-// another, and where a field is no exact distance it takes a few steps out of one.
+// Limit on ejections of a point in one substep before it counts as trapped: outside one shape it may be inside
+// another, and an inexact distance field needs a few steps.
 constexpr int max_ejections = 64;
 
 class Ejection {
 public:
-    // A displacement that is no motion.
+    // A displacement without a velocity.
     struct Displacement {
         std::uint32_t i;
         Vec3d by;  // m
@@ -25,18 +25,18 @@ public:
 
     explicit Ejection(const CollisionBlock& block) : block_(block) {}
 
-    // A new block.
+    // Starts a new block.
     void begin()
     {
         displacements_.clear();
         lost_.clear();
     }
 
-    // Along the shortest way out that is known. path_v: the velocity of the path on which the contact was found, which
-    // under drag and springs is not the point's; a: the acceleration on the point.
+    // Moves a point out along the shortest known way. path_v: velocity of the path on which the contact was found,
+    // which differs from the point's under drag and springs; a: acceleration on the point.
     void eject(CollidingPoint& point, const Contact& contact, int obstacle, const Vec3d& path_v, const Vec3d& a);
 
-    // Of a point that stays where it is put.
+    // Displaces a point that stays at its new position.
     void displace(std::uint32_t i, const Vec3d& by)
     {
         block_.P[i] += by;
@@ -44,7 +44,7 @@ public:
     }
 
     std::span<const Displacement> displacements() const { return displacements_; }
-    // The points that found no way out; some more than once.
+    // The points that found no way out, possibly more than once.
     const std::vector<std::uint32_t>& lost() const { return lost_; }
 
 private:

@@ -1,4 +1,4 @@
-// The first contact of each point's path with any of the obstacles: each obstacle is asked about many paths at once.
+// The first contact of each point's path with any of the obstacles: each obstacle is queried for many paths at once.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@ class FirstContacts {
 public:
     explicit FirstContacts(const CollisionBlock& block) : block_(block) {}
 
-    // A new block.
+    // Starts a new block.
     void begin()
     {
         obstacle_.resize(block_.size());
         contact_.resize(block_.size());
     }
 
-    // Forgets the contacts of one point, or of all.
+    // Drops the contacts of one point, or of all.
     void clear(std::size_t i) { obstacle_[i] = -1; }
     void clear()
     {
@@ -28,7 +28,7 @@ public:
         found_.clear();
     }
 
-    // A path that the next obstacle is asked about, as far as the earliest contact that is known on it.
+    // Adds a path to the query of the next obstacle, up to the earliest known contact on it.
     void add(std::uint32_t i, const Path& path)
     {
         asked_.push_back(i);
@@ -39,9 +39,9 @@ public:
 
     bool has(std::size_t i) const { return obstacle_[i] >= 0; }
     int obstacle(std::size_t i) const { return obstacle_[i]; }
-    // Of equally early contacts that with the first obstacle in the chain.
+    // Returns the contact; of equally early ones, the one with the first obstacle in the chain.
     const Contact& contact(std::size_t i) const { return contact_[i]; }
-    // The points that have a contact since all were cleared.
+    // The points with a contact since clear().
     const std::vector<std::uint32_t>& found() const { return found_; }
 
 private:

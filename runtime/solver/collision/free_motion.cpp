@@ -34,7 +34,8 @@ Path FreeMotion::path(std::size_t i, double radius) const
     return {block_.P[i], block_.v[i], a_[i], dt, radius, begin};
 }
 
-// The velocity of a dragged point falls from the first to the last; between them it is taken as linear in time.
+// The velocity of a dragged point decreases from the first to the last value; in between, it is taken as linear in
+// time.
 Vec3d FreeMotion::velocity_after(std::size_t i, double s) const
 {
     const double dt = block_.dt[i];

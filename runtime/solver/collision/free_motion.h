@@ -1,5 +1,5 @@
-// How the points of a block move in a sub-step while nothing touches them: along a parabola; under forces with linear
-// parts, along the parabola that stands for their damped motion.
+// The free motion of a block's points in a substep: along a parabola, or under forces with linear parts along the
+// parabola that represents their damped motion.
 #pragma once
 
 #include <span>
@@ -13,12 +13,12 @@
 
 namespace rapid {
 
-// One sub-step, or a part of it, of all points of a block.
+// One substep, or part of it, for all points of a block.
 struct Drift {
     Strided<Vec3d> a;                // m/s², constant within it
     std::span<const double> dt;      // s
     std::span<const double> after;   // s, from its end to the end of the frame
-    std::span<const Damped> damped;  // where it is not empty, in place of a
+    std::span<const Damped> damped;  // if not empty, replaces a
 };
 
 class FreeMotion {
@@ -28,12 +28,14 @@ public:
     void begin(const Drift& drift);
     bool is_damped() const { return !damped_.empty(); }
 
-    // m/s², without the forces of surfaces; under damping the mean of what is left of the sub-step.
+    // Returns the acceleration without the forces of surfaces, m/s²; with damping, the mean over the rest of the
+    // substep.
     const Vec3d& acceleration(std::size_t i) const { return a_[i]; }
-    // Whether a spring draws a damped point; whether it does to a surface.
+    // is_drawn() returns true if a spring acts on a damped point; is_drawn_to_surface() if the spring attaches to a
+    // surface.
     bool is_drawn(std::size_t i) const { return damped_[i].pull.w2 > 0 || is_drawn_to_surface(i); }
     bool is_drawn_to_surface(std::size_t i) const { return damped_[i].pull.surface.w2 > 0; }
-    // J/kg, of a damped point at P: the potential energy of what draws it, but for a constant.
+    // Returns the potential energy of the springs and constant force on a damped point at P, up to a constant, J/kg.
     double potential(std::size_t i, const Vec3d& P) const
     {
         const Damped::Pull& pull = damped_[i].pull;
@@ -41,14 +43,14 @@ public:
         const double surface = pull.surface.w2 > 0 ? potential_energy(pull.surface, P) : 0;
         return 0.5 * pull.w2 * d.squaredNorm() - pull.G.dot(d) + surface;
     }
-    // m/s, at P: of the shape that a spring draws the point to.
+    // Returns the velocity at P of the shape to which a spring attaches the point, m/s.
     Vec3d frame_velocity(std::size_t i, const Vec3d& P) const
     {
         const SurfaceSpring& spring = damped_[i].pull.surface;
         if (!(spring.w2 > 0) || !spring.shape->moves()) return Vec3d::Zero();
         return spring.shape->velocity_at(P, spring.time + 0.5 * block_.dt[i]);
     }
-    // J/kg: by how much that changes between two places, of which `from` is where the sub-step began.
+    // Returns the change in potential energy between two positions, J/kg; `from` is the beginning of the substep.
     double potential_change(std::size_t i, const Vec3d& from, const Vec3d& to) const
     {
         const Damped::Pull& pull = damped_[i].pull;
@@ -58,34 +60,34 @@ public:
         return change;
     }
     bool is_dragged(std::size_t i) const { return damped_[i].k > 0; }
-    // What draws a damped point.
+    // Returns the springs and constant force on a damped point.
     const Damped::Pull& pull(std::size_t i) const { return damped_[i].pull; }
-    // Sets that mean, from the velocity of the point now.
+    // Updates the mean acceleration from the current velocity of the point.
     void update_acceleration(std::size_t i, double left)
     {
         if (is_damped()) mean_a_[i] = damped_[i].mean_acceleration(block_.v[i], left);
     }
 
-    // What part of `left`, s, that mean may stand for.
+    // Returns the part of `left`, s, that the mean acceleration may represent.
     double longest_parabola(std::size_t i, double left) const
     {
         return is_damped() ? damped_[i].longest_parabola(block_.v[i], left) : left;
     }
 
-    // The free paths of all points, from where they are.
+    // Traces the free paths of all points from their current positions.
     void trace();
     FreePaths& paths() { return paths_; }
     Path path(std::size_t i, double radius = 0) const;
     Vec3d velocity_after(std::size_t i, double s) const;
 
-    // Takes all points to the ends of their paths, and one of them back.
+    // Move all points to the ends of their paths, and one of them back.
     void go_to_ends() { paths_.exchange(block_.P, block_.v); }
     void go_back(std::size_t i)
     {
         block_.P[i] = initial_P(i);
         block_.v[i] = initial_v(i);
     }
-    // The state at the beginning of the path, once points have gone to the ends.
+    // The state at the beginning of the path, after go_to_ends().
     Vec3d initial_P(std::size_t i) const { return paths_.P(i); }
     Vec3d initial_v(std::size_t i) const { return paths_.v(i); }
 
@@ -94,7 +96,7 @@ private:
     Strided<Vec3d> a_{nullptr, 0};
     FreePaths paths_;
 
-    // Where a force has a linear part, by point; a_ then points to the means.
+    // By point, if a force has a linear part; a_ then points to mean_a_.
     std::span<const Damped> damped_;
     std::vector<Vec3d> path_v_, path_a_, mean_a_;
 };

@@ -1,9 +1,9 @@
-// The hit attributes: the last contact of each point, by Houdini's names.
+// The hit attributes: the last contact of each point, using Houdini's names.
 //
 //   hittotal   contacts since birth          hitnum    contacts in this frame
-//   hitpos     where, m                      hitnml    normal of the surface, unit
+//   hitpos     position, m                   hitnml    normal of the surface, unit
 //   hitv       velocity of the surface, m/s  hittime   s since the start
-//   hitimpulse mass times the change of velocity, kg m/s
+//   hitimpulse mass times the velocity change, kg m/s
 //   hitpath    index of the collider among those of the chain, from 0
 #pragma once
 
@@ -14,9 +14,9 @@
 
 namespace rapid {
 
-// A contact that has changed the velocity of a point.
+// A contact that changed the velocity of a point.
 struct Impact {
-    Vec3d P, n, vc;  // where, m; the surface's normal, unit, and velocity, m/s
+    Vec3d P, n, vc;  // position, m; the surface's normal, unit, and velocity, m/s
     double speed;    // of approach, m/s
     Vec3d v;         // of the point before, m/s
     Vec3d change;    // of the velocity, m/s
@@ -31,7 +31,7 @@ public:
     // Makes the columns writable, on one thread. They must exist.
     Hits(PointSet& points, bool begins_frame);
 
-    // Of the point at this index of the set; impulse: kg m/s.
+    // Records a hit of the point at this index of the set; impulse: kg m/s.
     void record(std::size_t point, int collider, const Impact& impact, double impulse);
 
 private:

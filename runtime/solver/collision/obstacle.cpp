@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// FNV-1a, above 0.
+// Returns the FNV-1a hash, above 0.
 std::int32_t key_of(std::string_view node)
 {
     std::uint32_t hash = 0x811c9dc5u;

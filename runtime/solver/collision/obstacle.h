@@ -1,4 +1,4 @@
-// A collider as the solver asks it: its shape, and its parameters looked up for all points of a set.
+// A collider as seen by the solver: its shape, with its parameters for all points of a set.
 #pragma once
 
 #include <cstdint>
@@ -14,38 +14,38 @@
 namespace rapid {
 
 struct Obstacle {
-    // radius_of_points: m, valid as long as this. Error: a parameter's attribute is missing.
+    // radius_of_points: m, must outlive this. Throws Error if a parameter's attribute is missing.
     Obstacle(const Collider& collider, const PointSet& points, Strided<float> radius_of_points);
 
     const Shape* shape;
     Box3d bounds;
     double feature;  // m, the shape's smallest
     bool moves;
-    const MovingBody* body;  // null where it is at rest
+    const MovingBody* body;  // null if it is at rest
     std::optional<HalfSpace> plane;
     Method method;
     Response response;
     std::optional<double> record;  // m/s
     Strided<float> bounce, friction, radius, adhesion, viscosity;
-    std::int32_t key;               // of its node, above 0: points that it holds know it by this from frame to frame
-    Strided<std::uint8_t> members;  // of its group; 1 for all where it has none
+    std::int32_t key;               // identifies its node, above 0: points that it holds store it between frames
+    Strided<std::uint8_t> members;  // of its group; 1 for all points if it has none
 
     bool is_continuous() const { return method == Method::Continuous; }
     bool sticks() const { return response == Response::Stick; }
-    // Whether it may hold points that slide on it, or slow them.
+    // Returns true if it may hold points that slide on it, or slow them down.
     bool clings() const { return response == Response::Slide && (adheres_ || flows_); }
-    // Whether it may hold points at all, against what draws them off.
+    // Returns true if it may hold points against forces that pull them off.
     bool holds() const { return sticks() || (response == Response::Slide && adheres_); }
 
-    // Of the point at this index of the set; what adheres without end does so to what it holds, not to what slides.
+    // For the point at this index of the set. Unlimited adhesion applies to held points, not to sliding ones.
     double adhesion_to_sliding(std::size_t point) const { return sticks() ? 0.0 : double(adhesion[point]); }
     double restitution(std::size_t point) const { return response == Response::Bounce ? double(bounce[point]) : 0.0; }
 
-    // The largest radius of these points, m.
+    // Returns the largest radius of these points, m.
     double largest_radius(std::span<const std::uint32_t> points) const;
 
-    // How near to the surface counts as touching it, m: the rounding of a position to single precision, and the error
-    // of the shape's field.
+    // Returns the distance from the surface that counts as touching, m: the rounding of a position to single
+    // precision, plus the error of the shape's field.
     double contact_tolerance(const Vec3d& P, double point_radius) const
     {
         return flush_within(P, point_radius, feature * 0x1p-21);
@@ -56,10 +56,10 @@ struct Obstacle {
         return ((P - bounds.max()).array() > point_radius).any() || ((bounds.min() - P).array() > point_radius).any();
     }
 
-    // The unit normal of the shape's field; zero where it has none. time: s since the beginning of the frame.
+    // Returns the unit normal of the shape's field; zero if it has none. time: s since the beginning of the frame.
     Vec3d normal_at(const Vec3d& P, double time) const;
 
-    // The acceleration, m/s², of a point that moves with constant velocity in the body's frame.
+    // Returns the acceleration, m/s², of a point that moves with constant velocity in the body's frame.
     Vec3d acceleration_at(const Vec3d& P, const Vec3d& v, double time) const
     {
         return body ? body->acceleration_at(P, v, time) : Vec3d(Vec3d::Zero());

@@ -8,11 +8,11 @@
 namespace rapid {
 namespace {
 
-// A point that has gone nowhere, to rounding, in this many contacts and pieces is at rest: in a pit of a field it can
-// chatter at 1e-10 m/s between facets that each would let it slide. Real impacts move a point farther than that.
+// A point that has not moved, within rounding, in this many contacts and pieces is at rest. In a pit of a field it may
+// chatter at 1e-10 m/s between facets each of which would let it slide. Real impacts move a point farther.
 constexpr int chatter_events = 1024;
 
-// The longest piece along the edge of curved surfaces, as a part of the sub-step.
+// The longest piece along the edge of curved surfaces, relative to the substep.
 constexpr double max_edge_piece = 1.0 / 16;
 
 }  // namespace
@@ -37,7 +37,7 @@ bool PathPlanner::plan(CollidingPoint& point)
     return false;
 }
 
-// Along what the point rests on. A surface that it leaves no longer bears it.
+// Slides along the supports. A surface that the point leaves no longer supports it.
 Slide PathPlanner::slide(CollidingPoint& point)
 {
     const Vec3d &v = block_.v[point.i], &a = motion_.acceleration(point.i);
@@ -71,8 +71,8 @@ bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
         point.kind = CollidingPoint::Curved;  // in the surface's frame, to the end of the piece
         point.limit_path(point.piece);
     } else {
-        // Along the edge of curved surfaces in short straight pieces; each ends in the air, or within rounding of the
-        // surfaces, where the next contact finds it.
+        // Along the edge of curved surfaces in short straight pieces. Each ends in the air, or within rounding of the
+        // surfaces, and the next contact finds it there.
         point.kind = CollidingPoint::Straight;
         double longest = max_edge_piece * block_.dt[point.i];
         if (const double feature = std::max(point.on[0].feature, point.on[1].feature); feature > 0)
@@ -86,7 +86,7 @@ bool PathPlanner::slide_along_surface(CollidingPoint& point, const Slide& slide)
     return false;
 }
 
-// By the viscosity of what it slides on.
+// Slows the path by the viscosity of the supports.
 void PathPlanner::slow_down(CollidingPoint& point) const
 {
     const double k = point.on[0].viscosity + (point.supports == 2 ? point.on[1].viscosity : 0);
@@ -97,8 +97,8 @@ void PathPlanner::slow_down(CollidingPoint& point) const
     path.a = slowed.a;
 }
 
-// Whether a point on a surface has been busy for long without getting anywhere in the surface's frame. On one that
-// moves it gets somewhere with it.
+// Returns true if a point on a surface has had many events without moving in the surface's frame. On a moving surface,
+// it moves along.
 bool PathPlanner::chatters(CollidingPoint& point) const
 {
     if (point.events < point.checked_events + chatter_events) return false;
@@ -109,7 +109,7 @@ bool PathPlanner::chatters(CollidingPoint& point) const
     return (P - before).norm() <= obstacle.contact_tolerance(P, block_.radius(obstacle, point.i));
 }
 
-// For the rest of the sub-step the point moves with the surface.
+// Moves the point with the surface for the rest of the substep.
 void PathPlanner::ride(CollidingPoint& point)
 {
     const Support& on = point.on[0];
@@ -147,7 +147,7 @@ void PathPlanner::finish_path(CollidingPoint& point)
         on.ac = obstacle.acceleration_at(P, point.stops ? on.vc : v, now);
     }
     if (point.stops) v = on.vc;
-    // What adheres to the surfaces of an edge is still on the first.
+    // A point that adheres to the surfaces of an edge stays on the first.
     if (point.supports == 2 && !point.is_on_flat()) point.supports = on.adhesion > 0 ? 1 : 0;
 }
 

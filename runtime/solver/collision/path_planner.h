@@ -1,4 +1,4 @@
-// The next path of a point that has met a shape: a free parabola, a slide along a flat surface or along an edge, or a
+// Plans the next path of a point that has met a shape: a free parabola, a slide along a flat surface or an edge, or a
 // piece along a curved surface.
 #pragma once
 
@@ -16,9 +16,9 @@ public:
     {
     }
 
-    // False when there is none, because the point's sub-step is over.
+    // Returns false if there is no path because the point's substep is over.
     bool plan(CollidingPoint& point);
-    // Takes the point to the end of its path, which is free.
+    // Moves the point to the end of its path, which must be free of contacts.
     void finish_path(CollidingPoint& point);
 
 private:

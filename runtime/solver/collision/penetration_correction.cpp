@@ -7,7 +7,8 @@
 namespace rapid {
 namespace {
 
-// A place outside a shape, not much farther away than the nearest in any of 26 directions; P where there is none.
+// Returns a position outside a shape, at most a little farther away than the nearest in any of 26 directions; P if
+// there is none.
 Vec3d free_place(const Obstacle& obstacle, const Vec3d& P, double radius)
 {
     const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
@@ -51,7 +52,7 @@ void PenetrationCorrection::run(std::span<Vec3d> P, const std::vector<std::uint3
     audit_.add_trapped(inside_.size());
 }
 
-// Those of inside_ that are in this obstacle.
+// Moves the points of inside_ that are in this obstacle out of it.
 void PenetrationCorrection::move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_place)
 {
     query_.clear();

@@ -1,8 +1,8 @@
-// The final penetration correction, and what is left of penetration.
+// The final penetration correction, and the penetration that remains.
 //
-// Parts of a body that meet one another, or two bodies, leave no room to a point between them: at the end of the frame
-// it is brought out of both, with the velocity that it has. By the shortest way; and where that leads from one side of
-// a closed gap to the other, to the nearest place that is free.
+// Parts of a body that meet, or two bodies, leave no space for a point between them. At the end of the frame the point
+// is moved out of both and keeps its velocity: along the shortest way or, if that only leads from one side of a closed
+// gap to the other, to the nearest free position.
 #pragma once
 
 #include <cstdint>
@@ -24,12 +24,12 @@ public:
     {
     }
 
-    // P at the end of the frame. lost: points that found no way out of a shape in their sub-steps.
+    // P: at the end of the frame. lost: points that found no way out of a shape in their substeps.
     void run(std::span<Vec3d> P, const std::vector<std::uint32_t>& lost);
-    // What it has done, in order.
+    // The displacements, in order.
     std::span<const Ejection::Displacement> displacements() const { return displacements_; }
 
-    // The deepest that a touched point is in an obstacle, m, given the rounded positions.
+    // Returns the largest penetration of a touched point, m, given the rounded positions.
     double deepest(std::span<const Vec3f> P);
 
 private:

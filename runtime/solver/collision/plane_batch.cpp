@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// A vector of scalars: what is done to Vec3d does not become vectors over the points of a batch.
+// A vector of scalars. Operations on Vec3d would not be vectorized over the points of a batch.
 struct Triple {
     double x, y, z;
 };
@@ -28,7 +28,7 @@ using Rows = double[3][PlaneBatch::capacity];
 Triple load(const Rows& rows, std::size_t j) { return {rows[0][j], rows[1][j], rows[2][j]}; }
 void store(Rows& rows, std::size_t j, const Triple& a) { rows[0][j] = a.x, rows[1][j] = a.y, rows[2][j] = a.z; }
 
-// flush_within() of a shape without error of its own.
+// Equals flush_within() for a shape without an error of its own.
 double contact_tolerance(const Triple& P, double radius)
 {
     return 0x1p-22 * (std::max(std::max(std::abs(P.x), std::abs(P.y)), std::abs(P.z)) + radius);
@@ -38,8 +38,8 @@ struct State {
     Triple P, v;
 };
 
-// Along the plane, slowed by friction. A last approach by less than rounding costs its friction too, as every contact
-// does. vn: along the normal n; g: the acceleration into the plane.
+// Slides along the plane, slowed by friction. A last approach by less than rounding also has its friction, like every
+// contact. vn: along the normal n; g: the acceleration into the plane.
 State slide(const State& from, const Triple& n, double vn, double g, double friction, double dt)
 {
     const Triple vt = from.v - vn * n;
@@ -51,7 +51,7 @@ State slide(const State& from, const Triple& n, double vn, double g, double fric
     return {from.P + along * vt, select(stops, {0, 0, 0}, kept * vt)};
 }
 
-// contact_response() with a plane at rest. closing: speed of approach.
+// Equals contact_response() with a plane at rest. closing: speed of approach.
 Triple respond(const Triple& v, const Triple& n, double closing, double rebound, double bounce, double friction)
 {
     const Triple vt = v + closing * n;
@@ -78,14 +78,14 @@ void PlaneBatch::solve(const HalfSpace& plane)
         const bool only_pressed = is_zero(a + g * n);
         const State slid = slide({P, v}, n, vn, g, friction, dt);
 
-        // One bounce, from where the parabola first goes through the plane.
+        // One bounce, from the first crossing of the parabola with the plane.
         const bool sinks = touches & (vn < 0);
         const double above = std::max(f, 0.0), root = std::sqrt(vn * vn + 2 * g * above);
         const double fall = vn > 0 ? (vn + root) / g : 2 * above / (root - vn);
         const double s = sinks ? 0 : fall, left = dt - s;
         const Triple at = P + s * (v + 0.5 * s * a), u = v + s * a;
         const double closing = -dot(n, u), rebound = bounce * closing;
-        const double rising2 = 2 * g * contact_tolerance(at, radius);  // of a speed that lifts by less than rounding
+        const double rising2 = 2 * g * contact_tolerance(at, radius);  // for a speed that lifts by less than rounding
         const bool is_single = (closing * closing > rising2) & (rebound * rebound > rising2) & (2 * rebound > g * left);
         const Triple after = respond(u, n, closing, rebound, bounce, friction);
 
@@ -105,7 +105,7 @@ void PlaneBatch::solve(const HalfSpace& plane)
     }
 }
 
-// may_reach(), of all paths.
+// Applies may_reach() to all paths.
 void PlaneBatch::leave_out_near(const Box3d& box, double radius)
 {
     const Box3d wide = widened(box, radius);

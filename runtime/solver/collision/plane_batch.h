@@ -1,6 +1,6 @@
-// Points that may come near one plane at rest and nothing else, many at once: where they miss it, bounce off it once,
-// or lie on it and are changed by nothing but friction. Most points that touch anything do one of these. Without
-// branches, so that the loop is over vectors; the result is that of ContactRounds, at a twentieth of the cost.
+// Points that may come near one plane at rest and nothing else, many at once: those that miss it, bounce once, or lie
+// on it under friction only. This covers most points that touch anything. The loop has no branches, so it vectorizes.
+// It gives the result of ContactRounds at a twentieth of the cost.
 //
 // Layout: structure of arrays; coordinates are shape [3, capacity].
 #pragma once
@@ -21,7 +21,7 @@ public:
     bool is_full() const { return size_ == capacity; }
     void clear() { size_ = 0; }
 
-    // The surface that a point meets, and how.
+    // The surface properties for a point.
     struct Surface {
         double radius, bounce, friction;
     };
@@ -41,10 +41,10 @@ public:
         friction_[j] = surface.friction;
     }
 
-    // Takes all through their steps.
+    // Advances all points through their steps.
     void solve(const HalfSpace& plane);
 
-    // Leaves undecided the points that slide or bounce and may come near this box; radius: their largest, m.
+    // Makes sliding and bouncing points undecided if they may come near this box; radius: their largest, m.
     void leave_out_near(const Box3d& box, double radius);
 
     std::uint32_t point(std::size_t j) const { return point_[j]; }
@@ -52,11 +52,11 @@ public:
     Vec3d end(std::size_t j) const { return at(end_, j); }         // m
     Vec3d velocity(std::size_t j) const { return at(v_end_, j); }  // m/s, at the end
 
-    // Of a bounce.
-    Vec3d contact(std::size_t j) const { return at(contact_, j); }  // m; of a slide where it begins
-    double left(std::size_t j) const { return left_[j]; }           // s of the step after it
+    // For a bounce.
+    Vec3d contact(std::size_t j) const { return at(contact_, j); }  // m; of a slide, its beginning
+    double left(std::size_t j) const { return left_[j]; }           // s, of the step after the bounce
     double approach(std::size_t j) const { return approach_[j]; }   // m/s
-    Vec3d change(std::size_t j) const { return at(change_, j); }    // of the velocity, m/s
+    Vec3d change(std::size_t j) const { return at(change_, j); }    // in velocity, m/s
 
 private:
     using Coordinates = double[3][capacity];
@@ -70,7 +70,7 @@ private:
     std::int64_t outcome_[capacity];
     double left_[capacity], approach_[capacity];
     Coordinates end_, v_end_, contact_, change_;
-    Coordinates sagging_;  // how far the path is off the straight line to its end at most, m
+    Coordinates sagging_;  // the largest distance of the path from the straight line to its end, m
 };
 
 }  // namespace rapid

@@ -17,7 +17,7 @@ void PlaneContacts::finish(std::size_t o)
     batch_.clear();
 }
 
-// The result of one point of the batch.
+// Stores the result of one point of the batch.
 void PlaneContacts::take(std::size_t j, std::size_t o)
 {
     const Obstacle& obstacle = block_.obstacles[o];

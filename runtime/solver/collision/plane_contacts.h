@@ -1,5 +1,5 @@
-// Points that meet a plane at rest, and nothing else, go through the whole sub-step in closed form: most points that
-// touch anything, on any floor, and at a fraction of what rounds of contacts would cost.
+// Takes points that meet only a plane at rest through the whole substep in closed form. On any floor these are most
+// points that touch anything, and rounds of contacts would cost several times as much.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,12 @@ public:
     {
     }
 
-    // A new block. Obstacles that correct positions after a sub-step may move points off their planes.
+    // Starts a new block. Obstacles that correct positions after a substep may move points off their planes.
     void begin(bool corrects_positions) { corrects_positions_ = corrects_positions; }
 
-    // Before points go to the ends of their paths: adds one that may come near this obstacle, a plane, and near no
-    // other. Batches are solved as they fill, and the last by finish(); the end of a path is then that of the sub-step.
-    // Points for which a batch has no answer are left to `contacts`.
+    // Adds a point that may come near this obstacle, a plane, and no other; before points go to the ends of their
+    // paths. Full batches are solved immediately, the last one by finish(). The end of a path is then that of the
+    // substep. Undecided points are left to `contacts`.
     void add(std::uint32_t i, std::size_t o)
     {
         const Obstacle& obstacle = block_.obstacles[o];
@@ -44,8 +44,8 @@ public:
     }
     void finish(std::size_t obstacle);
 
-    // Takes a point at the beginning of its sub-step through all of it if its first contact is with a plane that it
-    // lies on, and it meets nothing else along it: to the bit what ContactRounds would do, at a third of its cost.
+    // Takes a point from the beginning of its substep to the end if its first contact is with a plane that it lies on,
+    // and it meets nothing else. The result is bit-identical to that of ContactRounds, at a third of the cost.
     bool slides_on_plane(std::size_t i);
 
 private:

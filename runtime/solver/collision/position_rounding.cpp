@@ -6,7 +6,7 @@
 namespace rapid {
 namespace {
 
-// Moves one coordinate, the one along which the normal is longest, by the least that lifts the point by `height`.
+// Moves the coordinate with the largest normal component by the least amount that lifts the point by `height`.
 Vec3f lifted(Vec3f P, const Vec3d& n, double height)
 {
     int k;
@@ -38,8 +38,8 @@ void PositionRounding::find_moved(std::span<const Vec3d> P, std::span<const Vec3
     }
 }
 
-// Calls use(i, surface, f, tolerance) for the points that have moved on a surface, with f = distance - radius at
-// position(i). The surfaces of an edge come one after the other.
+// Calls use(i, surface, f, tolerance) for points that have moved on a surface, with f = distance - radius at
+// position(i). The two surfaces of an edge are processed one after the other.
 template <class Position, class Use>
 void PositionRounding::ask_surfaces(const Position& position, const Use& use)
 {
@@ -59,7 +59,7 @@ void PositionRounding::ask_surfaces(const Position& position, const Use& use)
     }
 }
 
-// The contact tolerance by the coordinates of the whole path, as those of its end may be 0.
+// Returns the contact tolerance for the largest coordinates of the path, because those of its end may be 0.
 double PositionRounding::tolerance(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const
 {
     const Vec3d largest = P.cwiseAbs().cwiseMax(initial_P_[i].cast<double>().cwiseAbs());
@@ -71,8 +71,8 @@ void PositionRounding::snap(std::span<Vec3d> P, std::span<const Vec3f> initial)
     find_moved(P, initial);
     ask_surfaces([&](std::size_t i) { return P[i]; },
                  [&](std::size_t i, const TouchedPoints::Surface& surface, double f, double tolerance) {
-                     // The path of a point that rests on a moving shape leaves out how the shape turns and speeds up
-                     // within a step.
+                     // The path of a point on a moving shape ignores the turning and acceleration of the shape within
+                     // a step.
                      const Obstacle& obstacle = block_.obstacles[surface.obstacle];
                      const double h = block_.context.h;
                      const auto speed = [&](double time) { return obstacle.shape->velocity_at(P[i], time).norm(); };

@@ -1,8 +1,8 @@
-// Positions at the end of a frame, rounded to single precision on the outer side of the surfaces that points are on.
+// Rounds positions to single precision at the end of a frame, on the outer side of the surfaces that points are on.
 //
-// To nearest, a point can end up on the inner side of its surface by half an ulp an axis. Then the coordinate that
-// matters most is moved by the least that brings the point out again. A point that has not moved keeps its bits, so
-// that nothing creeps.
+// Rounding to nearest may put a point on the inner side of its surface, by up to half an ulp per axis. The coordinate
+// with the largest effect is then moved by the least amount that brings the point out again. A point that has not
+// moved keeps its bits, so that nothing creeps.
 #pragma once
 
 #include <array>
@@ -20,17 +20,17 @@ class PositionRounding {
 public:
     PositionRounding(const CollisionBlock& block, const TouchedPoints& touched) : block_(block), touched_(touched) {}
 
-    // A new block.
+    // Starts a new block.
     void begin()
     {
         initial_P_.resize(block_.size());
         for (auto& side : moved_on_) side.resize(block_.obstacles.size());
     }
 
-    // Before rounding: moves points that have moved on surfaces onto them as far as double goes, so that the error of
-    // their paths is not seen. initial: positions at the beginning of the frame.
+    // Is called before rounding. Moves points that have moved on surfaces onto them, to double precision, to remove
+    // the error of their paths. initial: positions at the beginning of the frame.
     void snap(std::span<Vec3d> P, std::span<const Vec3f> initial);
-    // After rounding: lifts those points to the outer sides of their surfaces.
+    // Is called after rounding. Lifts those points to the outer sides of their surfaces.
     void lift(std::span<Vec3f> rounded);
 
 private:

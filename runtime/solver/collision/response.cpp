@@ -4,8 +4,8 @@ namespace rapid {
 
 // v+ = vc + vt max(0, 1 - μ (1 + ε) |vn| / |vt|) - ε vn,   vn = ((v - vc)·n) n,   vt = (v - vc) - vn
 //
-// The paper prints (4) with v for v - vc, which holds for shapes at rest only. The impulse along n is m (1 + ε) |vn|,
-// so Coulomb friction takes at most μ times that from the tangent; the max with 0 is static friction.
+// The paper prints (4) with v instead of v - vc, which holds only for shapes at rest. The impulse along n is m (1 + ε)
+// |vn|, so Coulomb friction takes at most μ times that from the tangent; the max with 0 is static friction.
 Vec3d contact_response(const Vec3d& v, const Vec3d& vc, const Vec3d& n, double bounce, double friction)
 {
     const Vec3d relative = v - vc;

@@ -11,17 +11,18 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// How far the direction of friction may turn within a piece, in radians. The error of a piece is of third order in it;
-// a point that slides straight down a slope, or on a level floor, is exact at any length.
+// The largest turn of the friction's direction within a piece, in radians. The error of a piece is of third order in
+// it. A point that slides straight down a slope, or on a level floor, is exact at any length.
 constexpr double most_turn = 0.05;
 
-// Two surfaces within 0.06 degrees of each other are one: along their edge the forces would be ill determined.
+// Two surfaces within 0.06 degrees of each other count as one, because the forces along their edge would be
+// ill-conditioned.
 constexpr double parallel = 1e-3;  // sine of the angle between the normals
 
-// The part of an acceleration that rounding leaves along the surface where there is none.
+// Relative acceleration that rounding leaves along the surface if it should be 0.
 constexpr double rounding = 0x1p-48;
 
-// Until a speed along which `along` < 0 acts has come to 0, against viscosity, too: v' = along - k v.
+// Returns the time in which `along` < 0 reduces a speed to 0, with viscosity: v' = along - k v.
 double time_to_stop(double speed, double along, double k)
 {
     return k > 0 ? std::log1p(k * speed / -along) / k : -speed / along;
@@ -39,7 +40,7 @@ Vec3d tangential_to(const Support& on, const Vec3d& v)
 //
 //   at rest    the point stays while |at| <= μ N, else a' = at (1 - μ N / |at|)
 //   moving     a' = at - μ N vt/|vt|, until it stops, with the direction of vt in the middle of the piece, or at its
-//              end where friction could turn the point about
+//              end if friction could reverse the motion
 Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double left, double least)
 {
     const Vec3d& n = support.n;
@@ -62,7 +63,7 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
     const double speed = std::sqrt(speed2);
     const Vec3d direction = vt / speed;
     Slide slide{Slide::Moves, at - holds * direction, left};
-    const bool straight = at.isZero(0);  // as on a level floor: friction alone does not turn
+    const bool straight = at.isZero(0);  // e.g. on a level floor: friction alone does not turn
     const double along = straight ? -holds : slide.a.dot(direction);
     if (!straight) {
         const double aside2 = (slide.a - along * direction).squaredNorm();
@@ -74,8 +75,8 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
         slide.stops = true;
     }
     if (const double t = slide.duration; !straight && !slide.stops && holds * t > speed) {
-        // Friction that can turn the point about within the piece has the direction of the velocity at its end: by any
-        // other one a slow point would go to and fro across the pull.
+        // Friction that can reverse the motion within the piece uses the direction of the final velocity. With any
+        // other direction, a slow point would move back and forth across the pull.
         const Vec3d pulled = vt + t * at;
         const double size = pulled.norm();
         slide.stops = size <= t * holds;

@@ -1,9 +1,10 @@
-// What a point that a shape holds knows of it from frame to frame. Columns of the state, which outputs do not have.
+// State of points held by a shape, stored between frames. These columns belong to the state and are not written to
+// outputs.
 //
-//   stuckto      the obstacle's key; negative where the point has been torn off and still touches it; 0: none
-//   stuckface    of the surface's point that it is stuck to (MaterialPoint); `sliding` where it slides along the
-//   surface stuckat      the same: in the body's frame, or over the face, without the point's radius stuckP       where
-//   the last step left it: a point that is elsewhere has been moved by a script
+//   stuckto      the obstacle's key; negative if the point was torn off and still touches it; 0: none
+//   stuckface    face of the surface point that it is stuck to (MaterialPoint); `sliding` if it slides along the
+//   surface stuckat      position of that surface point: in the body's frame or over the face, without the point's
+//   radius stuckP       position after the last step: a point found elsewhere was moved by a script
 #pragma once
 
 #include <cstdint>
@@ -19,9 +20,9 @@ public:
     static constexpr const char* names[] = {"stuckP", "stuckat", "stuckface", "stuckto"};
     static constexpr std::int32_t sliding = -2;
 
-    // Whether a collider holds points.
+    // Returns true if a collider holds points.
     static bool are_needed(const Dynamics& dynamics);
-    // Brings those into being that are missing; the set without them.
+    // add_to() creates the missing columns; remove_from() removes them from the set.
     static void add_to(PointSet& points);
     static void remove_from(PointSet& points);
 

@@ -6,13 +6,13 @@
 namespace rapid {
 namespace {
 
-// A point that is found on a surface has its velocity to single precision: relative, and absolute in m/s.
+// Tolerance for the velocity of a point on a surface, which has single precision: relative, and absolute in m/s.
 constexpr double velocity_tolerance = 1e-6;
 
-// Of a distance: where it is flatter, as in the middle of a shape, it does not lead to the surface.
+// The smallest slope of a distance. A flatter field, as in the middle of a shape, does not lead to the surface.
 constexpr double least_slope = 0.5;
 
-// Into how many parts a sub-step is divided to find when a point is torn off; the moment is then bisected.
+// Parts of a substep that are searched for the time at which a point is torn off, and the bisections within one part.
 constexpr int parts_of_step = 8, bisections = 40;
 
 }  // namespace
@@ -54,7 +54,7 @@ void StuckPoints::advance()
     first_ = false;
 }
 
-// Sorts the points by what holds them.
+// Sorts the points by the obstacle that holds them.
 void StuckPoints::find_held()
 {
     for (std::vector<std::uint32_t>& points : held_) points.clear();
@@ -88,7 +88,7 @@ void StuckPoints::ask(std::size_t o, const std::vector<std::uint32_t>& points)
     if (!query_.empty()) query_.find_gradients_at_times(*block_.obstacles[o].shape);
 }
 
-// Points that lie on a surface, with its velocity: born on it, or put there.
+// Finds points that lie on a surface with its velocity, because they were born on it or placed there.
 void StuckPoints::find_resting()
 {
     std::vector<std::uint32_t> near;
@@ -116,7 +116,7 @@ void StuckPoints::find_resting()
     }
 }
 
-// The gap is that of the place that holds the point; of the point itself where that is elsewhere.
+// The gap is measured at the position that holds the point, or at the point itself if it is elsewhere.
 void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
 {
     const Obstacle& obstacle = obstacle_at(o);
@@ -126,7 +126,7 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
     const bool begins = begins_frame(i), moved = is_elsewhere(i, o, now);
     const MaterialPoint at = material(i, o);
     if (moved || (begins && at.face == MaterialPoint::rigid)) {
-        // Of another size, or the surface is another: the point stays where that is within its reach.
+        // The point's size or the surface has changed. The point stays if the surface is within its reach.
         const double tolerance = obstacle.contact_tolerance(block_.P[i], radius), slope2 = gap.gradient.squaredNorm();
         const bool off = std::abs(gap.f) > tolerance;
         if (std::abs(gap.f) > std::max({tolerance, radius, 2 * obstacle.feature})) return let_go(i);
@@ -176,7 +176,7 @@ void StuckPoints::advance_sliding(std::uint32_t i, int o, const Gap& gap)
     on.adhesion = adhesion;
     const Vec3d given = block_.v[i], v = tangential_to(on, given);
     on.ac = obstacle.acceleration_at(P, v, now);
-    // What is not kicked the slide takes off the surface, as it knows how that turns.
+    // Without a kick, the slide decides if the point leaves, because it accounts for the turning of the surface.
     const bool is_kicked = (given - vc).dot(n) > velocity_tolerance * (1 + given.norm());
     if (is_kicked && (kick_on(i, vc) + motion_.acceleration(i) - on.ac).dot(n) > adhesion) return let_go(i);
     carried_.push_back({i, block_.P[i], block_.v[i], P, v});
@@ -197,7 +197,7 @@ void StuckPoints::hold(std::size_t i, int o, double left)
     go(point, o, now, left);
 }
 
-// To what is at the point now.
+// Glues the point to its current position on the surface.
 void StuckPoints::glue(std::uint32_t i, int o, double now)
 {
     const Obstacle& obstacle = obstacle_at(o);
@@ -210,7 +210,7 @@ void StuckPoints::glue(std::uint32_t i, int o, double now)
     columns_->at[index] = at.at.cast<float>();
 }
 
-// From `now` on, by the time that is given.
+// Moves the point with the surface from `now` on for the given duration.
 void StuckPoints::go(std::uint32_t i, int o, double now, double duration)
 {
     const Obstacle& obstacle = obstacle_at(o);
@@ -233,7 +233,7 @@ MaterialPoint StuckPoints::material(std::uint32_t i, int o) const
     return point;
 }
 
-// Where the surface has the point at a time.
+// Returns the state of the surface point at a time.
 MovingBody::State StuckPoints::state(std::uint32_t i, int o, double time) const
 {
     const Obstacle& obstacle = obstacle_at(o);
@@ -247,8 +247,8 @@ bool StuckPoints::begins_frame(std::uint32_t i) const
     return first_ && block_.frame_time(i, block_.dt[i]) <= 1e-9 * block_.context.h;
 }
 
-// Whether a script has moved the point between two frames; or rows in the sub-step in which it hit the surface: they
-// have reached their balance with it there, and from then on they do not move what holds for good.
+// Returns true if a script has moved the point between two frames, or if rows have moved it in the substep of its
+// impact. Rows have then reached their balance with it, and afterwards do not move a permanently held point.
 bool StuckPoints::is_elsewhere(std::uint32_t i, int o, double now) const
 {
     if (begins_frame(i)) return columns_->P[block_.indices[i]] != block_.P[i].cast<float>();
@@ -266,15 +266,15 @@ bool StuckPoints::holds_for_good(std::size_t i) const
     return false;
 }
 
-// By which a script, an action or a neighbour has changed the velocity of the point since it was that of the surface,
-// m/s². A kick between two frames counts as an acceleration throughout the next.
+// Returns the kick of a script, an action or a neighbour: the difference of the point's velocity from that of the
+// surface, as an acceleration, m/s². A kick between two frames counts as an acceleration throughout the next frame.
 Vec3d StuckPoints::kick_on(std::uint32_t i, const Vec3d& v) const
 {
     const double over = begins_frame(i) ? block_.context.h : block_.context.drifts * block_.dt[i];
     return over > 0 ? Vec3d((block_.v[i] - v) / over) : Vec3d(Vec3d::Zero());
 }
 
-// What the bond to the surface has to bear, m/s²: with the acceleration b that the surface would have to give,
+// Returns the load on the bond to the surface, m/s²: with the acceleration b that the surface would have to supply,
 //
 //   b = a_surface - pull,   N = b·n,   sqrt(max(0, -N)² + max(0, |b - N n| - μ max(0, N))²)
 double StuckPoints::tension(std::uint32_t i, int o, const Vec3d& pull, double time) const
@@ -287,7 +287,7 @@ double StuckPoints::tension(std::uint32_t i, int o, const Vec3d& pull, double ti
                       std::max(0.0, along - obstacle.friction[block_.indices[i]] * std::max(0.0, N)));
 }
 
-// s from `now` on; infinite where the bond holds throughout the sub-step.
+// Returns the time until the bond tears, s from `now` on; infinite if it holds throughout the substep.
 double StuckPoints::time_of_tearing(std::uint32_t i, int o, const Vec3d& kick, double now) const
 {
     const double adhesion = obstacle_at(o).adhesion[block_.indices[i]], dt = block_.dt[i];

@@ -1,9 +1,9 @@
-// Points that a shape holds (numerics.md, Sticking): those that are glued to it move with a point of its surface,
-// whatever pulls them, until that would take more than the adhesion; those that cling to it slide along it and stay on
-// it as long.
+// Points held by a shape (numerics.md, Sticking). A glued point moves with a point of the surface under any force
+// until the force exceeds the adhesion. A clinging point slides along the surface, and stays on it within the same
+// limit.
 //
-// What holds a point is stored (StuckColumns): a surface that turns, deforms or speeds up could not be told again from
-// the place and velocity of a point alone.
+// The bond is stored (StuckColumns), because it could not be inferred from the position and velocity of a point on a
+// surface that turns, deforms or accelerates.
 #pragma once
 
 #include <cmath>
@@ -27,23 +27,24 @@ public:
     {
     }
 
-    // A new block.
+    // Starts a new block.
     void begin();
-    // Moves the glued points through the sub-step, and finds those that a shape holds no more, or only on its surface.
+    // Moves glued points through the substep, and finds those that a shape no longer holds, or holds only on its
+    // surface.
     void advance();
-    // After the rounds of contacts, with the points that had some: whom shapes hold now.
+    // Updates the bonds after the rounds of contacts; `met` are the points that had contacts.
     void finish(std::span<const std::uint32_t> met);
-    // At the end of the frame.
+    // Stores the state at the end of the frame.
     void keep(std::span<const Vec3f> P);
 
-    // A point that is to go on from where it is now, for what is left of the sub-step: freely, or along a surface.
+    // A point that continues from its current position for the rest of the substep: freely, or along a surface.
     struct Loose {
         std::uint32_t i;
         double left;  // s
         std::optional<Support> on;
     };
 
-    // A glued point that its shape has taken along, up to the moment at which it was torn off, if it was.
+    // A glued point that its shape has carried, up to the time at which it was torn off, if it was.
     struct Carried {
         std::uint32_t i;
         Vec3d P, v;  // before
@@ -51,16 +52,17 @@ public:
     };
     const std::vector<Carried>& carried() const { return carried_; }  // in this sub-step
 
-    // Whether a point is glued; whether nothing can tear it off, either; whether it is glued, or released to go on.
+    // has() returns true if a point is glued, holds_for_good() if in addition nothing can tear it off, and takes() if
+    // it is glued or released.
     bool has(std::size_t i) const { return taken_[i] == Glued; }
     bool holds_for_good(std::size_t i) const;
     bool takes(std::size_t i) const { return taken_[i] != Free; }
-    const std::vector<std::uint32_t>& list() const { return list_; }  // of the glued
+    const std::vector<std::uint32_t>& list() const { return list_; }  // the glued points
     const std::vector<Loose>& loose() const { return loose_; }
 
-    // Glues a point to an obstacle that it touches, with `left` seconds of its sub-step to go, and moves it so far.
+    // Glues a point to an obstacle that it touches, and moves it for the `left` seconds of its substep.
     void hold(std::size_t i, int obstacle, double left);
-    // Whether a point that was torn off an obstacle has not left it since.
+    // Returns true if a point that was torn off an obstacle has not left it since.
     bool is_torn(std::size_t i, int obstacle) const
     {
         return columns_ && columns_->to[block_.indices[i]] == -block_.obstacles[static_cast<std::size_t>(obstacle)].key;
@@ -68,7 +70,7 @@ public:
 
 private:
     enum Taken : std::uint8_t { Free, Glued, Released };
-    // How far a point is from the surface that holds it.
+    // Distance of a point from the surface that holds it.
     struct Gap {
         double f = 0;  // m, distance - radius
         Vec3d gradient = Vec3d::Zero();
@@ -99,9 +101,9 @@ private:
     const FreeMotion& motion_;
     TouchedPoints& touched_;
     StuckColumns* columns_ = nullptr;
-    bool first_ = true;  // sub-step of the block
+    bool first_ = true;  // first substep of the block
     std::vector<Taken> taken_;
-    std::vector<std::optional<Vec3d>> given_;  // the velocity that a glued point had at the end of the last sub-step
+    std::vector<std::optional<Vec3d>> given_;  // the velocity of a glued point at the end of the last substep
     std::vector<std::uint32_t> list_, torn_;
     std::vector<Loose> loose_;
     std::vector<Carried> carried_;

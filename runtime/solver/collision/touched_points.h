@@ -1,4 +1,4 @@
-// The points of a block that have met a shape since the frame began, and the surfaces that they are on.
+// The points of a block that have met a shape since the frame began, with the surfaces that they are on.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ public:
 
     explicit TouchedPoints(const CollisionBlock& block) : block_(block) {}
 
-    // A new block.
+    // Starts a new block.
     void begin()
     {
         touched_.assign(block_.size(), 0);
@@ -45,7 +45,8 @@ public:
     void set_surfaces(std::size_t i, const Surfaces& surfaces) { surfaces_[i] = surfaces; }
     void set_surface(std::size_t i, const Surface& surface) { surfaces_[i] = {surface, Surface()}; }
 
-    // The plane that is all that the point can have touched at the end of the sub-step; -1 for none.
+    // Returns the plane if it is the only surface that the point can have touched at the end of the substep; -1 for
+    // none.
     int only_plane(std::size_t i) const { return only_plane_[i]; }
     void set_only_plane(std::size_t i, int obstacle) { only_plane_[i] = obstacle; }
 

@@ -38,8 +38,8 @@ struct PairUse {
 // Search for pairs with |P_i - P_j| < reach_i + reach_j.
 class ContactSearch {
 public:
-    // grids: built from the radii, which the reaches may exceed. A reach is 0 for points in no grid. Throws
-    // InputError, before searching, if the pairs would exceed memory.
+    // grids: built from the radii, which the reaches may exceed. A reach is 0 for points in no grid. Throws Error,
+    // before searching, if the pairs would exceed memory.
     void find(std::span<const Vec3d> P, Strided<float> reach, const RadiusGrids& grids, Pairs& pairs,
               const PairUse& use = {});
 

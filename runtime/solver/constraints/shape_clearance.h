@@ -20,7 +20,7 @@ struct ShapeQuery {
     std::vector<double> moved, since_asked;  // m, in this substep, and since distances were first queried; by chunk
 
     std::vector<std::uint32_t> asked;  // points queried for one shape
-    std::vector<Vec3d> P, gradient;    // of these points
+    std::vector<Vec3d> P, gradient;    // of the queried points
     std::vector<double> phi, time;     // m, s
 
     // Returns the distance that a point may move in a substep, m. Contacts that are farther away are skipped.

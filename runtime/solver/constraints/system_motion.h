@@ -236,7 +236,7 @@ private:
             if (!is_nearer) return;
         }
     }
-    // Of what rows are off, to be corrected by masses: the sum, m, that of the squares, m², and the energy in springs,
+    // Errors of rows that masses can correct: their sum, m, the sum of squares, m², and the energy stored in springs,
     // J.
     struct Off {
         double sum = 0, squares = 0, energy = 0;

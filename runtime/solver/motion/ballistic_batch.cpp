@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// Points that are looked at and then advanced while they are in the first-level cache.
+// Points per block: tested and then advanced while they are in the first-level cache.
 constexpr std::size_t points_per_block = 512;
 
 [[gnu::always_inline]] inline FloatFlags magnitude_bits(const Floats& x)
@@ -61,8 +61,8 @@ void BallisticBatch::Clock::set(std::size_t first, std::size_t n)
     is_of_whole_frame_ = whole;
 }
 
-// Eight points. Returns bit 3 p for each point p that is left as it is. Unless it is known to be finite, `largest`
-// keeps the magnitude of what is written.
+// Advances eight points. Returns bit 3 p for each point p that is left unchanged. Unless the result is known to be
+// finite, `largest` keeps the largest magnitude written.
 template <bool Dragged, bool Avoids, bool Checks>
 [[gnu::always_inline]] inline std::uint32_t BallisticBatch::advance_pack(float* P, float* v, const Propagators& by,
                                                                          Largest& largest) const
@@ -77,8 +77,8 @@ template <bool Dragged, bool Avoids, bool Checks>
         if constexpr (Dragged) {
             x1 = x + (by.x_of_v[k] * u + by.fallen[k]);
             u1 = by.v_of_v[k] * u + by.gained[k];
-            // The velocity changes monotonically from u to u1: a quarter of the difference, for t. The parabolas of
-            // Collisions are off this path by as much as another quarter of the fall.
+            // The velocity changes monotonically from u to u1: a quarter of the difference, times t. The parabolas of
+            // Collisions deviate from this path by up to another quarter of the fall.
             sagging = 0.25 * (t * magnitude(u1 - u) + magnitude(by.fallen[k]));
         } else {
             const Doubles gain = t * packed_g_[k];
@@ -150,11 +150,11 @@ BallisticBatch::Bounds BallisticBatch::bounds_of(std::span<const Vec3f> values)
     return bounds;
 }
 
-// Whether no point with these positions and velocities comes near a box in t seconds, and all stay finite.
+// Returns true if no point with these positions and velocities comes near a box in t seconds, and all stay finite.
 bool BallisticBatch::are_far(const Box3d& positions, const Box3d& velocities, double t) const
 {
     const Vec3d gain = t * g_;
-    // Drag reduces the velocity and what the acceleration adds, each by itself.
+    // Drag reduces the velocity and the contribution of the acceleration separately.
     const Vec3d slowest = k_ == 0 ? Vec3d(velocities.min().cwiseMin(velocities.min() + gain).cwiseMin(0.0))
                                   : Vec3d(velocities.min().cwiseMin(0.0) + gain.cwiseMin(0.0));
     const Vec3d fastest = k_ == 0 ? Vec3d(velocities.max().cwiseMax(velocities.max() + gain).cwiseMax(0.0))
@@ -180,7 +180,7 @@ BallisticBatch::Progress BallisticBatch::advance(std::span<Vec3f> P, std::span<V
                    : advance_all<true, true>(P, v, time, begin, end, near);
 }
 
-// Among shapes, a block whose bounding box is far from all of them needs no test for each of its points: most blocks.
+// Most blocks have a bounding box that is far from all shapes, and need no test of individual points.
 template <bool Dragged, bool Avoids>
 BallisticBatch::Progress BallisticBatch::advance_all(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time,
                                                      std::size_t begin, std::size_t end,
@@ -219,7 +219,7 @@ void BallisticBatch::advance_block(std::span<Vec3f> P, std::span<Vec3f> v, Clock
 {
     Largest own_largest = largest;  // in registers
     for (std::size_t at = begin; at < end; at += lanes) {
-        // The next block is fetched while this one is computed.
+        // Prefetches the next block while this one is computed.
         for (int line = 0; line < 2; ++line) {
             __builtin_prefetch(P.data()->data() + 3 * (at + points_per_block) + 16 * line);
             __builtin_prefetch(v.data()->data() + 3 * (at + points_per_block) + 16 * line);

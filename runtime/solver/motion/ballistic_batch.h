@@ -1,8 +1,9 @@
-// Advances points on which only one uniform acceleration and one linear drag act: from single precision to single
-// precision in one pass over memory, whatever the sub-steps, because the closed form is exact and they would only
-// repeat it. Points that may come near a shape are left as they are, for Collisions.
+// Advances points that are subject only to one uniform acceleration and one linear drag. It works from single to
+// single precision in one pass over memory for any number of substeps, because the closed form is exact and substeps
+// would only repeat it. Points that may come near a shape are left unchanged, for Collisions.
 //
-// Why beside the sub-steps of a block (solver/block_step.h): it runs at the speed of memory (bench_solver, free_fall).
+// This exists alongside the substeps of a block (solver/block_step.h) because it runs at memory speed (bench_solver,
+// free_fall).
 #pragma once
 
 #include <array>
@@ -17,12 +18,12 @@
 
 namespace rapid {
 
-// How long each point moves in the frame, s: by its own column, which is shorter for a newborn, or h.
+// The time that each point moves in the frame, s: from its own column, which is shorter for a newborn, or h.
 struct OwnTime {
     double h = 0;
-    Strided<float> own{nullptr, 0};  // null where all move for h
+    Strided<float> own{nullptr, 0};  // null if all points move for h
 
-    // The whole frame in double precision, whether or not the points have a column because of newborns.
+    // Returns the whole frame in double precision, whether or not newborns make a column necessary.
     double operator()(std::size_t i) const
     {
         if (!own.data || own[i] == static_cast<float>(h)) return h;
@@ -35,16 +36,16 @@ public:
     // v' = g - k v: m/s², 1/s.
     BallisticBatch(const Vec3d& g, double k);
 
-    // Points whose path may come within `radius` of the box, by their bounding boxes, are not advanced.
+    // Excludes points whose path may come within `radius` of the box, by their bounding boxes.
     void avoid(const Box3d& box, double radius);
 
     struct Progress {
-        std::size_t end;  // the points before it have been advanced, or left to Collisions
-        bool finite;      // whether all their states are finite
+        std::size_t end;  // the points before it were advanced, or left to Collisions
+        bool finite;      // all their states are finite
     };
 
-    // Advances the points [begin, end), up to the first block of which one is not finite. Those that are left as they
-    // are, are appended to `near`, in order.
+    // Advances the points [begin, end), up to the first block with a non-finite point. Appends the excluded points to
+    // `near`, in order.
     Progress advance(std::span<Vec3f> P, std::span<Vec3f> v, const OwnTime& time, std::size_t begin, std::size_t end,
                      std::vector<std::uint32_t>& near) const;
 
@@ -54,17 +55,17 @@ private:
         PackedPoints<Doubles> min, max;
     };
 
-    // The propagator of each of eight points: how long it moves, s; with drag also the factors of its velocity, and
-    // what the acceleration adds to its position, m, and to its velocity, m/s.
+    // The propagators of eight points: the time of motion, s; with drag also the factors of the velocity, and the
+    // contributions of the acceleration to position, m, and velocity, m/s.
     struct Propagators {
         PackedPoints<Doubles> t, x_of_v, v_of_v, fallen, gained;
     };
 
-    // The propagators of one pack of points after the other: most points move for the whole frame, and share them.
+    // Supplies the propagators for consecutive packs of points. Most points move for the whole frame and share them.
     class Clock {
     public:
         Clock(const BallisticBatch& batch, const OwnTime& time, std::size_t begin);
-        // Of n points.
+        // Returns the propagators of n points.
         const Propagators& of(std::size_t first, std::size_t n)
         {
             if (own_) set(first, n);
@@ -76,17 +77,17 @@ private:
 
         const BallisticBatch& batch_;
         const OwnTime& time_;
-        const float* own_;        // null where all move for the same time
-        bool is_of_whole_frame_;  // propagators_
+        const float* own_;        // null if all points move for the same time
+        bool is_of_whole_frame_;  // propagators_ are for the whole frame
         Propagators propagators_;
     };
 
-    // The bounding box of some vectors, and whether all of them are finite; where they are not, the box means nothing.
+    // The bounding box of some vectors, and a flag that all of them are finite. If not, the box is meaningless.
     struct Bounds {
         Box3d box;
         bool finite;
     };
-    // The largest magnitude that was written, as bits; by coordinate.
+    // The largest magnitude written, as bits, by coordinate.
     using Largest = PackedPoints<FloatFlags>;
 
     static Bounds bounds_of(std::span<const Vec3f> values);

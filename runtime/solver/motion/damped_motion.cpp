@@ -17,8 +17,8 @@ constexpr auto one_over = [] {
     return all;
 }();
 
-// Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1; of its integral and its
-// derivative. For k t and w2 t² up to 1 the terms fall as 1/n!.
+// Taylor series of the impulse response h(t), h'' + k h' + w2 h = 0, h(0) = 0, h'(0) = 1, of its integral and of its
+// derivative. For k t and w2 t² up to 1 the terms decrease as 1/n!.
 Propagator propagator_by_series(double k, double w2, double t)
 {
     const double kt = k * t, w2t2 = w2 * t * t;
@@ -35,8 +35,8 @@ Propagator propagator_by_series(double k, double w2, double t)
     return {t * h, t * t * integral, slope, t * h};
 }
 
-// Without a spring, by x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to 1 by the series of the last one, from
-// which the others follow without cancellation. T: double, or a pack.
+// Response without a spring, with x = k t: e^-x, (1 - e^-x)/x and (e^-x - 1 + x)/x². Up to x = 1 the last one is a
+// series, from which the others follow without cancellation. T: double, or a pack.
 template <class T>
 struct Decay {
     T slope, h, integral;

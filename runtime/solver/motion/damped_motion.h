@@ -13,7 +13,7 @@
 
 namespace rapid {
 
-// After the time t from x0, with the velocity v: x = x0 + v x_of_v + G x_of_G, x' = v v_of_v + G v_of_G.
+// The state after the time t from x0, with the velocity v: x = x0 + v x_of_v + G x_of_G, x' = v v_of_v + G v_of_G.
 struct Propagator {
     double x_of_v = 0, x_of_G = 0, v_of_v = 1, v_of_G = 0;
 };
@@ -21,14 +21,15 @@ struct Propagator {
 // k: 1/s, at least 0; w2: 1/s², at least 0; t: s, at least 0.
 Propagator respond(double k, double w2, double t);
 
-// The same where quadratic drag is a part of it.
+// The same with quadratic drag included.
 struct Dragged {
     Propagator by;
     double rate = 0;  // 1/s, mean of k + c |v|
 };
 
-// The motion under drag of many points without springs, a pack at a time. Why beside respond(): where each point has a
-// drag of its own the exponentials are most of the cost, and a third of it in packs (bench_forces, air_by_attribute).
+// The motion of many springless points under drag, a pack at a time. It exists alongside respond() because points with
+// individual drag spend most of their time on exponentials, which take a third of it in packs (bench_forces,
+// air_by_attribute).
 struct DragPropagators {
     std::vector<double> x_of_v, x_of_G, v_of_v;  // by point; v_of_G is x_of_v
 
@@ -36,7 +37,7 @@ struct DragPropagators {
     void respond(std::span<const double> k, std::span<const double> t);
 };
 
-// The same, with the last result cached: neighbours often share k, w2 and t.
+// Calls respond() and caches the last result: neighbours often share k, w2 and t.
 class Responder {
 public:
     const Propagator& operator()(double k, double w2, double t)
@@ -50,30 +51,31 @@ private:
     Propagator last_;
 };
 
-// The acceleration at rest at P.
+// Returns the acceleration at rest at P.
 inline Vec3d acceleration_at_rest(const Vec3d& P, const Vec3d& a, const Linear& linear)
 {
     return a + linear.ku + (linear.w2q - linear.w2 * P);
 }
 
-// After the time t, of a point with the velocity v and the acceleration at rest G. Quadratic drag beside a spring is of
-// second order: it slows the velocity at the rate of its mean, and shortens the way by as much as without the spring.
+// Returns the response after the time t of a point with the velocity v and the acceleration at rest G. Quadratic drag
+// combined with a spring is of second order: it slows the velocity at its mean rate, and shortens the path by as much
+// as without the spring.
 Dragged respond(const Vec3d& v, const Vec3d& G, const Linear& linear, double t, Responder& respond);
 
-// The motion of a point through a step under linear forces.
+// The motion of a point over a step under linear forces.
 struct Damped {
-    double k, w2;        // of all drag and springs; quadratic drag by its mean rate
+    double k, w2;        // of all drag and springs; quadratic drag at its mean rate
     double linear_k, c;  // of linear and of quadratic drag
     Vec3d G;             // the acceleration at rest at its position
 
-    // After the step: the distance travelled, m, and the velocity, m/s.
+    // After the step: the displacement, m, and the velocity, m/s.
     Vec3d travel, v;
 
-    // The parabola that stands for the path, with the same end, and which never overshoots it.
+    // The parabola that represents the path, with the same end; it never overshoots the path.
     Vec3d path_v, path_a;
 
-    // What draws the point: G and w2, and the spring to a surface beside them (surface_springs.h), for whose bent path
-    // G is a mean and w2 is 0; of a shape that moves, as that is where the path begins.
+    // The forces on the point: G and w2, plus the spring to a surface (surface_springs.h), for whose curved path G is
+    // a mean and w2 is 0. For a moving shape, as at the beginning of the path.
     struct Pull {
         Vec3d G;
         double w2;
@@ -84,11 +86,11 @@ struct Damped {
     static Damped from(const Vec3d& P, const Vec3d& v, const Vec3d& a, const Linear& linear, double t,
                        Responder& respond);
 
-    // The mean acceleration over a time t from a velocity v.
+    // Returns the mean acceleration over a time t from a velocity v.
     Vec3d mean_acceleration(const Vec3d& v, double t) const;
 
-    // As much of a time t as a mean acceleration may stand for: while quadratic drag slows a point by a sixteenth, the
-    // mean of its first and last velocities is within 0.1 % of its mean velocity.
+    // Returns the part of a time t that a mean acceleration may represent. While quadratic drag slows a point by at
+    // most a sixteenth, the mean of its first and last velocities is within 0.1 % of its mean velocity.
     double longest_parabola(const Vec3d& from, double t) const;
 };
 

@@ -21,7 +21,7 @@ using Coordinates = PackedPoints<Doubles>;
     for (std::uint32_t k = 0; k < 3; ++k) store_pack(coordinates[k], to->data() + lanes * k);
 }
 
-// The durations of eight points, each three times.
+// Returns the durations of eight points, each repeated three times.
 [[gnu::always_inline]] inline Coordinates tripled(const double* t)
 {
     const Doubles eight = load_pack(t);

@@ -6,18 +6,18 @@
 namespace rapid {
 namespace {
 
-// Of y'' + k y' = b y, b = c g: the impulse response H (H(0) = 0, H'(0) = 1) and what follows from it, all but h times
-// e^(-scale t), which keeps them finite.
+// The response of y'' + k y' = b y, b = c g: the impulse response H (H(0) = 0, H'(0) = 1) and derived values, all
+// except h scaled by e^(-scale t), which keeps them finite.
 //
 //   J  = ∫ e^-k(t-s) H(s) ds     by which H' exceeds b times e^-kt
 //   h  = (1 - e^-kt)/k
 struct Response {
     double H, J, y0, decay, log_scale;  // y0: the response to y(0) = 1, y'(0) = 0; decay: e^-kt
-    double Q, J2;                       // ∫ H and ∫ J, where there is a series; log_scale is then 0
+    double Q, J2;                       // ∫ H and ∫ J, if there is a series; log_scale is then 0
     bool is_series;
 };
 
-// Taylor series in t; k t up to 2 and |b| t² up to 1, where terms fall as 2^n/n!.
+// Taylor series in t; k t up to 2 and |b| t² up to 1, for which terms decrease as 2^n/n!.
 Response response_by_series(double k, double b, double t)
 {
     const double kt = k * t, bt2 = b * t * t;
@@ -38,7 +38,7 @@ Response response_by_series(double k, double b, double t)
     return {t * H, t * t * J, 1 + b * Q, std::exp(-kt), 0, Q, t * t * t * J2, true};
 }
 
-// With exponentials, R² = k²/4 + b > 0.
+// Closed form with exponentials, R² = k²/4 + b > 0.
 Response by_exponentials(double k, double b, double R, double t)
 {
     const double rho = R + 0.5 * k, sigma = b / rho;  // H = (e^(sigma t) - e^(-rho t)) / 2R
@@ -47,7 +47,7 @@ Response by_exponentials(double k, double b, double R, double t)
     return {H, (slope - decay) / b, (rho + sigma * e) / (2 * R), decay, sigma * t, 0, 0, false};
 }
 
-// With sine and cosine, w² = -R² >= 0.
+// Closed form with sine and cosine, w² = -R² >= 0.
 Response by_oscillation(double k, double b, double w, double t)
 {
     const double angle = w * t, half = std::exp(-0.5 * k * t), decay = std::exp(-k * t);
@@ -65,8 +65,8 @@ Response respond_of(double k, double b, double t)
 // ln(1 + x)/x
 double log_ratio(double x) { return std::abs(x) < 1e-16 ? 1 : std::log1p(x) / x; }
 
-// While the point moves along the line without turning. With y'' + k y' = c g y, y(0) = 1, y'(0) = c v, it has gone
-// ln(y)/c, so that velocities across the line fall by E = e^-kt/y:
+// Motion along the line without turning. With y'' + k y' = c g y, y(0) = 1, y'(0) = c v, the distance is ln(y)/c, so
+// velocities across the line decay by E = e^-kt/y:
 //
 //   V_v = E                       V_G = E ∫ 1/E = (H + c v J)/y
 //   X_v = ln(1 + c v h)/(c v)     as without acceleration
@@ -78,7 +78,7 @@ Dragged one_way(double v, double g, double k, double c, double t)
     const double h = respond(k, 0, t).x_of_v, drag_alone = c * v * h;
     Dragged found;
     found.by.x_of_v = h * log_ratio(drag_alone);
-    // So weak an acceleration changes the rate by less than its closed form loses to rounding.
+    // An acceleration this weak changes the rate by less than its closed form loses to rounding.
     if (k * t > 2 && std::abs(b) < 1e-8 * k * k) {
         const Propagator r = respond(k, 0, t);
         const double y = 1 + drag_alone, J = (h - t * r.v_of_v) / k, J2 = (r.x_of_G - J) / k;
@@ -103,7 +103,7 @@ Dragged one_way(double v, double g, double k, double c, double t)
     return found;
 }
 
-// How long a point of this speed takes to stop, decelerated by g: ∫ dv/(g + k v + c v²) from 0.
+// Returns the time in which a point of this speed stops, decelerated by g: ∫ dv/(g + k v + c v²) from 0.
 double time_to_stop(double v, double g, double k, double c)
 {
     const double R2 = 0.25 * k * k - c * g, R = std::sqrt(std::abs(R2)), x = R * v, y = g + 0.5 * k * v;
@@ -111,7 +111,7 @@ double time_to_stop(double v, double g, double k, double c)
     return (R2 > 0 ? std::atanh(std::min(x / y, 1.0)) : std::atan2(x, y)) / R;
 }
 
-// The response over two times, one after the other; share: the first time's of both.
+// Returns the response over two consecutive times; share: the first time's fraction of both.
 Dragged then(const Dragged& first, double share, const Dragged& second)
 {
     const Propagator &a = first.by, &b = second.by;
@@ -120,7 +120,8 @@ Dragged then(const Dragged& first, double share, const Dragged& second)
             share * first.rate + (1 - share) * second.rate};
 }
 
-// At a speed that is accelerated along the motion, or decelerated until it stops and then accelerated back.
+// Returns the response for a speed that is accelerated along the motion, or decelerated until it stops and then
+// accelerated back.
 Dragged along_line(double speed, double along, double k, double c, double t)
 {
     if (!(along < 0)) return one_way(speed, along, k, c, t);
@@ -129,7 +130,7 @@ Dragged along_line(double speed, double along, double k, double c, double t)
     return then(one_way(speed, along, k, c, stop), stop / t, one_way(0, -along, k, c, t - stop));
 }
 
-// The direction of motion is that of the mean of the velocities before and after.
+// Uses the mean direction of the velocities before and after.
 Dragged along_mean_direction(const Vec3d& v, const Vec3d& G, double k, double c, double t)
 {
     const double speed = v.norm();
@@ -149,7 +150,7 @@ Dragged respond_to_quadratic_drag(const Vec3d& v, const Vec3d& G, double k, doub
     const double speed = v.norm(), along = speed > 0 ? G.dot(v) / speed : 0;
     const double stop = along < 0 ? time_to_stop(speed, -along, k, c) : t;
     if (stop >= t) return along_mean_direction(v, G, k, c, t);
-    // It turns round, and then has another direction.
+    // The point turns back, and then has another direction.
     const Dragged first = along_mean_direction(v, G, k, c, stop);
     return then(first, stop / t, along_mean_direction(v * first.by.v_of_v + G * first.by.v_of_G, G, k, c, t - stop));
 }

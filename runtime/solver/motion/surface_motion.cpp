@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// x, perpendicular to the unit vector a, turned as a is turned onto the unit vector b.
+// Rotates x, perpendicular to the unit vector a, as a is rotated onto the unit vector b.
 Vec3d turned(const Vec3d& x, const Vec3d& a, const Vec3d& b)
 {
     const double both = 1 + a.dot(b);
@@ -17,7 +17,8 @@ Vec3d turned(const Vec3d& x, const Vec3d& a, const Vec3d& b)
 
 Vec3d along_surface(const Vec3d& x, const Vec3d& n) { return x - x.dot(n) * n; }
 
-// ∫ X_G over the time t: X_G'' + k X_G' + w2 X_G = 1, integrated; near w2 = 0 the cube of the time.
+// Returns ∫ X_G over the time t, by integrating X_G'' + k X_G' + w2 X_G = 1; near w2 = 0 it follows the cube of the
+// time.
 double integral_of_x_of_G(const Propagator& r, double k, double w2, double t)
 {
     return w2 * t * t > 1e-4 ? (t - r.v_of_G - k * r.x_of_G) / w2 : t * r.x_of_G / 3;
@@ -25,7 +26,7 @@ double integral_of_x_of_G(const Propagator& r, double k, double w2, double t)
 
 }  // namespace
 
-// Returns where the motion would end if the surface were flat.
+// Returns the end of the motion on a flat surface.
 Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient, const Vec3d& V)
 {
     const double slope = gradient.norm();
@@ -46,7 +47,7 @@ Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient, const Vec3d& V)
     return P0 + t * V0_ + along_surface(u0_, n0_) * along.x_of_v + along_surface(pull_, n0_) * along.x_of_G + way * n0_;
 }
 
-// The normal of the middle is the mean of both ends. Returns the end, but for the curvature of the surface.
+// Returns the end, except for the curvature of the surface. The middle normal is the mean of those at both ends.
 Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
 {
     if (!acts_) return P;
@@ -72,7 +73,7 @@ Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
     return at_ = P0 + t * mean_V() + way + (d1_ - d0_) * n_;
 }
 
-// Puts the point at the distance d1, and gives it the energy that it has there.
+// Places the point at the distance d1, with the energy that it has there.
 void SurfaceMotion::end(double phi, const Vec3d& gradient)
 {
     if (!acts_) return;
@@ -81,7 +82,7 @@ void SurfaceMotion::end(double phi, const Vec3d& gradient)
     const double d = slope != 0 ? phi / slope : d1_;
     P = at_ + (d1_ - d) * n1;
     double left = energy_left(P, d1_);
-    if (left < 0) {  // the oscillator has gone farther than the energy carries it: more than a radian in the step
+    if (left < 0) {  // the oscillator went beyond its energy: more than a radian in the step
         const std::optional<double> reached = distance_reached(at_ - d * n1, n1);
         if (!reached) {  // nor along the surface: it turns back
             d1_ = d0_;
@@ -111,8 +112,8 @@ void SurfaceMotion::settle(double phi, const Vec3d& gradient)
     if (had > 0) v = V1_ + std::sqrt(1 + freed / had) * (v - V1_);
 }
 
-// The distance nearest to d1 from `surface` along n at which energy is left: the energy left there is
-// c + 2 b d - (s + w2) d².
+// Returns the distance nearest to d1, from `surface` along n, at which energy is left; the energy left is c + 2 b d -
+// (s + w2) d².
 std::optional<double> SurfaceMotion::distance_reached(const Vec3d& surface, const Vec3d& n) const
 {
     const Vec3d way = surface - P0 - t * mean_V();

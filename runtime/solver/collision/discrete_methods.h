@@ -32,8 +32,8 @@ public:
     // Is called at its end.
     void correct();
 
-    // How far off a contact that was found at the end of a sub-step, not on the path, may have put the point since
-    // begin(), m.
+    // Returns a bound, m, on the position error since begin() due to contacts found at the end of a substep instead of
+    // on the path.
     double position_error(std::size_t i) const { return position_error_[i]; }
 
 private:

@@ -43,8 +43,8 @@ private:
     const TouchedPoints& touched_;
     std::vector<Vec3f> initial_P_;
 
-    // Points of the block that are elsewhere on a surface than at the beginning of the frame: by the surface's side of
-    // an edge and obstacle; and those that can have touched one plane only.
+    // Points of the block that have moved on a surface in the frame, by the surface's side of an edge and obstacle,
+    // and those that can have touched only one plane.
     std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
     std::vector<std::uint32_t> moved_on_plane_;
     DistanceQuery query_;

@@ -45,8 +45,8 @@ void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
 }
 
 // The lighter point is a wall if it is better supported, or if the heavy one wedges it against its support. The heavy
-// point also loses its velocity into the lighter one: at most its own velocity relative to the lighter one's support, or
-// the resting speed. A light point that is squeezed out or thrown thus gives it no more, and a shape that lifts both
+// point also loses its velocity into the lighter one: at most its own velocity relative to the lighter one's support,
+// or the resting speed. A light point that is squeezed out or thrown thus gives it no more, and a shape that lifts both
 // still takes away the speed due to weight.
 void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
 {

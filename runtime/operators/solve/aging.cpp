@@ -2,7 +2,6 @@
 
 #include <limits>
 
-#include "runtime/operators/solve/step_recorder.h"
 #include "runtime/parallel.h"
 #include "runtime/points/buffer.h"
 #include "runtime/points/members.h"
@@ -21,7 +20,8 @@ const T* contiguous(const Strided<T>& values, std::size_t begin, std::size_t end
 
 }  // namespace
 
-std::size_t age_points(PointSet& points, const std::string& group, double frame_length, StepRecorder* recorder)
+std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
+                       const std::function<void(std::span<const std::uint8_t>)>& bury)
 {
     auto* ages = points.find<float>("age");
     if (!ages || points.empty()) return 0;
@@ -55,8 +55,9 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
         }
     });
     const std::size_t before = points.size();
-    if (lives && recorder) recorder->remove_old(points, keep);
-    if (lives) points.keep(keep);
+    if (!lives) return 0;
+    bury(keep);
+    points.keep(keep);
     return before - points.size();
 }
 

@@ -11,13 +11,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 
 #include "runtime/points/point_set.h"
 
 namespace rapid {
-
-class StepRecorder;
 
 class Aging {
 public:
@@ -45,8 +45,8 @@ private:
 };
 
 // Lets the points of the group grow older by their `dt`, or by a frame, and removes those that have reached their
-// `life`. Returns how many died; the recorder is told.
+// `life`. Calls bury(stays) before it does: their mask is 0. Returns how many died.
 std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
-                       StepRecorder* recorder = nullptr);
+                       const std::function<void(std::span<const std::uint8_t>)>& bury);
 
 }  // namespace rapid

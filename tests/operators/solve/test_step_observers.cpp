@@ -1,4 +1,4 @@
-#include "runtime/operators/solve/point_figures.h"
+#include "runtime/operators/solve/step_observers.h"
 
 #include <algorithm>
 #include <bit>
@@ -105,6 +105,47 @@ TEST_CASE("the state does not keep the figures, and a scene's own attributes sta
     Orbit untold({});
     untold.simulation->tells_points = false;
     CHECK_FALSE(untold.step(at_distances({1})).has("error"));
+}
+
+// The points after four steps among attractors, neighbours and, with a radius, contacts; some die of age. With all
+// observers that a step can have, or with those alone that it always has.
+PointSet after_steps(const test::Arguments& arguments, double radius_of_contacts, bool is_observed)
+{
+    const auto simulation = test::simulation();
+    simulation->tells_points = simulation->estimates_errors = is_observed;
+    if (is_observed) simulation->record = std::make_shared<StepRecord>();
+    NodeTest pull("attract", {{"strength", Value(20.0)}}, simulation);
+    NodeTest neighbours("interact", {{"radius", Value(1.0)}, {"separation", Value(30.0)}}, simulation);
+    NodeTest contact("contact", {{"radius", Value(radius_of_contacts)}}, simulation);
+    NodeTest solve("solve", arguments, simulation);
+    PointSet points = at_distances({0.5f, 0.7f, 1, 2, 2.1f, 5});
+    points.add({"age", 0.0f});
+    points.set("life", Column<float>(std::span<const float>(std::vector<float>{1, 1, 1, 0.1f, 1, 1})));
+    for (std::int64_t frame = 2; frame <= 5; ++frame) {
+        Flow flow = neighbours.evaluate(frame, {pull.evaluate(frame, {Flow{points, {}, simulation}})});
+        if (radius_of_contacts > 0) flow = contact.evaluate(frame, {std::move(flow)});
+        points = solve.evaluate(frame, {std::move(flow)}).points;
+    }
+    return points;
+}
+
+TEST_CASE("observers find out about a step and leave its points as they are", "[solve]")
+{
+    const auto same = [](const test::Arguments& arguments, double radius_of_contacts = 0) {
+        const PointSet observed = after_steps(arguments, radius_of_contacts, true);
+        const PointSet alone = after_steps(arguments, radius_of_contacts, false);
+        CHECK(observed.size() == 5);
+        CHECK(observed.has("error"));
+        CHECK_FALSE(alone.has("error"));
+        CHECK(test::ids_of(observed) == test::ids_of(alone));
+        for (const char* name : {"P", "v"})
+            CHECK(test::values_of<Vec3f>(observed, name) == test::values_of<Vec3f>(alone, name));
+    };
+    same({});
+    same({{"substeps", Value(3.0)}});
+    same({{"tolerance", Value(1e-4)}});
+    same({}, 0.1);
+    same({{"substeps", Value(3.0)}}, 0.1);
 }
 
 }  // namespace

@@ -1,21 +1,29 @@
-// The shapes of colliders as one step needs them (paper §4.3, §4.4): level sets with a band as wide as the points
-// require, and moving or deforming shapes along their paths through the step.
+// The dynamics of a step: those of the chain, the drag that points bear as attributes, colliders with their shapes in
+// motion; and what changes within the step.
 //
-// A level set is widened once and kept from step to step, as a deforming one is. A snapshot holds how wide they were,
-// not the grids: points would come to other bits among narrower ones.
+// Forces that change are given at the middles of the step's sub-steps, interactions at their ends, and constraints with
+// places that are functions of time along these. Of other constraints and of colliders the run has those of the end of
+// the step, shadows those of its middle.
 #pragma once
 
 #include <cmath>
 #include <map>
 #include <string>
 
-#include "runtime/graph/node.h"
+#include "runtime/operators/solve/step_observers.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/motion/deforming.h"
 
 namespace rapid {
 
+struct NeededBand;
+
+// The shapes of colliders as one step needs them (paper §4.3, §4.4): level sets with a band as wide as the points
+// require, and moving or deforming shapes along their paths through the step.
+//
+// A level set is widened once and kept from step to step, as a deforming one is. A snapshot holds how wide they were,
+// not the grids: points would come to other bits among narrower ones.
 class ColliderShapes {
 public:
     // Replaces the colliders whose shapes are too narrow, moving or deforming. substeps: after which points are put
@@ -54,13 +62,20 @@ private:
     };
 
     Widened known(const Collider& collider, const LevelSetPtr& shape) const;
-    void widen(Dynamics& dynamics, const PointSet& points, int substeps, const Evaluation& now);
-    void set_in_motion(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
-                       const Evaluation& now);
+    void widen(Dynamics& dynamics, NeededBand& needed_band, const Evaluation& now);
+    void set_in_motion(Dynamics& dynamics, NeededBand& needed_band, const FrameClock& clock, const Evaluation& now);
 
     std::map<ShapePtr, Widened> widened_;              // by the shape given
     std::map<std::string, Band> bands_, restored_;     // by collide node: of the last step; of a snapshot before it
     std::map<std::string, Deformation> deformations_;  // by collide node
 };
+
+// Completes the dynamics in the flow and the columns that they need, and gives the step those of its run and of
+// shadows. On the thread that evaluates nodes. Error: an attribute that stands for a parameter is out of its range; a
+// shape that does not fit into memory.
+void prepare(Step& step, ColliderShapes& shapes);
+
+// Refuses attributes that stand for parameters as constants are, by one scan of each.
+void require_in_range(const Step& step);
 
 }  // namespace rapid

@@ -1,0 +1,444 @@
+#include "runtime/operators/solve/step_observers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include "runtime/points/id_index.h"
+#include "runtime/shapes/shape.h"
+#include "runtime/solver/constraints/contact_state.h"
+#include "runtime/solver/estimate/coupled_errors.h"
+#include "runtime/solver/estimate/energy_drift.h"
+#include "runtime/solver/estimate/resolution.h"
+#include "runtime/solver/estimate/shadow.h"
+#include "runtime/solver/estimate/stiffness.h"
+#include "runtime/solver/estimate/tolerance_check.h"
+#include "runtime/solver/interaction.h"
+
+namespace rapid {
+namespace {
+
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& more)
+{
+    to.insert(to.end(), more.begin(), more.end());
+}
+
+// Keeps what happens to the points in a step, where an emitter has the simulation as its source (StepRecord). With a
+// tolerance points go through the step several times, and contacts are not recorded.
+class StepRecorder final : public StepObserver {
+public:
+    bool observes(const Step& step) const override { return step.flow.simulation->record != nullptr; }
+
+    void start(Flow& flow) override
+    {
+        Simulation& simulation = *flow.simulation;
+        if (!simulation.record) return;
+        *simulation.record = StepRecord();
+        simulation.record->before = flow.points;
+        simulation.first_new = simulation.next_id;
+    }
+
+    void begin(Step& step, const PointSet& entered) override
+    {
+        Simulation& simulation = *step.flow.simulation;
+        StepRecord& record = *simulation.record = StepRecord();
+        record.time = step.options.time;
+        record.h = step.options.h;
+        record.first_new = std::exchange(simulation.first_new, simulation.next_id);
+        record.before = entered;
+        record.has_contacts = !step.tolerance;
+        log_.reset();
+        if (record.has_contacts) step.options.log = &log_.emplace(entered.size());
+    }
+
+    void end(Step& step, const PointSet&) override
+    {
+        if (!log_) return;
+        StepRecord& record = *step.flow.simulation->record;
+        record.hits = log_->hits();
+        record.breaks = log_->breaks();
+        record.killed = log_->dead();
+        record.killed_at = log_->died_at();
+        log_.reset();
+    }
+
+    void bury(const Step& step, std::span<const std::uint8_t> stays) override
+    {
+        std::vector<std::uint32_t> places;
+        for (std::size_t i = 0; i < stays.size(); ++i)
+            if (!stays[i]) places.push_back(static_cast<std::uint32_t>(i));
+        if (places.empty()) return;
+        StepRecord& record = *step.flow.simulation->record;
+        const PointSet& old = record.old = step.flow.points.select(places);
+        const Strided<float> age = old.column<float>("age").read(), life = old.column<float>("life").read();
+        for (std::size_t i = 0; i < old.size(); ++i)
+            record.old_at.push_back(record.time - std::max(0.0, double(age[i]) - double(life[i])));
+    }
+
+private:
+    std::optional<StepLog> log_;
+};
+
+// Examines the points before the step: for stiff forces and actions after 1, 2, 4, 8, ... steps, at little cost, as
+// stiffness changes while points move. With a tolerance the sub-steps are chosen, and there is nothing to advise.
+class Examination final : public StepObserver {
+public:
+    bool observes(const Step&) const override { return true; }
+
+    void begin(Step& step, const PointSet& entered) override
+    {
+        const SolveOptions& options = step.options;
+        if (std::has_single_bit(static_cast<std::uint64_t>(std::llround(options.time / options.h)))) {
+            std::vector<Stiffness> found = find_stiff(entered, step.flow.dynamics, options);
+            if (step.tolerance) std::erase_if(found, [](const Stiffness& stiffness) { return !stiffness.is_exact(); });
+            append(step.now.figures.stiff, found);
+        }
+        if (!step.flow.simulation->trial) return;
+        Resolution& resolution = step.now.figures.resolution;
+        resolution = coarser(resolution, resolution_of(entered, options.h));
+        if (!step.flow.dynamics.actions().empty()) try_actions(step, entered);
+    }
+
+private:
+    // Actions, which are scripts, may fail.
+    static void try_actions(const Step& step, PointSet points)
+    {
+        Dynamics actions;
+        for (const auto& action : step.flow.dynamics.actions()) actions.add(action);
+        SolveOptions once;
+        once.time = step.options.time;
+        once.h = step.options.h;
+        once.frame = step.options.frame;
+        solve(points, actions, once);
+    }
+};
+
+// Estimates errors: by a sample of the points where each moves alone, else by all of them. Of coupled points a sample
+// tells nothing but rounding.
+class ErrorEstimate final : public StepObserver {
+public:
+    bool observes(const Step& step) const override { return StepObserver::observes(step) && step.estimates_errors(); }
+
+    void begin(Step& step, const PointSet& entered) override
+    {
+        note_left_out(step);
+        const PointSet& points = step.flow.points;
+        const bool alone = step.moves_alone();
+        shadows_.begin(points, !alone || is_closed_form(points, step.run, step.options), step.options.h);
+        if (alone)
+            drift_.begin(points, shadows_, step.run, step.options);
+        else
+            coupled_.begin(entered, step.finer, step.options);
+    }
+
+    void end(Step& step, const PointSet& moved) override
+    {
+        FrameFigures& figures = step.now.figures;
+        std::optional<std::vector<double>> drift;
+        if (step.moves_alone()) {
+            check_tolerance(step, moved);
+            compare_sample(step, moved);
+            drift = drift_.end(moved, shadows_, step.run);
+        } else {
+            shadows_.advance(moved, [](PointSet&) {});
+            compare_all(step);
+        }
+        const double rounding = shadows_.rounding(!step.flow.dynamics.colliders().empty());
+        figures.rounding = std::max(figures.rounding, rounding);
+        if (drift)
+            append(figures.energy_drift, *drift);
+        else
+            figures.has_no_energy = true;
+    }
+
+    void save(StateWriter& to) const override { to(shadows_, coupled_, drift_, tolerance_check_); }
+    void load(StateReader& from) override { from(shadows_, coupled_, drift_, tolerance_check_); }
+
+private:
+    // Parameters that are functions of the frame and in no error.
+    static void note_left_out(const Step& step)
+    {
+        const auto& varying = step.flow.simulation->varying;
+        std::vector<std::string>& left_out = step.now.figures.left_out_of_errors;
+        step.flow.dynamics.visit_in_order([&](const auto& dynamic) {
+            using D = std::decay_t<decltype(*dynamic)>;
+            if (step.tolerance && std::is_same_v<D, Interaction>)
+                left_out.push_back(dynamic->node + ", whose kicks with a tolerance are at the ends of frames");
+            const auto found = varying.find(dynamic->node);
+            if (found == varying.end()) return;
+            for (const std::string& param : found->second)
+                left_out.push_back(
+                    fmt::format("{}.{}, a function of the frame that is called once in each", dynamic->node, param));
+        });
+    }
+
+    // While the shadows are as they were before the step.
+    void check_tolerance(Step& step, const PointSet& moved)
+    {
+        if (!step.tolerance || shadows_.idle()) return;
+        step.beyond = tolerance_check_.beyond(shadows_.before(), moved, step.finer, step.options, step.allowed_error(),
+                                              2 * step.max_substeps);
+    }
+
+    void compare_sample(Step& step, const PointSet& moved)
+    {
+        std::vector<double> errors = shadows_.advance(moved, [&](PointSet& shadows) {
+            SolveOptions finer = step.options;
+            finer.substeps *= 2;
+            finer.met = nullptr;
+            finer.taken = nullptr;
+            finer.log = nullptr;
+            step.advance(shadows, step.finer, finer, 2);
+        });
+        append(step.now.figures.errors, errors);
+        step.is_exact = shadows_.idle();
+        if (!step.is_exact) step.note_errors(shadows_.ids(), std::move(errors));
+    }
+
+    void compare_all(Step& step)
+    {
+        CoupledErrors::Errors found = coupled_.end(step.flow.points);
+        FrameFigures& figures = step.now.figures;
+        append(figures.errors, found.since_birth);
+        append(figures.frame_errors, found.of_frame);
+        if (!found.unknown.empty()) figures.left_out_of_errors.push_back(found.unknown);
+        step.note_errors(found.ids, std::move(found.since_birth.empty() ? found.of_frame : found.since_birth));
+    }
+
+    Shadows shadows_;
+    CoupledErrors coupled_;
+    EnergyDrift drift_;
+    ToleranceCheck tolerance_check_;
+};
+
+// Reports what the solver has counted.
+class StepReport final : public StepObserver {
+public:
+    void begin(Step& step, const PointSet&) override { all_newborn_ = are_newborn(step.flow.points, step.options.h); }
+
+    void end(Step& step, const PointSet& moved) override
+    {
+        if (all_newborn_ && moved.empty()) warn_of_deaths_at_birth(step);
+        count(step);
+        warn(step);
+    }
+
+    void bury(const Step& step, std::span<const std::uint8_t> stays) override
+    {
+        if (all_newborn_ && std::find(stays.begin(), stays.end(), 1) == stays.end())
+            step.warn("all points die in the frame of their birth; give them a longer life");
+    }
+
+private:
+    // Whether there are points, all of which were born in this step.
+    static bool are_newborn(const PointSet& points, double h)
+    {
+        const auto* own = points.find<float>("dt");
+        if (points.empty() || !own) return false;
+        const Strided<float> dt = own->read();
+        for (std::size_t i = 0; i < points.size(); ++i)
+            if (!(dt[i] < static_cast<float>(h))) return false;
+        return true;
+    }
+
+    static void warn_of_deaths_at_birth(const Step& step)
+    {
+        for (const auto& collider : step.flow.dynamics.colliders())
+            if (collider->response == Response::Die) {
+                step.now.warnings.push_back(
+                    fmt::format("{}:{}: node \"{}\": kills all points where they are born: with response = \"die\" a "
+                                "point dies within its radius (pscale) of the shape; give radius = 0, or let points be "
+                                "born farther away",
+                                collider->location.file, collider->location.line, collider->node));
+                return;
+            }
+    }
+
+    static void count(const Step& step)
+    {
+        const SolveResult& result = step.done.result;
+        FrameFigures& figures = step.now.figures;
+        figures.substeps = std::max(figures.substeps, step.done.substeps);
+        figures.collisions += result.collisions;
+        figures.died += result.died;
+        figures.contact_limit += result.contact_limit;
+        figures.trapped += result.trapped;
+        figures.constraint_rows += result.residual.rows;
+        figures.loose_constraints += result.residual.loose;
+        figures.broken += result.residual.broken;
+        figures.asleep += result.asleep;
+        if (result.residual.search) figures.contact_search = result.residual.search;
+        figures.constraint_residual_max = std::max(figures.constraint_residual_max, result.residual.worst);
+        figures.contact_energy += result.contact_energy;
+        if (result.ledger && figures.ledger)
+            figures.ledger->append(*result.ledger);
+        else if (result.ledger)
+            figures.ledger = result.ledger;
+        figures.penetration_max = std::max(figures.penetration_max, result.penetration_max);
+        figures.beyond_tolerance += std::max(step.done.beyond, step.beyond);
+    }
+
+    static void warn(const Step& step)
+    {
+        const SolveResult& result = step.done.result;
+        if (result.contact_limit > 0)
+            step.warn(
+                "points reached the limit of contacts in a step, two thousand impacts, and rest where they are for "
+                "what was left of it; take more substeps");
+        if (result.residual.loose > 0)
+            step.warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
+        if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
+            step.warn(
+                fmt::format("constraints gave {:.1e} of the energy and {:.1e} of the momentum in motion that nothing "
+                            "accounts for; take more substeps, or more iterations",
+                            result.ledger->residue->energy, result.ledger->residue->momentum));
+        if (result.trapped > 0)
+            step.warn(has_band(step.flow.dynamics)
+                          ? "points are deep in a shape, where its field shows no way out; a level set of a larger "
+                            "half_width shows it farther"
+                          : "points are in a shape, with no way out: between shapes that leave no room, or in its "
+                            "middle; let them be born outside, or move the shapes apart");
+        if (step.done.beyond > 0)
+            step.warn(
+                fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps or "
+                            "the tolerance",
+                            step.done.substeps, *step.tolerance));
+        if (step.beyond > step.done.beyond)
+            step.warn(
+                fmt::format("by a sample, {} points are farther than {:g} m from where other sub-steps take them: the "
+                            "forces change within a sub-step; take more substeps to begin with",
+                            step.beyond, *step.tolerance));
+    }
+
+    // Whether a shape that points meet knows its distance in a band only.
+    static bool has_band(const Dynamics& dynamics)
+    {
+        return std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
+                           [](const auto& collider) { return std::isfinite(collider->shape->band()); });
+    }
+
+    bool all_newborn_ = false;
+};
+
+// What Solve can tell of single points, as attributes of its result, for those who look at them
+// (Evaluator::tell_points):
+//
+//   error     m, the estimated error of the position; nan where the point is not in the sample
+//   substeps  that the frame took of the point
+//   asleep    1 of those that sleep, else 0
+//
+// The state does not keep them. A scene's own attribute of one of these names stays.
+class PointFigures final : public StepObserver {
+public:
+    bool observes(const Step& step) const override
+    {
+        return StepObserver::observes(step) && step.flow.simulation->tells_points;
+    }
+
+    // Nothing has moved yet.
+    void start(Flow& flow) override
+    {
+        if (flow.simulation->tells_points) annotate(flow.points);
+    }
+
+    // With a tolerance points take sub-steps of their own.
+    void begin(Step& step, const PointSet& entered) override
+    {
+        substeps_ = step.options.substeps;
+        if (!step.tolerance) return;
+        ids_ = entered.id();
+        taken_.assign(entered.size(), substeps_);
+        step.options.taken = taken_.data();
+    }
+
+    void end(Step& step, const PointSet&) override
+    {
+        is_exact_ = step.is_exact;
+        known_ = std::move(step.ids);
+        errors_.assign(step.errors.begin(), step.errors.end());
+        asleep_.clear();
+        for (const SleepRecords::Record& record : step.options.sleep_records->records) asleep_.push_back(record.id);
+    }
+
+    void annotate(PointSet& points) override
+    {
+        const IdIndex places(points.id());
+        // A column of this value, and of others at the points with these ids.
+        const auto add = [&]<class T, class V>(const char* name, T all, T fallback, Strided<std::int64_t> ids,
+                                               const std::vector<V>& values) {
+            if (points.has(name)) return;
+            Column<T> column(points.size(), all, fallback);
+            if (!values.empty() && !points.empty()) {
+                const std::span<T> to = column.write();
+                for (std::size_t k = 0; k < values.size(); ++k)
+                    if (const std::uint32_t i = places[ids[k]]; i != IdIndex::none) to[i] = values[k];
+            }
+            points.set(name, std::move(column));
+        };
+        constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+        add("error", is_exact_ ? 0.0f : unknown, unknown, {known_.data(), 1}, errors_);
+        add("substeps", substeps_, std::int32_t{0}, ids_.read(), taken_);
+        add("asleep", std::int32_t{0}, std::int32_t{0}, {asleep_.data(), 1},
+            std::vector<std::int32_t>(asleep_.size(), 1));
+    }
+
+private:
+    bool is_exact_ = true;
+    std::int32_t substeps_ = 0;
+    Column<std::int64_t> ids_;                  // as the points entered Solve
+    std::vector<std::int32_t> taken_;           // in their order; empty where all take substeps_
+    std::vector<std::int64_t> known_, asleep_;  // ids
+    std::vector<float> errors_;                 // m, of those known
+};
+
+}  // namespace
+
+double Step::allowed_error() const { return *tolerance / flow.simulation->subframes; }
+
+Tolerated Step::advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by) const
+{
+    if (!tolerance) return {solve(points, dynamics, with), with.substeps, 0};
+    return solve_within(points, dynamics, with, allowed_error() / (finer_by * finer_by), finer_by * max_substeps);
+}
+
+void Step::note_errors(std::span<const std::int64_t> of, std::vector<double> found)
+{
+    ids.assign(of.begin(), of.end());
+    errors = std::move(found);
+}
+
+void Step::warn(const std::string& text) const
+{
+    now.warnings.push_back(fmt::format("node \"{}\": {}", now.node, text));
+}
+
+StepObservers::StepObservers()
+{
+    const auto add = [&](auto observer) { all_.push_back(std::move(observer)); };
+    add(std::make_unique<StepRecorder>());
+    add(std::make_unique<Examination>());
+    add(std::make_unique<ErrorEstimate>());
+    add(std::make_unique<StepReport>());
+    add(std::make_unique<PointFigures>());
+}
+
+void StepObservers::start(Flow& flow)
+{
+    *this = StepObservers();
+    for (const auto& observer : all_) observer->start(flow);
+}
+
+void StepObservers::begin(Step& step, const PointSet& entered)
+{
+    observing_.clear();
+    for (const auto& observer : all_)
+        if (observer->observes(step)) observing_.push_back(observer.get());
+    for (StepObserver* observer : observing_) observer->begin(step, entered);
+}
+
+}  // namespace rapid

@@ -269,6 +269,7 @@ double largest_distance(const PointSet& a, const PointSet& b)
 Stiffness::Cure cure_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
 {
     options.loads = nullptr;
+    options.log = nullptr;
     options.interacts = false;
     const auto solved = [&](int steps) {
         PointSet set = points;

@@ -148,5 +148,32 @@ TEST_CASE("observers find out about a step and leave its points as they are", "[
     same({{"substeps", Value(3.0)}}, 0.1);
 }
 
+// Kills points that are farther out than the limit.
+class Border : public Action {
+public:
+    std::unique_ptr<ActionPass> begin(PointSet&) const override { return std::make_unique<Pass>(); }
+
+private:
+    struct Pass : ActionPass {
+        void act(const Chunk& chunk, std::span<Vec3d>, std::span<std::uint8_t> dead) override
+        {
+            for (std::size_t i = 0; i < dead.size(); ++i) dead[i] |= chunk.P[i].x() > 0.9;
+        }
+    };
+};
+
+TEST_CASE("a record has the deaths of the step, and none of the runs that measure stiffness", "[solve]")
+{
+    const auto simulation = test::simulation();
+    simulation->record = std::make_shared<StepRecord>();
+    NodeTest pull("attract", {{"strength", Value(2000.0)}}, simulation);
+    NodeTest solve("solve", {}, simulation);
+    Flow flow = pull.evaluate(2, {Flow{at_distances({0.5f, 1, 2}), {}, simulation}});
+    flow.dynamics.add(std::shared_ptr<const Action>(std::make_shared<Border>()));
+    solve.evaluate(2, {std::move(flow)});
+    REQUIRE_FALSE(solve.figures.stiff.empty());
+    CHECK(simulation->record->killed_at.size() == simulation->record->killed.size());
+}
+
 }  // namespace
 }  // namespace rapid

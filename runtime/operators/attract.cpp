@@ -39,8 +39,8 @@ struct Attract {
         return dynamic_of<detail::ForceOf<Attract>>(now, group, *this);
     }
 
-    // All that it draws goes through the surface, where only a core bounds it. Within that it is a spring of
-    // omega² = strength / core^(falloff + 1); a quarter of a radian a step is resolved.
+    // Attracted points pass through the surface, where only core bounds the force. Within core it is a spring of
+    // omega² = strength / core^(falloff + 1); a quarter of a radian per step is resolved.
     std::string advice(double dt) const
     {
         const std::string text =
@@ -73,7 +73,7 @@ struct Attract {
         }
     }
 
-    // A shape's surface has one only if its field is an exact distance, which is not known.
+    // A force towards a shape's surface has a potential only for an exact distance field, which is not known.
     bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
         if (shape) return false;

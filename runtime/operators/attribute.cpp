@@ -1,8 +1,7 @@
 // attribute: creates attributes, and gives points their default value.
 //
-// The value goes to the initial points, to points born later without one of their own, and to points that a merge
-// brings without one. Existing values are never overwritten. With a function of the frame, points get the value of the
-// frame in which they appear.
+// Initial points get the value, as do points born later, or added by a merge, without a value of their own. Existing
+// values are never overwritten. With a function of the frame, points get the value of the frame in which they appear.
 #include "runtime/graph/point_edit.h"
 
 namespace rapid {
@@ -31,7 +30,7 @@ struct Attribute {
             }
     }
 
-    // No point is visited: those that exist have a value, or get it with the column.
+    // Visits no point: existing points have a value, or get it with the column.
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before&) const
     {
         for (const auto* given : {&values, &attributes})

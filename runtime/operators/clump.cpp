@@ -1,10 +1,10 @@
-// clump: points that have touched stick together, until they are torn apart (paper, figure 7: wet sand, snow, dirt).
+// clump: points that have touched stick together until they are torn apart (paper, figure 7: wet sand, snow, dirt).
 //
-//   C = |P_i - P_j| - rest, with the distance that the two had when they first touched, at least the sum of their
-//   radii; breaks where it pulls with more than `strength` (N)
+//   C = |P_i - P_j| - rest, with rest the distance at first contact, at least the sum of the radii;
+//   breaks if the pull exceeds `strength` (N)
 //
-// A bond that breaks is gone; the points stick again when they have been apart and touch once more. A bond only pulls:
-// that points do not sink into each other is the matter of contact.
+// A broken bond is removed. The points stick again after they have separated and touched once more. A bond only pulls;
+// contact keeps points from penetrating each other.
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
@@ -19,7 +19,7 @@
 namespace rapid {
 namespace {
 
-constexpr double bytes_a_bond = 320;  // of a row, its entry in the index of bonds, and of the search for it
+constexpr double bytes_a_bond = 320;  // a row, its entry in the index of bonds, and the search for it
 
 struct Bond {
     static constexpr int points = 2;
@@ -44,13 +44,14 @@ struct Bond {
     }
 };
 
-// The bonds of a node, over a run. New ones are looked for once a frame, where it begins.
+// The bonds of a node, over a run. New ones are searched for once per frame, at its beginning.
 class Bonds : public Rows<Bond> {
 public:
-    double strength = 0;                           // N, in this frame
-    std::set<std::array<std::int64_t, 2>> parted;  // broken, and not yet apart: by id, the smaller first
+    double strength = 0;  // N, in this frame
+    std::set<std::array<std::int64_t, 2>>
+        parted;  // broken bonds of points that are not yet apart: by id, the smaller first
 
-    // What the last search has seen: where all points sleep, there is nothing new.
+    // Input of the last search: if all points sleep, it is unchanged and finds nothing new.
     struct Searched {
         std::vector<std::int64_t> ids;
         std::vector<Vec3d> at;
@@ -93,13 +94,13 @@ public:
     }
 
 private:
-    // Bonds all pairs that touch and are not bonded yet. A broken bond is forgotten once its points are apart.
+    // Bonds all touching pairs that are not bonded yet. A broken bond is forgotten after its points have separated.
     void bond(const PointSet& points) const
     {
         const std::size_t n = points.size();
         const Strided<float> given = radii_of(radius, points);
         const Strided<std::uint8_t> members = members_of(points, group);
-        // Points that rest on each other touch within rounding and the error of solving.
+        // Points that rest on each other touch within rounding and the error of the solver.
         constexpr float touch = 1.02f;
         const Strided<std::int64_t> id = points.id().read();
         Bonds::Searched now{std::vector<std::int64_t>(n), std::vector<Vec3d>(n), std::vector<float>(n)};

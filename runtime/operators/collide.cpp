@@ -16,7 +16,7 @@
 namespace rapid {
 namespace {
 
-// The parameter `record`: false, true (every contact), or the least speed of impact.
+// The parameter `record`: false, true (every contact), or a minimum impact speed.
 struct LeastSpeed {
     static constexpr std::string_view param_type = "false or number";
 
@@ -31,7 +31,7 @@ void read_value(const Param& param, const Value& value, LeastSpeed& least)
         rapid::read_value(param, value, least.speed);
 }
 
-// A shape, which may have a motion or deform; at some frames there may be none.
+// A shape, which may have a motion or deform, and may be absent at some frames.
 struct ColliderShape {
     static constexpr std::string_view param_type = "shape";
 
@@ -131,7 +131,7 @@ struct Collide {
                             response));
     }
 
-    // A level set is widened to the largest radius, and points come to other bits in a wider band.
+    // A level set is widened to the largest radius, and a wider band changes the points' bits.
     std::string couples(const Plan& plan, const PlannedNode& node) const
     {
         const auto is_function = [&](const char* name) {
@@ -163,7 +163,7 @@ struct Collide {
     std::shared_ptr<const Collider> dynamic(const Evaluation& now) const
     {
         if (!shape.rest && !shape.deforming) return nullptr;
-        // A frame at which a sequence has nothing is none to collide with, nor is the way there.
+        // A frame without data in a sequence has no collider, nor does the interval before it.
         if (shape.deforming && !shape.deforming->mesh().has(now.frame.number - 1, now.frame.number)) return nullptr;
         auto collider = dynamic_of<Collider>(now, group);
         collider->shape = shape.rest;

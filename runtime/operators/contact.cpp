@@ -1,7 +1,7 @@
 // contact: points collide as spheres, with friction and restitution (paper §5.1, §5.2).
 //
-// Pairs are found in sparse grids of cells, one for each cluster of radii: `max_difference` and `max_grids` trade the
-// time of many grids for that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
+// Pairs are found in sparse grids of cells, one per cluster of radii: `max_difference` and `max_grids` trade the time
+// of many grids against that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/solver/constraints/contact_forces.h"
@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// Above it points that are born in one another may fly: 10 m/s at 5, 2,700 at 8, for 1 and 10 kg in 0.02 m.
+// Above this, points born in one another may fly apart: 10 m/s at 5, 2,700 at 8, for 1 and 10 kg in 0.02 m.
 constexpr double most_scaling = 4;
 
 class ContactConstraint : public RememberingConstraint<ContactConstraint, Contacts> {

@@ -1,9 +1,9 @@
-// create: starts a simulation, and yields its points at the beginning of each frame.
+// create: starts a simulation, and outputs its points at the beginning of each frame.
 //
-// At the first frame these are the initial points, numbered from 0 in their order (an id counts births in this
-// simulation; ids that they had before are dropped). At every later frame they are the points as Solve left them,
-// passed on without a copy, or the initial points again where no Solve feeds any back. Every planned column and group
-// exists from the first frame on, so that all frames have the same.
+// At the first frame these are the initial points, numbered from 0 in order. (An id counts births in this simulation;
+// earlier ids are dropped.) At later frames they are the points from Solve, passed on without a copy, or the initial
+// points again if no Solve feeds points back. Every planned column and group exists from the first frame on, so all
+// frames have the same columns.
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"

@@ -1,14 +1,14 @@
-// curve_force: points are drawn to a curve, and driven along it.
+// curve_force: draws points to a curve and drives them along it.
 //
 //   a = -k (v - speed t) - w2 (P - c)          k = w drag, w2 = w pull;  w = (1 - (d/radius)²)², 1 without a radius
 //
-//   c    the place of the curve nearest to P, at the distance d
-//   t    the curve's direction there: between those at the ends of a segment, each along its two neighbours
+//   c    the position on the curve nearest to P, at the distance d
+//   t    the curve's direction there, interpolated along a segment between its ends, each along its two neighbours
 //
-//   vc   the velocity of c, where the curve moves:  a = -k (v - vc - speed t) - ...
+//   vc   the velocity of c if the curve moves:  a = -k (v - vc - speed t) - ...
 //
-// The integrator solves both parts together: no pull is too stiff. c is that in the middle of a sub-step, and held for
-// it: of second order along the curve. Beyond the ends of an open curve there is no force.
+// The integrator solves both parts together, so no pull is too stiff. c is taken at the middle of a substep and held
+// constant, which is of second order along the curve. There is no force beyond the ends of an open curve.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -22,13 +22,14 @@
 namespace rapid {
 namespace {
 
-// {{x, y, z}, ...}, points in the order in which the curve goes through them, or curves, which may move.
+// {{x, y, z}, ...}, points in the order of the curve, or curve objects, which may move.
 struct AnyCurves {
     static constexpr std::string_view param_type = StepCurves::param_type;
 
-    std::vector<Vec3d> P;                            // where it is at rest
-    std::shared_ptr<const CurveLines> open, closed;  // of curves that say so themselves, the same
-    std::shared_ptr<const StepCurves> step;          // where it moves
+    std::vector<Vec3d> P;  // positions if at rest
+    std::shared_ptr<const CurveLines> open,
+        closed;                              // identical for curve objects, which define whether they are closed
+    std::shared_ptr<const StepCurves> step;  // if it moves
     bool is_list = false;
 };
 
@@ -99,7 +100,7 @@ struct CurveForce {
     void contribute(const Chunk& chunk, Forces& forces) const
     {
         const CurveLines* lines = (closed ? curve.closed : curve.open).get();
-        if (!lines) return;  // a sequence that has none in this step
+        if (!lines) return;  // a sequence without curves in this step
         const Strided<float> along = chunk.read(speed), towards = chunk.read(pull), rate = chunk.read(drag);
         const Strided<float> reach = radius ? chunk.read(*radius) : Strided<float>{nullptr, 0};
         std::vector<Vec3d> P, v;
@@ -122,17 +123,17 @@ private:
         bool beyond = false;  // an end of an open curve
     };
 
-    // The curve's direction at one of its points: of length 1. on_line: that of the line.
+    // Returns the curve's unit direction at one of its points. on_line: the direction of the line.
     static Vec3d direction_at(std::int32_t i, const Vec3d& on_line, const CurveLines& lines,
                               const std::vector<Vec3d>& P)
     {
         const auto at = [&](std::int32_t k) -> const Vec3d& { return P[static_cast<std::size_t>(k >= 0 ? k : i)]; };
         const auto place = static_cast<std::size_t>(i);
         const Vec3d d = at(lines.after[place]) - at(lines.before[place]);
-        return d.norm() > 0 ? Vec3d(d.normalized()) : on_line;  // it turns back there
+        return d.norm() > 0 ? Vec3d(d.normalized()) : on_line;  // the curve turns back there
     }
 
-    // v: of the curve's points; empty where it is at rest.
+    // v: of the curve's points; empty if it is at rest.
     static Nearest nearest_to(const Vec3d& from, const CurveLines& lines, const std::vector<Vec3d>& P,
                               const std::vector<Vec3d>& v)
     {

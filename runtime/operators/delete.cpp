@@ -1,4 +1,4 @@
-// delete: removes the points of a group for which `where` is true; either may be left out.
+// delete: removes the points of a group for which `where` is true; either may be omitted.
 #include "runtime/graph/selection.h"
 
 namespace rapid {

@@ -1,8 +1,8 @@
-// distance: keeps pairs of points apart and together, as rods or as springs.
+// distance: keeps pairs of points at a distance, as rods or as springs.
 //
 //   C = |P_i - P_j| - rest >= and <= 0        compliance in m/N: 0 for a rod, 1 / stiffness for a spring
 //
-// Chains and trees of pairs are solved directly whatever their length (solver/constraints/tree_solver.h).
+// Chains and trees of pairs are solved directly at any length (solver/constraints/tree_solver.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
@@ -14,7 +14,7 @@
 
 namespace rapid {
 
-// Two points by their numbers, from 1, in the set that first enters the node.
+// Two points by their numbers, from 1, in the first set that enters the node.
 struct PointPair {
     int i = 0, j = 0;
 };
@@ -31,9 +31,9 @@ void read_value(const Param& param, const Value& value, PointPair& pair)
 
 namespace {
 
-constexpr double bytes_a_tie = 256;  // of a row, and of the search for it
+constexpr double bytes_a_tie = 256;  // a row, and the search for it
 
-// m: below it the square of a length is no number any more of which one may divide by the root.
+// Length, m, below which the square of a length underflows, so that it cannot be divided by the root.
 constexpr double no_length = 1e-150;
 
 struct Tie {
@@ -54,12 +54,12 @@ struct Tie {
     {
         const Vec3d d = P[0] - P[1];
         const double length = d.norm();
-        // Any direction parts two points in one place.
+        // Two coincident points are separated in an arbitrary direction.
         gradient[0] = length > no_length ? Vec3d(d / length) : Vec3d(Vec3d::UnitY());
         gradient[1] = -gradient[0];
         return length - rest;
     }
-    // (d + d')/(|d| + |d'|); of a half turn, which leaves no direction, that at its beginning.
+    // Returns (d + d')/(|d| + |d'|); for a half turn, which has no such direction, the gradient at the beginning.
     void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
                            std::array<Vec3d, 2>& gradient) const
     {

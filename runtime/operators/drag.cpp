@@ -2,8 +2,8 @@
 //
 //   a = -linear v - quadratic |v| v
 //
-// Exact at any step, alone and along an acceleration; of second order across one. It never reverses a velocity, and
-// keeps the terminal speed.
+// Exact at any step, without or along an acceleration; of second order across one. It never reverses a velocity, and
+// reproduces the terminal speed.
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -1,15 +1,14 @@
 // emit: emits points from a surface, from a volume or at points, which may be at rest, moving or deforming (paper §3).
 //
-// A newborn point is appended where it is born and as it is then. With the age L at the end of its first frame
+// A newborn point is appended with its state at birth. With the age L at the end of its first frame
 // (emit/birth_times.h), its column `dt` holds γ = min(L, h), the time for which Solve advances it in this frame, and
-// its age is L - γ, so that it grows to L by the frame's end.
+// its age is L - γ, so that it reaches L at the frame's end.
 //
 // A moving source emits each point from where its birthplace is at the time of birth, t = 1 - L / h of the path from
 // the previous frame (shapes/motion/body_path.h); emit/birth_velocity.h has the equation of the velocity.
 //
 // A birth's random numbers depend on the seed, on the name of this node and on the birth's number in this emitter.
-// Births that a subset of the points leaves out (points/subset.h) have their number and their id, and nothing else is
-// computed of them.
+// Births outside a subset of the points (points/subset.h) count and take an id, but nothing else is computed for them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -31,21 +30,22 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t batch_size = 256;     // births at a time, in the first-level cache
+constexpr std::size_t batch_size = 256;     // births processed together, in the first-level cache
 constexpr double most_births = 2147483647;  // in a frame
 
-// The newborn points' part of the columns in which each has a value of its own, shape [n]; the others are empty.
+// The newborn points' part of the columns with individual values, shape [n]; other columns are empty.
 struct NewbornColumns {
     std::span<Vec3f> P, v;
     std::span<std::int64_t> id;
     std::span<float> dt, age, birthtime, life;
     // Copy inherited attributes to the newborn from number `first` on.
     std::vector<std::function<void(std::size_t first, std::span<const Birthplace> places)>> inherit;
-    // Draw those that differ from birth to birth.
+    // Draw the values that differ between births.
     std::vector<DrawValues> draw;
 };
 
-// The values of all points, one each; expanded in parallel, because they are many more than the newborn.
+// Returns the values of all points, one per point; expanded in parallel, because all points are many more than the
+// newborn ones.
 std::span<float> expanded(Column<float>& column)
 {
     if (!column.is_uniform()) return column.write();
@@ -224,8 +224,8 @@ private:
         return clock_.at_rate(*rate, step, steps);
     }
 
-    // Of `count` or `impulse`. Ages at the frame's end do not depend on sub-frames: births at one instant all belong to
-    // the sub-frame that holds it.
+    // Returns the births of `count` or `impulse`. Ages at the frame's end do not depend on subframes: simultaneous
+    // births all belong to the subframe that contains their time.
     Births births_of_frame(std::int64_t step, const FrameClock& clock)
     {
         const std::int64_t parts = clock.subframes, before = step - 1 - clock.start, part = before % parts;
@@ -237,7 +237,7 @@ private:
         return clock_.at_once(here ? n : 0, clock.fps);
     }
 
-    // The source's attributes that `attributes` does not replace.
+    // Returns the source's attributes that `attributes` does not replace.
     std::vector<std::string> inherited() const
     {
         std::vector<std::string> names = source_.inherited();
@@ -257,7 +257,7 @@ private:
     void move_source(const Simulation& simulation, const Evaluation& now);
     void emit(Flow& flow, Births births, const Evaluation& now);
 
-    // Error: no memory for so many newborn, with a copy of those that are there.
+    // Throws Error if the newborn points, plus a copy of the existing ones, do not fit in memory.
     void require_room(const PointSet& points, std::size_t n) const
     {
         const double bytes = static_cast<double>(n) * bytes_a_birth + static_cast<double>(points.bytes());
@@ -280,7 +280,7 @@ private:
     bool at_beginning_ = false;  // of an interval: see BirthSource::Move
     bool warned_unmatched_ = false;
     bool has_emitted_ = false;    // read in trials
-    mutable BirthSource source_;  // made from `source` and `from` when they change
+    mutable BirthSource source_;  // rebuilt from `source` and `from` when they change
 };
 RAPID_NODE(Emit);
 RAPID_COUPLING("emit", Emit);
@@ -339,7 +339,7 @@ void Emit::emit(Flow& flow, Births births, const Evaluation& now)
     if (birth.edit) birth.edit->edit(points, points.size() - n, now);
 }
 
-// Whether anything is born or not: all frames have the same columns.
+// Creates the columns even if nothing is born, so that all frames have the same columns.
 void Emit::make_columns(PointSet& points, const BirthAges& ages, const Evaluation& now) const
 {
     for (const AttributeSpec& spec : made())
@@ -353,7 +353,7 @@ void Emit::make_columns(PointSet& points, const BirthAges& ages, const Evaluatio
     if (!now.at_start && !whole_frames) points.add({"dt", static_cast<float>(now.frame.dt)});
 }
 
-// A value that all newborn share is given to its column as one, so that a uniform column stays uniform.
+// Appends n points. A value shared by all newborn points is set uniformly, so that a uniform column stays uniform.
 void Emit::append(PointSet& points, std::size_t n, const BirthAges& ages, const BirthVelocity& velocities,
                   const Evaluation& now) const
 {
@@ -410,7 +410,7 @@ NewbornColumns Emit::newborn_columns(PointSet& points, std::size_t n, const Birt
     return newborn;
 }
 
-// The births of a batch, the first-th of those chosen and the following, column by column.
+// Fills a batch of births, from index `first` of the chosen ones on, column by column.
 void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> places,
                 const BirthAges& ages, const BirthVelocity& velocities, const Evaluation& now) const
 {

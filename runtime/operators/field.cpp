@@ -3,8 +3,8 @@
 //   mode "force"       F = strength value                N; accelerates a point by its mass
 //   mode "velocity"    a = -drag (v - strength value)    exact at any step: no drag is too stiff
 //
-// The value is sampled at the middle of the sub-step, in place and time: of second order in the variation of the field
-// along the path.
+// The value is sampled at the middle of the substep in space and time, which is of second order in the variation of
+// the field along the path.
 #include "runtime/graph/node.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 
@@ -53,7 +53,7 @@ struct Field {
     }
 
 private:
-    static constexpr float usual_drag = 1;  // 1/s, where none is given
+    static constexpr float usual_drag = 1;  // 1/s, if not given
 };
 RAPID_NODE(Field);
 

@@ -1,12 +1,12 @@
-// goal: each point travels to a place, and is there, at rest, when its time is over; then it goes where the place goes.
+// goal: each point travels to a target position, arrives at rest when its time is over, and then follows the target.
 //
 //   P(u) = P + d (3u² - 2u³) + v T (u - 2u² + u³)            d = to - P;  T: the time that is left;  u = t / T
 //
-// The cubic from where the point is, at its velocity, to rest at its place, is made anew at each frame: with no other
-// force it is the same each time, and what another force did in a frame before the last is made good; a place that
-// moves is headed for as it is at the end of the frame. A kick and a constant acceleration take Solve to the cubic's
-// place and velocity at the frame's end. A point that is held at its place goes evenly with it through the frame, and
-// has its velocity. A force that acts in the last frame, or while the point is held, moves it by a dt²/2.
+// The cubic from the point's current position and velocity to rest at the target is recomputed at each frame. Without
+// other forces it stays the same, and the effect of another force before the last frame is corrected. A moving target
+// is aimed at in its position at the end of the frame. A kick and a constant acceleration take Solve to the cubic's
+// position and velocity at the frame's end. A held point moves uniformly with its target through the frame, and has
+// its velocity. A force that acts in the last frame, or on a held point, moves it by a dt²/2.
 #include <algorithm>
 #include <optional>
 
@@ -97,8 +97,8 @@ struct Goal {
                 const std::optional<double> left = time_left(since, dt);
                 if (!left) continue;
                 const Vec3d at = P[i].cast<double>(), d = goal[i].cast<double>() - at;
-                // Of a point that was at its place, and not elsewhere, the place is as fast as the way through the
-                // frame.
+                // For a point that was at its target and nowhere else, the target has the velocity of the path through
+                // the frame.
                 const bool is_held = *left <= 1e-6 * time && places_before &&
                                      (at - (*places_before)[i].cast<double>()).norm() <= 1e-3 * d.norm();
                 go(d, *left, dt, double{mass[i]}, is_held ? Vec3d(d / dt) : Vec3d::Zero(), v[i], force[i]);
@@ -108,18 +108,18 @@ struct Goal {
     }
 
 private:
-    // s, from the beginning of the frame; a way that begins within it is begun with it, and ends in time. Nothing: the
-    // point is not on its way.
+    // Returns the remaining time, s, from the beginning of the frame. A path that begins within the frame starts with
+    // it, and ends on time. Returns nothing if the point is not on its path.
     std::optional<double> time_left(double since, double dt) const
     {
-        // dt is a float: a way that begins with the next frame is not begun.
+        // dt is a float: do not start a path that begins with the next frame.
         if (!(dt > 0) || since + dt <= 1e-4 * dt) return std::nullopt;
         const double left = time - std::max(since, 0.0);
         if (left <= 1e-6 * time && !hold) return std::nullopt;
         return left;
     }
 
-    // d: from the point to its place; there: its velocity where its time is over.
+    // d: from the point to its target; there: its velocity when its time is over.
     static void go(const Vec3d& d, double left, double dt, double mass, const Vec3d& there, Vec3f& v, Vec3f& force)
     {
         const double u = left > dt ? dt / left : 1;
@@ -133,7 +133,7 @@ private:
         force += ((after - v.cast<double>()) * (mass / dt)).cast<float>();
     }
 
-    // Returns the places of the frame before.
+    // Finds the target positions, and returns those of the previous frame.
     Column<Vec3f> find_places(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of,
                               const Evaluation& now)
     {
@@ -150,7 +150,7 @@ private:
         return before;
     }
 
-    // Of the target of the last frame; a cache.
+    // A cache for the target of the last frame.
     ObjectPtr known_;
     std::optional<GoalPlaces> places_;
 };

@@ -1,4 +1,4 @@
-// gravity: one acceleration for all points, whatever their mass.
+// gravity: one acceleration for all points, independent of mass.
 //
 //   a = g        exact at any step: the integrator follows the parabola
 #include "runtime/graph/node.h"

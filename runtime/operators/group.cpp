@@ -24,8 +24,8 @@ public:
     }
     std::size_t chunk() const override { return selection_.chunk(); }
     bool is_script() const override { return selection_.is_script(); }
-    // The group that limits the selection, or that `where` reads, may be the one that is written: all points of the
-    // chunk are selected before any is written.
+    // The group that limits the selection, or that `where` reads, may be the written one: all points of the chunk are
+    // selected before any is written.
     void visit(const Stretch& stretch) override
     {
         const std::vector<std::uint8_t> selected = selection_.of(stretch);

@@ -1,15 +1,15 @@
-// merge: the points of several chains as one set, in the order of the inputs.
+// merge: joins the points of several chains into one set, in the order of the inputs.
 //
 // The result belongs to the simulation of the first input. A point that several inputs have (of the same simulation,
 // with the same id) is taken from the first of these. A point of another simulation gets an id of this one when it
-// first appears, and keeps it from frame to frame.
+// first appears, and keeps it in later frames.
 //
-// Between Create and Solve, points of another simulation are adopted as their own chain yields them: its initial points
-// at the first frame, newborn points at the frame of their birth; from then on this simulation's Solve moves them.
-// After a Solve both simulations continue independently, and only the output is merged.
+// Between Create and Solve, points of another simulation are adopted as their own chain outputs them: its initial
+// points at the first frame, newborn points at the frame of their birth. From then on this simulation's Solve moves
+// them. After a Solve both simulations continue independently, and only the output is merged.
 //
-// The result has the columns and groups of all inputs. A point whose own chain lacks a column gets the column's value
-// for points without one.
+// The result has the columns and groups of all inputs. A point from a chain without a column gets the column's
+// fallback value.
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/point_edit.h"
@@ -59,7 +59,7 @@ void append_points(PointSet& into, PointSet from, const Evaluation& now)
     for (const auto& [name, members] : from.groups()) copy_values(into.group(name), members);
 }
 
-// The nodes before one, itself included, by their place in the plan.
+// Returns the nodes upstream of a node, including itself, by index in the plan.
 std::set<std::size_t> upstream_of(const Plan& plan, std::size_t node)
 {
     std::set<std::size_t> found;
@@ -79,12 +79,12 @@ bool removes_points(const PlannedNode& node)
     return node.node->type->kind == NodeKind::Solve || (edit && edit->removes_points());
 }
 
-// Whether points of one simulation are in the order of their ids behind a merge. The points of the first input come
-// first, then those of the second that it does not have, and so on: newborn points, in the order in which their
-// emitters are evaluated, and those that an input before has removed.
+// Returns true if points of one simulation are in the order of their ids after a merge. The points of the first input
+// come first, then points that only the second has, and so on: newborn points, in the evaluation order of their
+// emitters, and points that an earlier input has removed.
 bool keeps_order(const Plan& plan, const PlannedNode& merge)
 {
-    std::set<std::size_t> before;  // the inputs so far
+    std::set<std::size_t> before;  // upstream of the inputs so far
     std::size_t last_emitter = 0;
     for (const std::size_t input : merge.inputs) {
         const std::set<std::size_t> here = upstream_of(plan, input);
@@ -100,13 +100,13 @@ bool keeps_order(const Plan& plan, const PlannedNode& merge)
     return true;
 }
 
-// Ids in a snapshot: they are gone through one by one, some seconds at most.
+// Limit of ids in a snapshot: they are processed one by one, in a few seconds at most.
 constexpr std::int64_t most_adopted = std::int64_t{1} << 31;
 
 // The ids of the points in the result.
 class IdSet {
 public:
-    // False if it was in the set already.
+    // Returns false if it was in the set already.
     bool insert(std::int64_t id)
     {
         const auto i = static_cast<std::size_t>(id);
@@ -186,7 +186,7 @@ private:
     struct Run {
         std::uint64_t input;
         std::int64_t first, size;  // ids in the simulation of the input
-        std::int64_t adopted;      // of the first, here
+        std::int64_t adopted;      // id of the first here
 
         template <class Archive>
         void serialize(Archive& keep)

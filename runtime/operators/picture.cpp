@@ -1,4 +1,4 @@
-// picture: how points look in pictures, from where, and which shapes are shown.
+// picture: the look of points in pictures, the camera, and which shapes are shown.
 #include "runtime/operators/picture.h"
 
 #include <fmt/format.h>
@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// Both are between the same two keys: what one of them leaves open is so on the whole way.
+// Both are between the same two keys: a value that one of them leaves unset stays unset between them.
 template <class T>
 std::optional<T> on_the_way(const std::optional<T>& a, const std::optional<T>& b, double part)
 {

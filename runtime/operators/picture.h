@@ -1,4 +1,4 @@
-// What a scene says of its pictures: `rapid.camera` and `:picture`. The command that draws them reads it.
+// The picture settings of a scene: `rapid.camera` and `:picture`. The command that draws pictures reads them.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// `rapid.camera`. What it leaves open is fitted to the scene, or to a group of points.
+// The object of `rapid.camera`. Unset values are fitted to the scene, or to a group of points.
 class CameraObject : public Object {
 public:
     static constexpr std::string_view param_type = "camera";
@@ -24,13 +24,13 @@ public:
 
 using CameraPtr = std::shared_ptr<const CameraObject>;
 
-// A camera, or keys {[1] = a, [48] = b}: between two it goes smoothly from the one to the other.
+// A camera, or keys {[1] = a, [48] = b}, with a smooth transition between two keys.
 struct CameraTrack {
     static constexpr std::string_view param_type = "camera";
 
-    std::map<std::int64_t, CameraPtr> keys;  // by frame; of a single camera its frame is of no effect
+    std::map<std::int64_t, CameraPtr> keys;  // by frame; the frame of a single camera has no effect
 
-    // Null where there is none.
+    // Returns null if there is no camera.
     CameraPtr at(double frame) const;
 };
 
@@ -45,7 +45,7 @@ struct PictureNode {
     static NodeType declare();
     void uses(Uses& uses) const;
 
-    // The points stay as they are.
+    // Leaves the points unchanged.
     void edit(PointSet&, const Evaluation&) const {}
 };
 

@@ -1,8 +1,8 @@
-// pin: holds points at a position, at one that each has as an attribute, or on a body that moves or deforms: there each
-// keeps to the nearest face, at its barycentric place and its height above it.
+// pin: holds points at a position, at one that each has as an attribute, or on a moving or deforming body. On a body,
+// each point stays at its barycentric position and height over the nearest face.
 //
-// Rigid, a pinned point is kinematic: its position and velocity are prescribed, and no other constraint moves it. With
-// a compliance it is held by three springs, one along each axis.
+// A rigidly pinned point is kinematic: its position and velocity are prescribed, and no other constraint moves it.
+// With a compliance it is held by three springs, one along each axis.
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/id_index.h"
@@ -45,11 +45,11 @@ void read_value(const Param& param, const Value& value, PinTarget& target)
         read_value(param, value, target.place.emplace());
 }
 
-// Where points are held; by id, over a run.
+// Position at which a point is held; by id, over a run.
 struct Pin {
     Vec3d from = Vec3d::Zero(), to = Vec3d::Zero();  // at the frame's beginning and end, m
-    MaterialPoint on;                                // of a body that moves
-    Vec3d now = Vec3d::Zero(), v = Vec3d::Zero();    // in this sub-step: m, m/s
+    MaterialPoint on;                                // on a moving body
+    Vec3d now = Vec3d::Zero(), v = Vec3d::Zero();    // in this substep: m, m/s
     bool taken = false;
 
     template <class Archive>
@@ -61,8 +61,8 @@ struct Pin {
 
 struct Along {
     static constexpr int points = 1;
-    static constexpr bool rests = true;  // PinCoupling sees to targets that move
-    const Pin* pin;                      // Pins sees to it
+    static constexpr bool rests = true;  // PinCoupling handles moving targets
+    const Pin* pin;                      // set by Pins
     int axis;
 
     template <class Archive>
@@ -82,7 +82,7 @@ struct Along {
 
 struct Pins {
     Pins() = default;
-    // The springs of a copy draw to its own pins.
+    // The springs of a copy refer to its own pins.
     Pins(const Pins& other) : by_id(other.by_id), held(other.held), springs(other.springs) { attach_springs(); }
     Pins& operator=(const Pins&) = delete;
 
@@ -103,11 +103,11 @@ struct Pins {
 
     std::map<std::int64_t, Pin> by_id;  // addresses of pins are stable
     std::vector<std::int64_t> held;     // in the last frame
-    Rows<Along> springs;                // where pins have a compliance
+    Rows<Along> springs;                // if pins have a compliance
 };
 
 // A body that carries points through a step: by a motion, or by the faces of a mesh. Times are in seconds since the
-// step began.
+// beginning of the step.
 struct PinBody {
     std::shared_ptr<const MotionTrack> track;
     MovingBodyPtr surface;
@@ -135,10 +135,10 @@ struct PinBody {
     }
 };
 
-// A place that is a function of time, through a step: c0 + x (c1 + x (c2 + x c3)), x its part from 0 to 1.
+// A position as a function of time, through a step: c0 + x (c1 + x (c2 + x c3)), with x from 0 to 1.
 class PlaceCurve {
 public:
-    // Through places at the parts 0, 1/3, 2/3 and 1.
+    // Interpolates positions at x = 0, 1/3, 2/3 and 1.
     explicit PlaceCurve(const std::array<Vec3d, 4>& at)
         : c0_(at[0]),
           c1_(-5.5 * at[0] + 9 * at[1] - 4.5 * at[2] + at[3]),
@@ -156,7 +156,7 @@ private:
 
 class PinCoupling : public Coupling, public Holding {
 public:
-    // compliance: m/N, 0 where pins are rigid; h: s, the frame's length.
+    // compliance: m/N, 0 if pins are rigid; h: s, the frame's length.
     PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PlaceCurve> curve, double compliance, double h)
         : pins_(std::move(pins)),
           body_(std::move(body)),
@@ -168,7 +168,7 @@ public:
     }
 
     void hold_at(std::size_t i, Pin& pin) { held_.push_back({i, &pin}); }
-    void keep_awake(std::uint32_t i) { awake_.push_back(i); }  // its target moves, or it is newly held or let go
+    void keep_awake(std::uint32_t i) { awake_.push_back(i); }  // its target moves, or it is newly held or released
 
     void join(Sleep* sleep) override
     {
@@ -201,7 +201,7 @@ public:
     }
     void move_kinematic(Substep& step) override
     {
-        pins_->springs.move_kinematic(step);  // with the targets of before
+        pins_->springs.move_kinematic(step);  // with the previous targets
         const double since = (step.index + 1) * step.dt;
         aim(since, step.dt);
         if (!rigid_) return;
@@ -219,12 +219,12 @@ public:
     void warm_start(Substep& step) override
     {
         with_own_masses(step, [&] { pins_->springs.warm_start(step); });
-        hold_moving(step);  // sleepers that a shock has woken, too
+        hold_moving(step);  // includes sleepers that a shock has woken
         for (Load& load : loads_) load.v = step.v[load.i];
     }
-    void project(Substep&) override {}  // by the masses of the points
-    // Impulses of contacts give velocities the half of them that moves no position by itself, too: by the points' own
-    // mass where springs are resolved, as what these do against it is in their forces.
+    void project(Substep&) override {}  // handled through the masses of the points
+    // Impulses of contacts also add the half of the velocity that moves no position by itself. For resolved springs
+    // this uses the points' own mass, because the springs' reaction is already in their forces.
     void settle(Substep& step) override
     {
         for (const Load& load : loads_)
@@ -242,12 +242,12 @@ public:
     Residual close(Substep& step) override { return pins_->springs.close(step); }
 
 private:
-    // A point on springs, with its inverse masses: its own, and while it is held.
+    // A point on springs, with its own inverse mass and the one while it is held.
     struct Load {
         std::uint32_t i;
         double own, held;
-        bool is_resolved;  // by the sub-step
-        Vec3d v;           // m/s, where the projection begins
+        bool is_resolved;  // by the substep
+        Vec3d v;           // m/s, at the start of the projection
     };
 
     void hold_moving(Substep& step)
@@ -306,13 +306,13 @@ private:
     std::vector<Load> loads_;
     std::vector<std::pair<std::size_t, Pin*>> held_;
     std::vector<std::uint32_t> awake_;
-    std::vector<std::pair<std::uint32_t, Drive>> drives_;  // in the sub-step
+    std::vector<std::pair<std::uint32_t, Drive>> drives_;  // in the substep
 };
 
 class PinConstraint : public RememberingConstraint<PinConstraint, Pins>, public Placed {
 public:
     std::optional<PerPoint<Vec3f>> place;  // at the end of the step
-    std::optional<PlaceCurve> curve;       // where that is a function of time
+    std::optional<PlaceCurve> curve;       // if it is a function of time
     PinBody body;
     double compliance = 0;
 
@@ -353,7 +353,7 @@ public:
             } else if (place) {
                 pin.from = pin.to;
             }
-            if (body.surface && !body.surface->has(pin.on)) StateReader::fail();  // it was of another mesh
+            if (body.surface && !body.surface->has(pin.on)) StateReader::fail();  // the pin was on another mesh
             if (place) pin.to = to;
             coupling->hold_at(i, pin);
             if (moves || curve || pin.from != pin.to) coupling->keep_awake(static_cast<std::uint32_t>(i));
@@ -367,7 +367,7 @@ public:
     }
 
 private:
-    // Points that are held in only one of two frames; their ids ascend.
+    // Keeps points awake that are held in only one of two frames; their ids ascend.
     void keep_changed_awake(PinCoupling& coupling, const IdIndex& index, const std::vector<std::int64_t>& held) const
     {
         std::vector<std::int64_t> changed;

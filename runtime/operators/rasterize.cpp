@@ -1,6 +1,7 @@
 // rasterize: writes the points as volumes for each frame, and passes them on unchanged (grid_of_points.h).
 //
-// Frames without points have no file: a volume of nothing can bear no points, and a sequence goes on between its files.
+// Frames without points have no file, because an empty volume cannot be a source, and a sequence continues between its
+// files.
 #include "runtime/operators/rasterize.h"
 
 #include <fmt/format.h>

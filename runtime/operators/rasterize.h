@@ -1,5 +1,5 @@
-// What `:rasterize` writes: the density of points, and means of their vectors, as volumes. The command that writes
-// files reads it.
+// The settings of `:rasterize`, which writes the density of points, and means of their vectors, as volumes. The
+// command that writes files reads them.
 #pragma once
 
 #include <filesystem>
@@ -26,12 +26,12 @@ struct Rasterize {
     void check() const;
     std::string couples(const Plan& plan, const PlannedNode& node) const;
 
-    // The points stay as they are.
+    // Leaves the points unchanged.
     void edit(PointSet& points, const Evaluation& now) const;
     Flow start(std::span<Flow> inputs, const Evaluation& now) const;
 
-    // The file of points that edit() has given to Evaluation::write: the grid density, and one for each attribute.
-    // Error: as density_of_points (grid_of_points.h); a full disk.
+    // Writes the volumes of the points that edit() passed to Evaluation::write: the grid density, and one per
+    // attribute. Throws Error as density_of_points does (grid_of_points.h), or if the disk is full.
     void write_volumes(const std::filesystem::path& path, const PointSet& points) const;
 };
 

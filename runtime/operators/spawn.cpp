@@ -1,12 +1,12 @@
-// spawn: bears points from the points of another node, its parents, at moments and places of their paths.
+// spawn: emits children from the points of another node, their parents, at times and positions on the parents' paths.
 //
-// Each parent bears along its path through the frame (spawn/parent_paths.h), by rate and count of each, or at an event
-// (spawn/parent_clock.h). Parents of another simulation, which comes before, have their path in this frame; those of
-// the same simulation move later in the frame, and bear along their path of the frame before.
+// Each parent emits along its path through the frame (spawn/parent_paths.h), by its rate and count, or at an event
+// (spawn/parent_clock.h). Parents of another simulation, which is evaluated first, have their path in this frame.
+// Parents of the same simulation move later in the frame, and emit along their path of the previous frame.
 //
 // A birth's random numbers depend on the seed, on the name of this node and on the birth's number among those of its
-// parent. Nodes without a name of their own are numbered together with those of emit, of which spawn was a part: so
-// scenes that were written for it keep their random numbers.
+// parent. Unnamed nodes are numbered together with those of emit, because spawn was once part of emit: scenes written
+// for it keep their random numbers.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 namespace rapid {
 namespace {
 
-// Error: no memory for all newborn, with a copy of the points that are there.
+// Throws Error if the newborn points, plus a copy of the existing ones, do not fit in memory.
 void require_room(const PointSet& points, const std::vector<Brood>& broods)
 {
     if (broods.empty()) return;
@@ -40,7 +40,7 @@ bool emits(const BirthPlan& plan)
     return plan.count ? is_positive(*plan.count) : plan.on.has_value();
 }
 
-// In a trial, in which no point moves and nothing happens to it: one birth of a living parent.
+// Returns one birth of a living parent, for a trial, in which no point moves and no event occurs.
 std::vector<Brood> sample_of(const ParentPaths& parents)
 {
     for (std::uint32_t i = 0; i < parents.size(); ++i) {
@@ -55,7 +55,7 @@ std::vector<Brood> sample_of(const ParentPaths& parents)
     return {};
 }
 
-// Points of this chain are removed at once, those of another by the evaluator, from all that nobody has taken yet.
+// Removes points of this chain immediately. The evaluator removes those of another chain, from all sets not yet taken.
 void remove_parents(Flow& flow, const Flow& from, const ParentPaths& parents, const std::vector<Brood>& broods,
                     const Evaluation& now)
 {
@@ -182,7 +182,7 @@ struct Spawn : Newborn {
     }
 
 private:
-    // The attributes that newborn points get from their parents.
+    // Returns the attributes that newborn points get from their parents.
     std::vector<std::string> of_parents() const
     {
         std::vector<std::string> names = inherit;
@@ -203,7 +203,8 @@ private:
 RAPID_NODE(Spawn);
 RAPID_COUPLING("spawn", Spawn);
 
-// The type of an inherited attribute is that which the source's makers, or Rapid, give it. Error: nobody makes it.
+// Inherited attributes have the type that the nodes of the source, or Rapid, define. Throws Error if none of them
+// does.
 std::vector<AttributeSpec> Spawn::made(const Uses& uses) const
 {
     std::vector<AttributeSpec> specs = given();
@@ -225,7 +226,7 @@ std::vector<AttributeSpec> Spawn::made(const Uses& uses) const
     return specs;
 }
 
-// What is born a frame is spread over its sub-frames.
+// The births of a frame are spread over its subframes.
 BirthPlan Spawn::plan_of_step(const Flow& flow, const Flow& from, const Evaluation& now) const
 {
     BirthPlan plan{rate, count, on, min_speed.value_or(0), limit, birth.when};
@@ -242,12 +243,12 @@ void Spawn::bear(Flow& flow, const Flow& from, const Evaluation& now)
     const StepRecord& record = *from.simulation->record;
     if (on && on->kind == BirthEvent::Hit && !record.has_contacts)
         throw Error("on = \"hit\": the parents' solve has a tolerance, and then keeps no contacts; give it substeps");
-    // Points of the same chain move after this node: their last path is that of the frame before.
+    // Points of the same chain move after this node: their last path is that of the previous frame.
     const bool waits = from.simulation == flow.simulation && !now.at_start;
     const ParentPaths parents(from.points, record, source_group);
     const BirthPlan plan = plan_of_step(flow, from, now);
     std::vector<Brood> broods;
-    // A chain that begins when its parents have lived already bears from its next frame on.
+    // A chain whose parents have already lived when it begins emits from its next frame on.
     if (!now.at_start || record.h == 0) broods = clock_.births(parents, plan, now);
     const bool is_trial = flow.simulation->trial;
     const bool is_sample = is_trial && !now.at_start && broods.empty() && emits(plan);

@@ -1,10 +1,9 @@
-// spring: a damped spring to a position, to a position of each point's own, or to the surface of a shape.
+// spring: a damped spring to a position, to an individual position per point, or to the surface of a shape.
 //
 //   F = -stiffness (P - target) - damping v        accelerates a point by its mass; both parts are exact at any step
 //
-// The target on a shape is the nearest position, wherever the point and the shape go: exact on planes at rest, of
-// second order on curved surfaces, and at any step without a gain of energy but by a shape that moves
-// (solver/surface_springs.h).
+// The target on a shape is the nearest position, even while the point and the shape move: exact on planes at rest, of
+// second order on curved surfaces. At any step, only a moving shape can add energy (solver/surface_springs.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/step_shape.h"
 #include "runtime/shapes/motion/mesh_surface.h"

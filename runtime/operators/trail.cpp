@@ -1,7 +1,7 @@
-// trail: keeps the last places of each point.
+// trail: stores the last positions of each point.
 //
-// Between Create and Solve the trail is part of the points, and the next frame gets both back. Elsewhere nothing comes
-// back, so the node remembers the points of the frame before, by id.
+// Between Create and Solve the trail is part of the points, and both are fed back to the next frame. Elsewhere nothing
+// is fed back, so the node remembers the points of the previous frame, by id.
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -16,7 +16,7 @@
 namespace rapid {
 namespace {
 
-// The values of the points at these indices; `none` for those that were not there.
+// Returns the values of the points at these indices; `none` for missing points.
 template <class T>
 Column<T> values_at(std::span<const std::uint32_t> indices, const Column<T>& from, const T& none)
 {
@@ -53,14 +53,14 @@ struct Trail {
     {
         for (const AttributeSpec& column : trail_columns(places)) {
             uses.makes.push_back(column);
-            uses.reads.push_back(column.name);  // each place becomes the next one
+            uses.reads.push_back(column.name);  // each position becomes the next one
             uses.writes.push_back(column.name);
         }
     }
 
     void edit(PointSet& points, const Evaluation& now)
     {
-        // The points have not moved yet: they are where they were at the end of the frame before, or were born.
+        // The points have not moved yet: they have their positions from the end of the previous frame, or from birth.
         if (now.is_fed_back) return lengthen(points);
 
         if (now.at_start) before_ = PointSet();
@@ -97,8 +97,8 @@ private:
         });
     }
 
-    // These points as they were in the frame before: their positions and trails. The count of a point that was not
-    // there is -1, because lengthen() makes it 0.
+    // Returns the positions and trails of these points in the previous frame. The count of a new point is -1, because
+    // lengthen() makes it 0.
     PointSet trails_before(const PointSet& points)
     {
         PointSet before = std::exchange(before_, PointSet());
@@ -122,7 +122,7 @@ private:
         return trails;
     }
 
-    PointSet before_;  // ids, positions and trails of the frame before, where nothing is fed back
+    PointSet before_;  // ids, positions and trails of the previous frame, if nothing is fed back
 };
 RAPID_NODE(Trail);
 RAPID_COUPLING("trail", Trail);

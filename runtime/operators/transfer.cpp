@@ -1,7 +1,7 @@
-// transfer: gives points the attributes of the nearest place of a mesh: of its vertices and corners, linear on each
+// transfer: gives points the attributes at the nearest position of a mesh: of its vertices and corners, linear on each
 // face, and of its faces.
 //
-// A mesh that moves or deforms is as it is at the end of the frame.
+// A moving or deforming mesh is used in its state at the end of the frame.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -61,7 +61,7 @@ struct Transfer {
         }
     }
 
-    // Error: an attribute that the mesh does not have, or has none.
+    // Throws Error if the mesh lacks a requested attribute, or has no attributes.
     void check() const
     {
         if (known_ != source.rest()) {
@@ -93,7 +93,7 @@ struct Transfer {
         if (!source.moving) {
             give(flow.points, known_, *surface_, values_, Pose(), now);
         } else if (!source.moving->deforms()) {
-            // Points are taken into the frame of the mesh at rest.
+            // Points are transformed to the frame of the mesh at rest.
             give(flow.points, known_, *surface_, values_, source.moving->motion()->at(now.frame), now);
         } else {
             const MeshPtr mesh = source.moving->at(clock, static_cast<std::int64_t>(std::ceil(now.frame.number)));
@@ -108,7 +108,7 @@ private:
     void give(PointSet& points, const MeshPtr& mesh, const MovingBody& surface, const BirthSource& values,
               const Pose& pose, const Evaluation& now) const
     {
-        // The place of each point; of an element below 0 where the point keeps what it has.
+        // The nearest position of each point; its element is below 0 if the point keeps its values.
         std::vector<Birthplace> places(points.size());
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = std::as_const(points).P().read();
@@ -160,7 +160,7 @@ private:
         return place;
     }
 
-    // Of the mesh at rest; a cache.
+    // A cache for the mesh at rest.
     mutable MeshPtr known_;
     mutable BirthSource values_;
     mutable std::shared_ptr<const MovingBody> surface_;

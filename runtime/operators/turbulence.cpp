@@ -20,7 +20,7 @@ public:
         const double* P = coordinates(chunk.P);
         double* x = scaled.data()->data();
         for (std::size_t l = 0; l < 3 * chunk.size(); ++l) x[l] = P[l] / size;
-        // All at once for points of the same time; newborn points have times of their own.
+        // Evaluates points with the same time together; newborn points have individual times.
         for (std::size_t begin = 0; begin < chunk.size();) {
             std::size_t end = begin + 1;
             while (end < chunk.size() && chunk.time[end] == chunk.time[begin]) ++end;

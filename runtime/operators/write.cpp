@@ -1,6 +1,6 @@
 // write: writes the points to a file for each frame, and passes them on unchanged.
 //
-// It also writes the first frame, wherever it is in the chain, so that a sequence of files begins with the frames.
+// It also writes the first frame, anywhere in the chain, so that a sequence of files starts with the frames.
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/operators/written_points.h"

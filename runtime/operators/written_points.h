@@ -1,4 +1,4 @@
-// What a node that writes files gives to Evaluation::write.
+// Selects the points that a node passes to Evaluation::write.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// The members of a group, or all points where it is empty.
+// Returns the members of a group, or all points if it is empty.
 inline PointSet members_alone(const PointSet& points, const std::string& group)
 {
     PointSet set = points;
@@ -21,7 +21,7 @@ inline PointSet members_alone(const PointSet& points, const std::string& group)
     return set;
 }
 
-// Leaves P, v, id and these.
+// Removes all columns except P, v, id and the named ones.
 inline void keep_columns(PointSet& set, const std::vector<std::string>& names)
 {
     for (const std::string& name : set.column_names())

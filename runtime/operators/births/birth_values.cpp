@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// The low half of the use, which no other draw of an emitter has (draws.h); the high half is of the name.
+// The low half of the use, which no other draw of an emitter has (draws.h); the high half depends on the name.
 constexpr std::uint64_t attribute_use = 24;
 
 bool is_list(const Value& value, std::size_t size)
@@ -17,7 +17,7 @@ bool is_list(const Value& value, std::size_t size)
     return table && table->list.size() == size && table->numbered.empty() && table->named.empty();
 }
 
-// {{0, value}, {1, value}}: each entry is a list of a number and a value.
+// Recognizes {{0, value}, {1, value}}: each entry is a list of a number and a value.
 bool is_ramp(const Table& table)
 {
     if (table.list.size() < 2) return false;
@@ -26,7 +26,7 @@ bool is_ramp(const Table& table)
     return true;
 }
 
-// {min, max}: two numbers, or two vectors.
+// Recognizes {min, max}: two numbers, or two vectors.
 bool is_range(const Table& table)
 {
     if (table.list.size() != 2) return false;
@@ -86,7 +86,7 @@ BirthValue read_birth_value(const Param& param, const Value& value)
     return result;
 }
 
-// The use of the number that a birth draws for an attribute.
+// Returns the use of the number that a birth draws for an attribute.
 std::uint64_t use_of(std::string_view name)
 {
     std::uint64_t hash = 14695981039346656037ull;  // FNV-1a

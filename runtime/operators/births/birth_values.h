@@ -1,7 +1,7 @@
-// The values of newborn points, by attribute: one for all; at random between two, {min, max}; or at random on a ramp,
-// {{0, first}, ..., {1, last}}, linear between its keys; of texts {"a", "b", ...}, each as likely.
+// The values of newborn points, by attribute: one for all; random between two, {min, max}; or random on a ramp, {{0,
+// first}, ..., {1, last}}, linear between its keys. Strings {"a", "b", ...} are equally likely.
 //
-// A birth draws one number for each attribute, of the attribute's name: others change none of them.
+// A birth draws one number per attribute, keyed by the attribute's name, so that other attributes do not change it.
 #pragma once
 
 #include <algorithm>
@@ -21,9 +21,9 @@ struct BirthValue {
         double at;  // from 0 to 1
         AttributeValue value;
     };
-    // All of one type; one, if all newborn have the same.
+    // All of one type; a single key if all newborn points have the same value.
     std::vector<Key> keys;
-    bool counts = false;  // whole numbers, each of them as likely
+    bool counts = false;  // integers, all equally likely
 
     bool is_common() const { return keys.size() == 1; }
     const AttributeValue& first() const { return keys.front().value; }
@@ -45,10 +45,10 @@ struct BirthValues {
 
 void read_value(const Param& param, const Value& value, BirthValues& field);
 
-// Gives `count` births, from `first` among the last n points of a column, values by their random numbers; births: their
+// Assigns random values to `count` births, starting at `first` among the last n points of a column; births: their
 // numbers.
 using DrawValues = std::function<void(std::size_t first, std::size_t count, const Items& births)>;
-// For the attribute of this name, whose newborn differ. The value outlives the result.
+// Returns the function for the attribute of this name, whose values differ between births. The value must outlive it.
 DrawValues draw_values(const BirthValue& value, AnyColumn& column, std::size_t n, RandomKey key, std::string_view name);
 
 template <class T>

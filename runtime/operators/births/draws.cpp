@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// 1 with the sign of each.
+// Returns 1 with the sign of each element.
 Doubles signs_of(const Doubles& x)
 {
     return std::bit_cast<Doubles>((std::bit_cast<Flags>(x) & INT64_MIN) | std::bit_cast<std::int64_t>(1.0));
@@ -23,7 +23,7 @@ Vectors<Doubles> turned(const Vectors<Doubles>& mean, double depth, const Double
 {
     const Doubles length = sqrt(dot(mean, mean));
     const Vectors<Doubles> d{mean.x / length, mean.y / length, mean.z / length};
-    const Doubles fall = depth * u;  // 1 - cos α: the cosine of a narrow cone would keep few digits
+    const Doubles fall = depth * u;  // 1 - cos α: the cosine of a narrow cone would lose digits
     const Doubles side = sqrt(fall * (2 - fall));
     const Doubles turn = 2 * std::numbers::pi * w;
 
@@ -46,7 +46,7 @@ void Cone::turn(std::span<Vec3d> vectors, std::span<const Draws> draws) const
 {
     for (std::size_t begin = 0; begin < vectors.size(); begin += lanes) {
         const std::uint32_t count = static_cast<std::uint32_t>(std::min<std::size_t>(lanes, vectors.size() - begin));
-        Indices places;  // the lanes behind the last vector repeat it
+        Indices places;  // lanes beyond the last vector repeat it
         for (std::uint32_t l = 0; l < lanes; ++l)
             places[l] = static_cast<std::uint32_t>(begin) + std::min(l, count - 1);
         Doubles u, w;

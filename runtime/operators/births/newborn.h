@@ -1,4 +1,4 @@
-// The parameters that emit and spawn share: when points are born, how fast, for how long, and what they have.
+// The parameters that emit and spawn share: time, speed, lifetime and attributes of births.
 #pragma once
 
 #include <cmath>
@@ -15,15 +15,15 @@
 
 namespace rapid {
 
-// A number of births due that is this near to a whole one counts as that. 0.29 births a second for 100 s are
+// A number of due births this close to an integer counts as that integer. 0.29 births per second for 100 s are
 // 28.999999999999996 in doubles, and 29 to the user. Rounding stays below 1e-11 after 100,000 changes of the rate, and
 // a birth is shifted by at most this fraction of the interval between two.
 inline constexpr double whole_tolerance = 1e-9;
 
-// Memory of a newborn point with the attributes that most have, in the state and in what is made of it within a frame.
+// Memory per newborn point with common attributes, in the state and in copies within a frame.
 inline constexpr double bytes_a_birth = 2 * 64;
 
-inline constexpr std::size_t trial_births = 64;  // of a frame, in a trial (Evaluator::examine)
+inline constexpr std::size_t trial_births = 64;  // per frame, in a trial (Evaluator::examine)
 
 // One number for all points, or uniform between two: 2 or {1, 3}.
 struct Interval {
@@ -38,24 +38,24 @@ struct Interval {
 void read_value(const Param& param, const Value& value, Interval& field);
 
 inline bool is_zero(const Interval& interval) { return interval.min == 0 && interval.max == 0; }
-// 2, or {1, 3}.
+// Returns "2" or "{1, 3}".
 std::string describe(const Interval& interval);
 
-// When in the frame's interval points are born, or a function that edits each newborn point, which is then born at a
-// random time.
+// The time within the frame's interval at which points are born, or a function that edits each newborn point, which is
+// then born at a random time.
 struct BirthMoment {
-    // Functions are made kernels by the host of the scripting language, as the end of this says.
+    // The host of the scripting language compiles functions to kernels; it detects them by the end of this string.
     static constexpr std::string_view param_type = "moment or function of a point";
 
     std::string when = "random";
-    // Null without a function; the same object.
+    // Null if there is no function; both are the same object.
     std::shared_ptr<const PointFunction> function;
     std::shared_ptr<const PointEditor> edit;
 };
 
 void read_value(const Param& param, const Value& value, BirthMoment& field);
 
-// Base of the structs of emit and spawn.
+// Base of the parameter structs of emit and spawn.
 struct Newborn {
     BirthMoment birth;
     Vec3d velocity;
@@ -65,20 +65,20 @@ struct Newborn {
     std::string joins;
     BirthValues attributes;
 
-    // Adds these parameters, and what every newborn point has. speed_along: the direction of `speed`.
+    // Adds these parameters and the attributes of every newborn point. speed_along: the direction of `speed`.
     template <class T>
     static void declare_newborn(Declaration<T>& type, const std::string& speed_along);
 
     void use_newborn(Uses& uses) const;
     void check_attributes() const;
 
-    // The attributes that `attributes` makes.
+    // The attributes that the parameter `attributes` creates.
     std::vector<AttributeSpec> given() const;
-    // The value of a float attribute if `attributes` gives all newborn the same one.
+    // Returns the value of a float attribute if `attributes` gives all newborn points the same one.
     std::optional<std::vector<float>> common_value(const std::string& attribute) const;
     bool may_end() const { return std::isfinite(life->min); }
     bool joins_group(const Evaluation& now) const { return !joins.empty() && now.keeps_group(joins); }
-    // The functions that draw the values which differ from birth to birth, of the last n points.
+    // Returns the functions that draw values for the last n points, for attributes that differ between births.
     std::vector<DrawValues> draws_of(PointSet& points, std::size_t n, const Evaluation& now) const;
 };
 

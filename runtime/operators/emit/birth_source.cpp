@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint64_t pick_use = 17;
 
-// The vertices of a mesh with their attributes, as points.
+// Returns the vertices of a mesh with their attributes, as points.
 PointSet vertices_of(const Mesh& mesh)
 {
     PointSet vertices;
@@ -36,7 +36,7 @@ PointSet vertices_of(const Mesh& mesh)
     return vertices;
 }
 
-// The corners of its faces, three of each, with all attributes of vertices, corners and faces.
+// Returns the corners of a mesh's faces, three per face, with all attributes of vertices, corners and faces.
 PointSet corners_of(const DetailedMesh& mesh)
 {
     PointSet corners;
@@ -67,7 +67,7 @@ PointSet corners_of(const DetailedMesh& mesh)
     return corners;
 }
 
-// Area-weighted vertex normals; not of length 1.
+// Returns area-weighted vertex normals, not normalised.
 Column<Vec3f> vertex_normals(const Mesh& mesh)
 {
     std::vector<Vec3f> sum(mesh.positions.size(), Vec3f::Zero());
@@ -103,7 +103,7 @@ private:
     std::vector<Cubic<Vec3d>> curves_;  // by point
 };
 
-// v counts as the rate of change where the ways that it predicts are off by less than this part of the ways gone.
+// v counts as the rate of change if the error of the paths it predicts is below this fraction of the actual paths.
 constexpr double most_off = 0.5;
 
 bool is_rate_of_change(const PointSet& now, const PointSet& before, std::span<const std::uint32_t> place, double dt)
@@ -119,19 +119,20 @@ bool is_rate_of_change(const PointSet& now, const PointSet& before, std::span<co
     return way > 0 && off <= most_off * most_off * way;
 }
 
-// The curves along which the points of a source travel in one step, where the source is another set at each step: a
-// function of the frame, such as one that reads a sequence of files. Points are the same where their id is.
+// The curves along which the points of a source travel in one step, if the source is another set at each step: a
+// function of the frame, such as one that reads a sequence of files. Points are matched by id.
 //
-// Where the attribute v is the rate at which positions change, the curve is the cubic Hermite spline of both, which is
-// the path to third order. Else its tangents are differences: of second order from the third step on, straight before.
-// A point that was not there goes back along its v, or is at rest.
+// If the attribute v is the rate at which positions change, the curve is the cubic Hermite spline of both, which is
+// the path to third order. Otherwise its tangents are differences: of second order from the third step on, straight
+// before. A new point is traced back along its v, or is at rest.
 struct PointPath {
     BodyPathPtr path;           // births are given on the points of `now`, by element
     std::size_t unmatched = 0;  // points of `now` that were not there before
-    bool follows_v = false;     // v is the rate at which positions change: path gives it, not the attribute
+    bool follows_v = false;     // v is the rate of change of positions: path provides it instead of the attribute
 };
 
-// now, before: the source at the end and the beginning of a step of `dt` seconds; earlier: a step before that, or null.
+// now, before: the source at the end and the beginning of a step of `dt` seconds; earlier: one step before that, or
+// null.
 PointPath point_path(const PointSet& now, const PointSet& before, const PointSet* earlier, bool straight, double dt)
 {
     PointPath result;
@@ -316,7 +317,7 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
     }
     FrameClock clock = simulation;
     if (deforms) clock.subframes = 1;
-    // At the start there is no interval yet: births take place at the beginning of the next one, unless that jumps.
+    // At the start there is no interval yet: births take place at the beginning of the next one, unless it is a jump.
     bool at_beginning = step <= clock.start;
     const std::int64_t last = at_beginning ? step + 1 : step, parts = deforms ? simulation.subframes : 1;
     std::int64_t end = clock.start + (last - clock.start + parts - 1) / parts;
@@ -372,7 +373,7 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
     scatter_ = scatter_on(mesh);
 }
 
-// By a density at the corners of faces, 0 on those that are not in the group.
+// Scatters by the density at the corners of faces, with 0 on faces outside the group.
 ScatterPtr BirthSource::scatter_on(const MeshPtr& mesh) const
 {
     if (density_.empty() && group_.empty()) return scatter_on_surface(mesh);
@@ -453,7 +454,7 @@ std::vector<std::string> BirthSource::inherited() const
     std::vector<std::string> names;
     for (const std::string& name : values_.column_names()) {
         const auto own = {"P", "v", "id", "dt", "age", "life", "birthtime", "force"};
-        // The normals of a mesh that turns are those of the mesh at rest.
+        // The normals of a rotating mesh belong to the mesh at rest.
         const bool turns = name == "N" && moving_mesh_ && !moving_mesh_->deforms();
         if (!turns && std::find(own.begin(), own.end(), name) == own.end() && name.rfind("hit", 0) != 0)
             names.push_back(name);
@@ -464,7 +465,7 @@ std::vector<std::string> BirthSource::inherited() const
 void BirthSource::place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const
 {
     if (scatter_) {
-        // In runs of consecutive births.
+        // Places runs of consecutive births together.
         for (std::size_t begin = 0, end = 1; begin < out.size(); begin = end++) {
             while (end < out.size() && births[end] == births[begin] + (end - begin)) ++end;
             scatter_->place(key, births[begin], out.subspan(begin, end - begin));

@@ -1,8 +1,8 @@
 // The source of an emitter: a mesh, a level set, an analytic shape, a fog, a curve, or points; at rest, moving or
 // deforming.
 //
-// It gives the place of a birth, the normal there, and the attribute values that newborn points inherit. All of these
-// depend only on the random key and the birth's number.
+// It provides the position of a birth, the normal there, and the attribute values that newborn points inherit. All of
+// these depend only on the random key and the birth's number.
 #pragma once
 
 #include <span>
@@ -27,9 +27,9 @@ class MovingCurves;
 class BirthSource {
 public:
     BirthSource() = default;
-    // from: "surface", "volume", "points" (a mesh's vertices), or empty for the object's default. Error: an object that
-    // is no source, or none of that kind. density: the attribute by which places are drawn, or empty. group: that of a
-    // mesh's faces on which points are born, or empty.
+    // from: "surface", "volume", "points" (a mesh's vertices), or empty for the object's default. Throws Error if the
+    // object is not a source, or not of that kind. density: attribute by which positions are drawn, or empty. group:
+    // group of mesh faces on which points are born, or empty.
     BirthSource(ObjectPtr object, std::string from, std::string density = "", std::string group = "");
 
     bool is(const ObjectPtr& object, const std::string& from, const std::string& density,
@@ -37,38 +37,40 @@ public:
     {
         return object_ == object && from_ == from && density_ == density && group_ == group;
     }
-    // Points that take the place of those of `last`, which was the source until now: they travel from there to here.
+    // Makes the points of this source continue those of `last`, the source until now: they travel from there to here.
     void follow(const BirthSource& last);
 
-    // Moves it to the interval that ends with a step; at the simulation's start, to that instant. Once a step, before
-    // births are placed, on one thread. A deforming source is known at whole frames, and its path within a frame does
-    // not depend on the sub-frames.
+    // Moves the source to the interval that ends with a step; at the simulation's start, to that instant. Call it once
+    // per step, before placing births, on one thread. A deforming source is known at whole frames, and its path within
+    // a frame does not depend on the subframes.
     struct Move {
         std::optional<Jump> jump = {};  // detected in this interval
-        bool at_beginning = false;      // births take place at t = 0: of the interval that begins at the start
-        std::size_t unmatched = 0;      // points of a set that was another before, and did not have them
+        bool at_beginning = false;      // births take place at t = 0 of the first interval
+        std::size_t unmatched = 0;      // points of a changing set that did not exist before
     };
     Move move_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
-    // Whether birthplaces move: they are then to be carried along path().
+    // Returns true if birthplaces move and must be carried along path().
     bool moves() const { return path_ != nullptr; }
     const BodyPath& path() const { return *path_; }
 
-    // A set of no points, or a sequence that has nothing in this interval.
+    // Returns true for a set without points, or a sequence without data in this interval.
     bool empty() const { return is_absent_ || (!scatter_ && values_.empty()); }
     bool has_normals() const { return has_normals_; }
-    // Whether its attribute v is to be added to the velocity of its path.
+    // Returns true if its attribute v must be added to the velocity of its path.
     bool has_own_velocity() const { return !path_is_of_v_; }
 
-    // Attributes of its points, of a mesh's vertices, or of the corners of its faces, v included; read through value().
+    // Attributes of its points, of a mesh's vertices, or of the corners of its faces, including v; read through
+    // value().
     const PointSet& values() const { return values_; }
-    // The attributes that newborn points inherit: all but those that every point has of its own (P, v, id, age, ...).
+    // Returns the attributes that newborn points inherit: all except those that every point has individually (P, v,
+    // id, age, ...).
     std::vector<std::string> inherited() const;
 
-    // Places birth number births[i] at out[i]; N has the length 1, or 0 where there is no normal. Source points are
-    // taken in order, cyclically, or at random; by a density at random. Draws from the uses 0 to 15 and 17 of the key.
+    // Places birth number births[i] at out[i]. N has length 1, or 0 if there is no normal. Source points are taken in
+    // order, cyclically, or at random; with a density always at random. Draws from the uses 0 to 15 and 17 of the key.
     void place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const;
 
-    // A column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
+    // Returns a column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
     template <class T>
     T value(const Strided<T>& column, const Birthplace& place) const
     {
@@ -76,7 +78,7 @@ public:
             if (scatter_ && is_of_corners_) {
                 const std::size_t first = 3 * static_cast<std::size_t>(place.element);
                 const T &a = column[first], &b = column[first + 1], &c = column[first + 2];
-                if (a == b && b == c) return a;  // of a face
+                if (a == b && b == c) return a;  // an attribute of faces
                 return a * (1 - place.b1 - place.b2) + b * place.b1 + c * place.b2;
             }
             if (scatter_) {
@@ -88,7 +90,7 @@ public:
         return column[static_cast<std::size_t>(place.element)];
     }
 
-    // Where the points of a set that is another at each step come from.
+    // Stores the previous sets of a source that is another set at each step.
     template <class Archive>
     void serialize(Archive& keep)
     {
@@ -109,23 +111,23 @@ private:
 
     ObjectPtr object_;
     std::string from_, density_, group_;
-    std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, where it is one
+    std::shared_ptr<const AnimatedMesh> moving_mesh_;    // the object, if it is one
     std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
     std::shared_ptr<const MovingCurves> moving_curves_;  // likewise
     BodyPathPtr path_;
     ScatterPtr scatter_;  // null: births are at the points of values_
     MeshPtr mesh_;        // birthplaces refer to its triangles
     PointSet values_;
-    bool is_of_corners_ = false;  // values_ has three of each triangle of mesh_
+    bool is_of_corners_ = false;  // values_ has three per triangle of mesh_
     Column<Vec3f> normals_;       // of the points
     AliasTable chances_;          // of the points, by their density
     bool has_normals_ = false, is_absent_ = false;
 
-    // Of points: their motion, or the sets before, where a function of the frame gives another at each step.
+    // For points: their motion, or the previous sets if a function of the frame gives a new set at each step.
     std::shared_ptr<const AnimatedPoints> moving_points_;
     std::optional<PointSet> before_, earlier_;
     bool is_of_points_ = false, path_is_of_v_ = false;
-    bool is_fresh_ = false;  // follows another set, and has not moved yet
+    bool is_fresh_ = false;  // follows another set and has not moved yet
 };
 
 }  // namespace rapid

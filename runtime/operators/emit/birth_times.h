@@ -1,9 +1,8 @@
-// How many points an emitter emits in a frame, and when.
+// The number of points that an emitter emits in a frame, and their times.
 //
-// By the time t = n / fps a constant rate r has emitted floor(r t) points, computed from the whole number n of frames
-// and never from a sum of steps: no birth is lost or doubled at the end of a frame, however long the run. When the rate
-// changes, the fraction of a birth that is due carries over to the new rate. A birth at the end of a frame belongs to
-// that frame.
+// By the time t = n / fps a constant rate r has emitted floor(r t) points, computed from the integer n of frames and
+// never from a sum of steps. No birth is lost or duplicated at the end of a frame, however long the run. When the rate
+// changes, the fraction of a birth that is due carries over. A birth at the end of a frame belongs to that frame.
 //
 // A point born within the frame's interval has an age L with 0 <= L <= h at its end: h for birth = "begin", 0 for
 // "end", uniform in between for "random", and h minus its exact time of birth for "even". With the parameter `age` it
@@ -30,7 +29,7 @@
 
 namespace rapid {
 
-// The number of births at a frame. impulse: numbers of births by frame.
+// Returns the number of births at a frame. impulse: numbers of births by frame.
 template <class Numbers>
 std::size_t impulse_at(const Numbers& impulse, std::int64_t frame)
 {
@@ -38,33 +37,33 @@ std::size_t impulse_at(const Numbers& impulse, std::int64_t frame)
     return found == impulse.end() ? 0 : static_cast<std::size_t>(found->second);
 }
 
-// Whether a frame up to this one has an impulse: a trial skips frames (Evaluator::examine).
+// Returns true if any frame up to this one has an impulse: a trial skips frames (Evaluator::examine).
 template <class Numbers>
 bool has_impulse_by(const Numbers& impulse, double frame)
 {
     return !impulse.empty() && static_cast<double>(impulse.begin()->first) <= frame;
 }
 
-// The births of one frame, or of a part of it, numbered from 0 over the emitter's whole life.
+// The births of one frame, or of part of it, numbered from 0 over the emitter's whole life.
 struct Births {
     std::uint64_t first = 0;
     std::size_t count = 0;
 
     // Evenly spaced births: birth i of this frame, from 0, takes place when i + 1 births are due.
-    double due = 0;         // births due at the frame's end since its beginning; not whole
+    double due = 0;         // births due from the frame's beginning to its end; not an integer
     double per_second = 0;  // rate, 1/s
-    // Time from birth i to the frame's end, s, at least 0.
+    // Returns the time from birth i to the frame's end, s, at least 0.
     double even_age(std::size_t i) const;
 };
 
 class BirthClock {
 public:
-    // No births before the end of the frame `start`.
+    // No births occur before the end of the frame `start`.
     explicit BirthClock(std::int64_t start = 1) : anchor_(start) {}
 
-    // The births of `frame` at `rate` (1/s, finite, at least 0). Called for the frames in their order.
+    // Returns the births of `frame` at `rate` (1/s, finite, at least 0). Must be called for the frames in order.
     Births at_rate(double rate, std::int64_t frame, double fps);
-    // Of the `count` births of a frame, those of its part number `part`, from 0, of `parts`.
+    // Returns the share of a frame's `count` births in its part number `part`, from 0, of `parts`.
     Births at_once(std::size_t count, double fps, int part = 0, int parts = 1);
 
     template <class Archive>
@@ -77,25 +76,26 @@ public:
     }
 
 private:
-    static constexpr std::int64_t most_births = std::int64_t{1} << 53;  // and frames, as doubles count
+    static constexpr std::int64_t most_births = std::int64_t{1}
+                                                << 53;  // also the limit of frames: the exact integers of a double
 
     double due_by(std::int64_t frame, double fps) const;
 
     std::uint64_t total_ = 0;  // births so far
     double rate_ = 0;          // 1/s
-    std::int64_t anchor_;      // frame at whose end this rate began
+    std::int64_t anchor_;      // frame at the end of which this rate began
     double carry_ = 0;         // fraction of a birth due at the anchor, in [0, 1)
     std::uint64_t born_ = 0;   // births since the anchor
 };
 
-// Births of a frame, or those among them that a subset has.
+// The births of a frame, or the part of them that belongs to a subset.
 struct Chosen {
     const Births& births;
-    std::vector<std::uint32_t> places;  // in the frame, of those that a subset has
+    std::vector<std::uint32_t> places;  // indices in the frame of those that belong to the subset
     bool are_all;
 
     std::size_t size() const { return are_all ? births.count : places.size(); }
-    // From the first-th of them on: their numbers among the births of the frame, and of the emitter.
+    // Return the chosen births from index `first` on, numbered within the frame, and within the emitter.
     Items in_frame(std::size_t first) const { return items(0, first); }
     Items numbers(std::size_t first) const { return items(births.first, first); }
 
@@ -106,7 +106,7 @@ private:
     }
 };
 
-// next_id: of the first.
+// Chooses the births of a subset. next_id: id of the first birth.
 inline Chosen choose(const Births& births, const Subset& subset, std::int64_t next_id)
 {
     Chosen chosen{births, {}, subset.is_all()};
@@ -123,13 +123,13 @@ struct BirthAge {
     std::string attribute;
 
     bool is_single() const { return attribute.empty() && interval.is_single(); }
-    // Error: the source lacks the attribute, or one of its values is no age.
+    // Throws Error if the source lacks the attribute, or one of its values is not an age.
     void check(const BirthSource& source) const;
 };
 
 void read_value(const Param& param, const Value& value, BirthAge& field);
 
-// The ages of one frame's births. What it is made from outlives it.
+// The ages of one frame's births. The constructor's arguments must outlive it.
 class BirthAges {
 public:
     // frame_length: s; 0 in the initial state, which is not advanced.
@@ -137,11 +137,11 @@ public:
               double frame_length);
 
     double frame_length() const { return h_; }
-    // The age of all newborn, s; nothing where they differ.
+    // The age of all newborn points, s; empty if they differ.
     const std::optional<double>& common() const { return common_; }
 
-    // The ages L of some births, s; places_in_frame: their numbers among the births of this frame; spans have shape
-    // [n]. The draws are read where ages are random.
+    // Finds the ages L of some births, s. places_in_frame: their numbers among the births of this frame; spans have
+    // shape [n]. The draws are read only if ages are random.
     void find(const Births& births, const Items& places_in_frame, std::span<const Birthplace> places,
               std::span<const Draws> draws, std::span<double> L) const;
 

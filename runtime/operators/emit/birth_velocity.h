@@ -14,23 +14,23 @@
 
 namespace rapid {
 
-// What it is made from outlives it.
+// Computes birth velocities. The constructor's arguments must outlive it.
 class BirthVelocity {
 public:
     // spread: rad.
     BirthVelocity(const Vec3d& velocity, const Interval& speed, double spread, double inherit,
                   const BirthSource& source);
 
-    // Whether it needs random numbers.
+    // Returns true if it needs random numbers.
     bool is_random() const { return is_random_; }
-    // Whether it needs normals that follow a moving source.
+    // Returns true if it needs normals that follow a moving source.
     bool needs_normals() const { return !is_zero(speed_); }
-    // Whether all newborn have the same.
+    // Returns true if all newborn points have the same velocity.
     bool is_common() const { return is_common_; }
     Vec3f common() const { return (velocity_ + inherited_).cast<float>(); }
 
-    // source_motion: the velocities of the birthplaces on a moving source, read where it moves. Spans have shape [n].
-    // speed_draws: by speed_use, read where speed is random.
+    // source_motion: velocities of the birthplaces, read if the source moves. Spans have shape [n]. speed_draws: by
+    // speed_use, read if speed is random.
     void find(std::span<const Birthplace> places, std::span<const Draws> draws, std::span<const Draws> speed_draws,
               std::span<const Vec3d> source_motion, std::span<Vec3f> v) const;
 
@@ -41,8 +41,8 @@ private:
     const BirthSource& source_;
     const Cone cone_;
     bool is_random_, is_common_;
-    bool source_v_differs_;  // its points differ in what is inherited of their v
-    Vec3d inherited_;        // from the v of the source, where they do not
+    bool source_v_differs_;  // source points differ in the inherited part of their v
+    Vec3d inherited_;        // inherited part of the source's v if it is uniform
 };
 
 }  // namespace rapid

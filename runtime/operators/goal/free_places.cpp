@@ -76,7 +76,7 @@ std::uint32_t FreePlaces::take(const Vec3d& P)
     Nearest nearest{std::numeric_limits<double>::infinity(), 0};
     search(0, order_.size(), P.allFinite() ? P : Vec3d(Vec3d::Zero()), nearest);
     ++takers_[order_[nearest.node]];
-    // One less in each range around it.
+    // One less in each range that contains it.
     for (std::size_t begin = 0, end = order_.size();;) {
         const std::size_t middle = begin + (end - begin) / 2;
         --free_[middle];

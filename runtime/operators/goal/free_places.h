@@ -1,7 +1,8 @@
-// Places that points take one by one, each the nearest that fewest have. All are taken once before one is taken twice.
+// Positions that points take one by one, each the nearest of those with the fewest takers. All are taken once before
+// any is taken twice.
 //
-// A k-d tree over an array: the middle of a range is a node, what is before and behind it its two branches, which know
-// how many of their places are free.
+// A k-d tree stored in an array: the middle of a range is a node, the elements before and after it are its two
+// branches. Each node stores how many positions in its range are free.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,11 @@ namespace rapid {
 
 class FreePlaces {
 public:
-    // Finite ones, at least one. takers: how many have each already.
+    // places: finite, at least one. takers: current number of takers of each.
     FreePlaces(std::vector<Vec3d> places, std::vector<std::uint32_t> takers);
 
-    // The number of the place nearest to P, which it takes; of two as near the first. Of a P that is not finite any.
+    // Returns the index of the free position nearest to P, and takes it; ties go to the first. Any is taken if P is
+    // not finite.
     std::uint32_t take(const Vec3d& P);
 
 private:
@@ -31,10 +33,10 @@ private:
 
     std::vector<Vec3d> places_;
     std::vector<std::uint32_t> takers_;
-    std::uint32_t round_ = 0;           // the fewest takers of a place
-    std::vector<std::uint32_t> order_;  // of the tree
-    std::vector<std::uint8_t> axis_;    // along which a node parts its range
-    std::vector<std::uint32_t> free_;   // places in a node's range with the fewest takers
+    std::uint32_t round_ = 0;           // the lowest number of takers
+    std::vector<std::uint32_t> order_;  // indices of places, in tree order
+    std::vector<std::uint8_t> axis_;    // along which a node splits its range
+    std::vector<std::uint32_t> free_;   // number of places in a node's range with the fewest takers
 };
 
 }  // namespace rapid

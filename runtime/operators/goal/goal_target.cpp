@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::uint64_t shuffle_use = 25;  // those of places on surfaces are the scatter's
+constexpr std::uint64_t shuffle_use = 25;  // the scatter uses those of positions on surfaces
 
 std::uint64_t number_of(std::int64_t id) { return static_cast<std::uint64_t>(id); }
 
@@ -53,7 +53,7 @@ public:
                       std::span<Vec3f> places) = 0;
 
 protected:
-    // place(i) for each member.
+    // Sets places[i] to place(i) for each member.
     template <class F>
     static void for_each_member(Strided<std::uint8_t> members, std::span<Vec3f> places, const F& place)
     {
@@ -64,7 +64,7 @@ protected:
     }
 };
 
-// A place is a point: that of the same id, or by the order of ids, again from the first where there are fewer.
+// A target position is a point: the one with the same id, or by order of ids, cyclically.
 class GoalPlaces::OfPoints : public Kind {
 public:
     OfPoints(const PointSet& points, MotionPtr motion, std::string by)
@@ -113,7 +113,7 @@ private:
         return order;
     }
 
-    // Those that have none yet, by id.
+    // Assigns positions to points that have none yet, by id.
     template <class At>
     void take_nearest(PointSet& points, Strided<std::uint8_t> members, const At& at) const
     {
@@ -143,7 +143,8 @@ private:
     const std::string by_;
 };
 
-// By id a place is a vertex, at random a place of the surface that each point has by its id, at any time.
+// By id, a target position is a vertex; at random, a position on the surface that each point gets from its id for all
+// times.
 class GoalPlaces::OfMesh : public Kind {
 public:
     OfMesh(MeshPtr rest, std::shared_ptr<const AnimatedMesh> moving, std::string by)
@@ -181,7 +182,7 @@ public:
     }
 
 private:
-    // Rigid ones move as a whole, at sub-frames too; of a sequence the mesh is that of the frame.
+    // Rigid meshes move as a whole, also at subframes; a sequence uses the mesh of the frame.
     MeshPtr mesh_at(const FrameClock& clock, const Frame& frame) const
     {
         if (!moving_) return rest_;
@@ -247,8 +248,8 @@ public:
     }
 
 private:
-    // P - φ ∇φ / |∇φ|², which is on the surface where φ is a distance; P where there is no gradient, beyond the band of
-    // a level set.
+    // Moves P to P - φ ∇φ / |∇φ|², which is on the surface if φ is a distance; P stays if there is no gradient, beyond
+    // the band of a level set.
     void go_to_surface(std::span<Vec3d> P) const
     {
         std::vector<double> phi(P.size());

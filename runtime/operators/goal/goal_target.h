@@ -1,4 +1,4 @@
-// What points go to: a mesh, a shape or points, at rest or moving, or a place of each point's own.
+// The target of points: a mesh, a shape or points, at rest or moving, or a position stored per point.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@
 
 namespace rapid {
 
-// The number of the place that a point has taken (by = "nearest", of points); -1: none.
+// The index of the position that a point has taken (by = "nearest", for points); -1: none.
 inline constexpr char goal_number[] = "goalnum";
 
 struct GoalTarget {
@@ -25,23 +25,23 @@ struct GoalTarget {
     std::string attribute;  // a vec3
 
     bool is_points() const;
-    // Whether a point keeps the place that it has once got, by number.
+    // Returns true if a point keeps the position that it first took, by index.
     bool is_taken(const std::string& by) const { return is_points() && by == "nearest"; }
 };
 
 void read_value(const Param& param, const Value& value, GoalTarget& target);
 
-// The places of a target as it is at the end of a frame.
+// The positions of a target at the end of a frame.
 class GoalPlaces {
 public:
-    // by: "id", "random" or "nearest". Error: a target that has no places of that kind.
+    // by: "id", "random" or "nearest". Throws Error if the target has no positions of that kind.
     GoalPlaces(const GoalTarget& target, const std::string& by);
     ~GoalPlaces();
     GoalPlaces(GoalPlaces&&) noexcept;
     GoalPlaces& operator=(GoalPlaces&&) noexcept;
 
-    // places: shape [points.size()], of those whose member is 1. The points get their goal_number where they take a
-    // place.
+    // Finds the positions of points whose member is 1; places: shape [points.size()]. Stores goal_number if points
+    // take a position.
     void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
               std::span<Vec3f> places);
 

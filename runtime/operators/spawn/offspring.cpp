@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// The number of a birth among all births of all parents, for its random numbers.
+// Returns the number of a birth among all births of all parents, for its random numbers.
 std::uint64_t number_of(std::int64_t parent, std::uint64_t number)
 {
     return (static_cast<std::uint64_t>(parent) << 32) + number;
@@ -20,7 +20,7 @@ std::uint64_t number_of(std::int64_t parent, std::uint64_t number)
 
 }  // namespace
 
-// The newborn points' part of the columns, shape [n]; empty where nothing reads them.
+// The newborn points' part of the columns, shape [n]; empty if nothing reads them.
 struct Offspring::Columns {
     std::span<Vec3f> P, v;
     std::span<std::int64_t> id, parent;
@@ -80,7 +80,7 @@ Offspring::Columns Offspring::columns_of(PointSet& points, std::size_t n) const
     return columns;
 }
 
-// mass and pscale of a brood that shares its parent: m / n, r / n^(1/3).
+// mass and pscale of children that split their parent: m / n, r / n^(1/3).
 void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns) const
 {
     for (const std::string& name : traits_.inherit) {
@@ -107,7 +107,7 @@ void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns)
     }
 }
 
-// The births [begin, end) of the step, brood by brood.
+// Fills the births [begin, end) of the step, parent by parent.
 void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end) const
 {
     const Cone cone(newborn_.spread);
@@ -167,7 +167,7 @@ ParentPaths::Moment Offspring::moment_of_hit(std::uint32_t place) const
     return {hit.P.cast<double>(), hit.v1.cast<double>()};
 }
 
-// The direction of `speed`: off the surface at a hit, the parent's attribute N, or the way that it goes.
+// Returns the direction of `speed`: the surface normal at a hit, the parent's attribute N, or its direction of motion.
 Vec3d Offspring::normal_of(const Brood& brood, const Vec3d& v) const
 {
     if (brood.hit != Brood::no_hit) return parents_.record().hits[brood.hit].n.cast<double>();

@@ -1,4 +1,4 @@
-// The points that are born from the points of a node in one step: column by column, in parallel.
+// The children born from the points of a node in one step: column by column, in parallel.
 #pragma once
 
 #include <string>
@@ -11,25 +11,25 @@
 
 namespace rapid {
 
-// What newborn points get, and what of it is their parents'.
+// Settings for newborn points, and their inheritance from parents.
 struct Traits {
     const Newborn& newborn;
-    std::vector<std::string> inherit;  // the attributes that they get from their parents
-    double share;                      // part of the parent's velocity
+    std::vector<std::string> inherit;  // attributes copied from the parents
+    double share;                      // fraction of the parent's velocity
     bool splits;
     double wait;  // s from the end of the parents' step to the end of the frame
 };
 
 class Offspring {
 public:
-    // All outlive it.
+    // All arguments must outlive it.
     Offspring(const ParentPaths& parents, const std::vector<Brood>& broods, const Traits& traits,
               const Evaluation& now);
 
-    // Appends the first n births, or all, with ids from next_id on. Returns how many.
+    // Appends the first `most` births, or all if there are fewer, with ids from next_id on. Returns their number.
     std::size_t append_to(PointSet& points, std::int64_t& next_id, std::size_t most) const;
 
-    // The columns that newborn points need, whether there are any or not.
+    // Creates the columns that newborn points need, even if there are no births.
     void make_columns(PointSet& points) const;
 
 private:

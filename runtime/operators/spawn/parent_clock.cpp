@@ -37,8 +37,8 @@ std::optional<AttributeComparison> comparison_of(const std::string& text)
     return comparison;
 }
 
-// The value that is compared, of a parent at a moment of its time in the step: of P and v along its path, of others
-// between the values before and after.
+// The compared value of a parent at a time in the step: P and v along its path, other values interpolated between
+// those before and after.
 class ComparedValue {
 public:
     ComparedValue(const ParentPaths& paths, const AttributeComparison& comparison)
@@ -57,7 +57,7 @@ public:
         return before + (after - before) * std::clamp((t - parent.begin) / T, 0.0, 1.0);
     }
 
-    // The first moment at which it holds, to rounding; it does not hold at the beginning, and does at the end.
+    // Returns the first time at which it holds, to rounding; it does not hold at the beginning, and does at the end.
     double first_moment(const ParentPaths::Parent& parent) const
     {
         double low = parent.begin, high = parent.end;
@@ -116,7 +116,7 @@ std::vector<std::uint8_t> tested(const PointFunction& function, const PointSet& 
     return result;
 }
 
-// The values of a float or integer attribute. Error: there is none of that name, or it holds vectors.
+// Returns the values of a float or integer attribute. Throws Error if there is none of that name, or it holds vectors.
 std::vector<double> numbers_of(const PointSet& points, const std::string& attribute)
 {
     const AnyColumn* column = points.find(attribute);
@@ -136,7 +136,7 @@ std::vector<double> numbers_of(const PointSet& points, const std::string& attrib
         *column);
 }
 
-// An amount of each parent, asked of its set once.
+// The amount of each parent, looked up once per set.
 class Amounts {
 public:
     template <class T>
@@ -208,7 +208,7 @@ void read_value(const Param& param, const Value& value, BirthEvent& field)
     field.comparison = *comparison;
 }
 
-// Collects the broods of a step.
+// Collects the births of a step.
 class ParentClock::Tally {
 public:
     Tally(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now)
@@ -250,7 +250,7 @@ private:
             return add(i, state, births, brood);
         }
         const double rate = rates_->of(parent, id);
-        // Parents that are born together do not bear together, unless births are even.
+        // Parents that are born together do not emit simultaneously, unless births are even.
         if (!state.is_known && !even) state.due = uniform4(random_, static_cast<std::uint64_t>(id), phase_use)[0];
         state.is_known = true;
         const double due = state.due + rate * T, births = whole_births(due);
@@ -286,7 +286,7 @@ private:
         }
     }
 
-    // The number of contacts grows at contacts, of which each is an event with a normal.
+    // The number of contacts grows at contacts, each of which is an event with a normal.
     void take_contacts(std::uint32_t i, const ParentPaths::Parent& parent, State& state)
     {
         const AttributeComparison& comparison = plan_.on->comparison;
@@ -343,7 +343,7 @@ private:
     const RandomKey random_;
     std::optional<Amounts> rates_, counts_;
     std::optional<ComparedValue> value_;
-    std::vector<std::uint8_t> holds_;  // of the living, by the test
+    std::vector<std::uint8_t> holds_;  // of the living points, by the test
     std::size_t total_ = 0;
 };
 
@@ -353,7 +353,7 @@ std::vector<Brood> ParentClock::births(const ParentPaths& parents, const BirthPl
     const IdIndex known(ids_);
     std::vector<State> states;
     states.reserve(parents.living().size());
-    std::size_t next = 0;  // mostly the points are in the order of the last step
+    std::size_t next = 0;  // usually the points are in the order of the last step
     for (std::uint32_t i = 0; i < parents.size(); ++i) {
         const std::int64_t id = parents.id(parents[i]);
         State state;

@@ -1,7 +1,7 @@
-// How many points each parent bears in a step, and when.
+// The number of points that each parent emits in a step, and their times.
 //
-// A parent's births are numbered from 0 over its life. What is due of a birth at the end of a step is carried over to
-// the next, parent by parent.
+// A parent's births are numbered from 0 over its life. The fraction of a birth due at the end of a step carries over
+// to the next step, separately for each parent.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +22,13 @@
 
 namespace rapid {
 
-// Births a second (double), or whole births (int): a number, or an attribute of the parents.
+// Births per second (double), or a number of births (int): a constant, or an attribute of the parents.
 template <class T>
 struct Amount {
     static constexpr std::string_view param_type =
         std::is_same_v<T, int> ? "integer or rapid.attr" : "number or rapid.attr";
     T value{};
-    std::string attribute;  // where not empty, each parent has its own
+    std::string attribute;  // if not empty, each parent has its own value
 };
 
 template <class T>
@@ -41,11 +41,11 @@ void read_value(const Param& param, const Value& value, Amount<T>& field)
         read_value(param, value, field.value);
 }
 
-// "age > 0.5", "P.y < 0": true from a moment on.
+// "age > 0.5", "P.y < 0": an event at the time when it becomes true.
 struct AttributeComparison {
     enum Relation { Below, AtMost, Above, AtLeast };
     std::string attribute;
-    int axis = -1;  // of a vec3; -1 of a number
+    int axis = -1;  // of a vec3; -1 for a number
     Relation relation = Above;
     double limit = 0;
 
@@ -65,9 +65,9 @@ struct AttributeComparison {
     }
 };
 
-// The moment at which a parent bears others: the parameter `on`.
+// The event at which a parent emits children: the parameter `on`.
 struct BirthEvent {
-    // Functions are made kernels by the host of the scripting language, as the end of this says.
+    // The host of the scripting language compiles functions to kernels; it detects them by the end of this string.
     static constexpr std::string_view param_type = "event or function of a point";
 
     enum Kind { Hit, Death, Birth, Compares, Tests };
@@ -75,37 +75,37 @@ struct BirthEvent {
     AttributeComparison comparison;
     std::shared_ptr<const PointFunction> test;
 
-    // What it reads of its points.
+    // Adds the attributes that it reads from the parents.
     void uses(Uses& uses) const;
 };
 
 void read_value(const Param& param, const Value& value, BirthEvent& field);
 
-// Births of one parent: at one moment, or over its time in the step.
+// The children of one parent: born at one time, or over the parent's time in the step.
 struct Brood {
     static constexpr std::uint32_t no_hit = UINT32_MAX;
 
-    std::uint32_t parent;         // among the paths
-    std::uint32_t hit = no_hit;   // of the record, that they are born at
+    std::uint32_t parent;         // index among the paths
+    std::uint32_t hit = no_hit;   // index in the record of the hit at which they are born
     std::uint64_t number;         // of the first among all births of the parent
-    std::size_t first, count;     // of the first among all births of the step; how many
-    double begin, end;            // s since the beginning of the step; equal for one moment
+    std::size_t first, count;     // index of the first among all births of the step; their number
+    double begin, end;            // s since the beginning of the step; equal for a single time
     double spacing = 0, due = 0;  // even births: birth i at begin + (i + 1 - due) spacing
 };
 
 struct BirthPlan {
-    std::optional<Amount<double>> rate;  // 1/s, of each parent
-    std::optional<Amount<int>> count;    // a frame, or an event, of each parent
+    std::optional<Amount<double>> rate;  // 1/s, per parent
+    std::optional<Amount<int>> count;    // per frame or event, and per parent
     std::optional<BirthEvent> on;
     double min_speed = 0;         // m/s, of hits
-    std::optional<double> limit;  // births of a parent
-    std::string birth;            // "random", "begin", "end", "even": over the time of a parent in the step
-    int part = 0, parts = 1;      // of a frame: the step's number in it, from 0, and how many there are
+    std::optional<double> limit;  // births per parent
+    std::string birth;            // "random", "begin", "end", "even": within a parent's time in the step
+    int part = 0, parts = 1;      // the step's number in its frame, from 0, and the steps per frame
 };
 
 class ParentClock {
 public:
-    // The broods of a step, in the order of the parents, then of time. Called for the steps in their order.
+    // Returns the children of a step, by parent, then by time. Must be called for the steps in order.
     std::vector<Brood> births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now);
 
     template <class Archive>
@@ -117,10 +117,10 @@ public:
 
 private:
     struct State {
-        double due = 0;          // of a birth, in [0, 1)
+        double due = 0;          // fraction of a birth, in [0, 1)
         std::uint64_t born = 0;  // births so far
-        bool is_known = false;   // whether it has borne in a step before, so that `due` counts
-        bool held = false;       // whether the comparison, or the test, was true at the end of the last step
+        bool is_known = false;   // it has emitted in an earlier step, so `due` is valid
+        bool held = false;       // the comparison or test was true at the end of the last step
 
         template <class Archive>
         void serialize(Archive& keep)
@@ -131,7 +131,7 @@ private:
     };
     class Tally;
 
-    // Of the living, in the order of the last step.
+    // For living points, in the order of the last step.
     Column<std::int64_t> ids_;
     std::vector<State> states_;
 };

@@ -45,14 +45,14 @@ void ParentPaths::add(const PointSet& set, std::span<const double> died_at, bool
     const Strided<std::uint8_t> members = members_of(set, group);
     const Column<float>* own = record_.before.find<float>("dt");
     const float h = static_cast<float>(record_.h);
-    std::uint32_t next = 0;  // mostly the points are in the same order
+    std::uint32_t next = 0;  // usually the points are in the same order
     for (std::size_t i = 0; i < set.size(); ++i) {
         std::uint32_t before = next;
         if (!(next < record_.before.size() && ids_before[next] == ids[i])) before = index[ids[i]];
         next = before == none ? next : before + 1;
         Parent parent{&set, static_cast<std::uint32_t>(i), ids[i], before, record_.h, record_.h, record_.h};
         if (before != none) {
-            // Of the whole step, in double precision.
+            // The time of the whole step, in double precision.
             parent.begin = !own || (*own)[before] == h ? 0 : record_.h - double((*own)[before]);
         } else {
             ++without_path_;

@@ -1,10 +1,10 @@
-// The paths of points through a step, from which others are born.
+// The paths of points through a step, along which others are born.
 //
 // Between the states before and after the step, and at contacts within it, a point is on the cubic Hermite curve
 //
 //   P(u) = P0 + u (T v0 + u (3d - T (2 v0 + v1) + u (T (v0 + v1) - 2d)))       u from 0 to 1 in the time T, d = P1 - P0
 //
-// which is its path exactly where its acceleration is linear in time: a parabola between two bounces.
+// which is its exact path if its acceleration is linear in time, e.g. a parabola between two bounces.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +22,15 @@ public:
 
     // Times are in s since the beginning of the step.
     struct Parent {
-        const PointSet* set;  // that has its values
-        std::uint32_t place;  // in it
+        const PointSet* set;  // has the parent's values
+        std::uint32_t place;  // index in it
         std::int64_t id;
-        std::uint32_t before;   // in the record's `before`; none where it was not there
+        std::uint32_t before;   // index in the record's `before`; none if it did not exist then
         double begin, end;      // of its life in this step
-        double path_end;        // when it is where the set says
-        std::uint32_t hit = 0;  // its hits in the record: the first, and how many
+        double path_end;        // time at which it has the position in the set
+        std::uint32_t hit = 0;  // its hits in the record: index of the first, and number
         std::uint32_t hits = 0;
-        bool takes_part = true;  // is in the group
+        bool takes_part = true;  // belongs to the group
         bool is_alive = true;
         bool is_new = false;  // born in this step
     };
@@ -39,11 +39,11 @@ public:
         Vec3d P, v;  // m, m/s
     };
 
-    // The curve of a parent between two of these states.
+    // The curve of a parent between two consecutive states.
     struct Piece {
         double begin, end;  // s
         Vec3d c0, c1, c2, c3;
-        Vec3d v;  // of a piece without length
+        Vec3d v;  // for a piece of zero length
 
         bool holds(double t) const { return begin <= t && t < end; }
         Moment at(double t) const
@@ -55,7 +55,7 @@ public:
         }
     };
 
-    // living: the points after the step; those of the record that died in it follow. Both outlive this.
+    // living: the points after the step; the points of the record that died in it follow. Both must outlive this.
     ParentPaths(const PointSet& living, const StepRecord& record, const std::string& group);
 
     std::size_t size() const { return parents_.size(); }
@@ -65,11 +65,11 @@ public:
     const PointSet& living() const { return living_; }
     double time_of(const LoggedHit& hit) const { return hit.time - (record_.time - record_.h); }
 
-    // The piece of its path at a time. From any thread.
+    // Returns the piece of the path at a time. May be called from any thread.
     Piece piece(const Parent& parent, double t) const;
     Moment at(const Parent& parent, double t) const { return piece(parent, t).at(t); }
 
-    // Points that were not there before the step, and are at one place all through it.
+    // Number of points that did not exist before the step and keep one position throughout it.
     std::size_t without_path() const { return without_path_; }
 
 private:

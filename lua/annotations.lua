@@ -1,7 +1,7 @@
--- Annotations of the graph language that no declaration of a node or a maker gives: values, kernels, rapid.math.
+-- Annotations of the graph language that no node or maker declaration provides: values, kernels, rapid.math.
 --
--- `rapid nodes --annotations` writes lua/rapid.d.lua from the next line on. It replaces --@makers by the functions of
--- all makers except those that are declared here, --@point_fields by a point's attributes, and --@nodes by the nodes.
+-- `rapid nodes --annotations` writes lua/rapid.d.lua from the next line on. It replaces --@makers with the functions of
+-- all makers except those declared here, --@point_fields with a point's attributes, and --@nodes with the nodes.
 ---@meta rapid
 -- The graph language, for editors with the Lua language server. Written by `rapid nodes --annotations`; do not edit.
 
@@ -24,10 +24,10 @@ function Vec3:dot(w) end
 function Vec3:cross(w) end
 ---@return number
 function Vec3:length() end
----Of length 1; zero stays zero.
+---Returns it with length 1; zero stays zero.
 ---@return rapid.Vec3
 function Vec3:normalized() end
----This at t = 0, w at t = 1.
+---Interpolates from this (t = 0) to w (t = 1).
 ---@param w rapid.Vec3
 ---@param t number
 ---@return rapid.Vec3
@@ -116,19 +116,19 @@ local Mesh = {}
 ---@param motion rapid.Motion
 ---@return rapid.Mesh
 function Mesh:transform(motion) end
----To the nearest face, metres; in kernels.
+---Distance to the nearest face, metres; in kernels.
 ---@param P rapid.Vec3
 ---@return number
 function Mesh:distance(P) end
----Away from the nearest face; in kernels.
+---Direction away from the nearest face; in kernels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Mesh:gradient(P) end
----Of the nearest face, m/s; in kernels.
+---Velocity of the nearest face, m/s; in kernels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Mesh:velocity(P) end
----The nearest place; or, with a name, what the mesh has there of that attribute; in kernels.
+---The nearest position; with a name, the value of that attribute there; in kernels.
 ---@param P rapid.Vec3
 ---@param attribute? string
 ---@return any
@@ -136,19 +136,19 @@ function Mesh:closest(P, attribute) end
 
 ---@class rapid.Shape
 local Shape = {}
----Metres, negative inside.
+---Signed distance, metres, negative inside.
 ---@param P rapid.Vec3
 ---@return number
 function Shape:distance(P) end
----Out of the shape.
+---Direction out of the shape.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:gradient(P) end
----Of what is there of the shape, m/s.
+---Velocity of the shape there, m/s.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:velocity(P) end
----The nearest place of the surface; of a level set within its band.
+---The nearest position on the surface; for a level set within its band.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:closest(P) end
@@ -184,7 +184,7 @@ function Fog:write(path, options) end
 
 ---@class rapid.Grid  of vectors
 local Grid = {}
----Between the voxels' values.
+---Interpolates between voxels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Grid:sample(P) end
@@ -218,7 +218,7 @@ function rapid.param(name, default, doc) end
 ---@return rapid.Attribute
 function rapid.attr(name) end
 
----A shape, a mesh or points that the program offers which has opened the scene.
+---A shape, a mesh or points offered by the program that has opened the scene.
 ---@param name string
 ---@return any
 function rapid.host(name) end
@@ -269,7 +269,7 @@ function rapid.points.along(curve, options) end
 ---@return number
 function rapid.math.clamp(x, lo, hi) end
 
----x carried from [lo, hi] to [from, to], and held at its ends.
+---Maps x from [lo, hi] to [from, to], clamped to its ends.
 ---@param x number
 ---@param lo number
 ---@param hi number
@@ -285,7 +285,7 @@ function rapid.math.fit(x, lo, hi, from, to) end
 ---@return number
 function rapid.math.smoothstep(lo, hi, x) end
 
----A number in [-1, 1] that changes smoothly in place and time.
+---A number in [-1, 1] that changes smoothly with position and time.
 ---@param P rapid.Vec3
 ---@param time? number
 ---@param octaves? integer
@@ -326,7 +326,7 @@ function Point:leave(group) end
 function Point:within(group) end
 ---Removes the point when its node ends.
 function Point:kill() end
----In [0, 1): the point's own number k, the same in every frame, or with the frame another in each.
+---The point's own random number k in [0, 1): the same in every frame, or a new one in each if given the frame.
 ---@param k number
 ---@param frame? rapid.Frame|number
 ---@return number

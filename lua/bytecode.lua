@@ -1,26 +1,26 @@
 -- Analysis of a kernel: its effects, read from its bytecode before it runs.
 --
 -- An abstract interpretation over the instructions of a function: each register holds the kernel's point, a constant
--- string, a method of the point, a value that is shared with other points (it came from an upvalue or a global), or
--- something unknown. Where two paths meet, unequal values become unknown (or stay shared). The result:
+-- string, a method of the point, a value shared with other points (it came from an upvalue or a global), or something
+-- unknown. If two paths that meet hold unequal values, the result is unknown (or stays shared). The result:
 --
 --   reads, writes    names indexed on the point itself
---   may              names indexed anywhere in helpers, and on values that may be the point; of a function of the whole
---                    set also its texts, which may name attributes
---   joins, asks      groups that it joins or leaves, and that it asks for, where named by constants; in helpers these
---                    are the calls of a method `join` of anything
---   computes_names   whether it indexes the point, or a value that may be the point, by a computed name
---   asks_places      whether it may read a point's `index`: whether it has this name, or indexes an unknown value by a
+--   may              names indexed anywhere in helpers, and on values that may be the point; for a function of the
+--                    whole set also its strings, which may name attributes
+--   joins, asks      groups that it joins or leaves, and that it queries, if constants name them; in helpers, calls of
+--                    a method `join` of any object
+--   computes_names   true if it indexes the point, or a value that may be the point, by a computed name
+--   asks_places      true if it may read a point's `index`: it uses this name, or indexes an unknown value by a
 --                    computed name
 --   calls            names on the point itself that it calls like methods
---   kills            whether `kill` is called or could be
---   reads_points     of a function of the whole set: whether it may do more with its points than to name points.detail
+--   kills            true if `kill` is called or could be
+--   reads_points     for a function of the whole set: true if it may use its points for more than points.detail
 --   vectors          attributes to which it assigns vec3(...) or quat(...), with the number of components
 --   stores           places (line, source, message) where it writes upvalues, globals, shared tables or parameters
 --
 -- Helpers are the functions that it can reach through upvalues, globals and tables of them, metatables included, as
--- they are when the graph file has run. Their arguments and results are followed, too. Values in tables that a
--- kernel makes are not followed: `rapid check --races` finds these by running it.
+-- they are after the graph file has run. Their arguments and results are followed, too. Values in tables that a kernel
+-- makes are not followed: `rapid check --races` finds these by running it.
 local bit = require "bit"
 local protected = require "protected"
 local util = require "jit.util"
@@ -34,7 +34,7 @@ for op = 0, #vmdef.bcnames / 6 - 1 do
   names[op] = vmdef.bcnames:sub(op * 6 + 1, op * 6 + 6):gsub("%s", "")
 end
 
--- Each writes no register although its first operand is one.
+-- Instructions that write no register although their first operand is one.
 local conditional = {}
 for _, name in ipairs { "ISLT", "ISGE", "ISLE", "ISGT", "ISEQV", "ISNEV", "ISEQS", "ISNES", "ISEQN", "ISNEN", "ISEQP",
                         "ISNEP", "ISTC", "ISFC", "IST", "ISF" } do
@@ -42,9 +42,9 @@ for _, name in ipairs { "ISLT", "ISGE", "ISLE", "ISGT", "ISEQV", "ISNEV", "ISEQS
 end
 
 local point = { kind = "point" }
-local shared = { kind = "shared" } -- of unknown value
-local parameters = { kind = "shared", value = {} } -- of a Lua node
-local set = { kind = "set" } -- all points, of a :detail
+local shared = { kind = "shared" } -- the value is unknown
+local parameters = { kind = "shared", value = {} } -- the parameters of a Lua node
+local set = { kind = "set" } -- all points, in a :detail function
 
 local function join(a, b)
   if a == b then return a end
@@ -58,7 +58,7 @@ local function string_constant(f, index)
   return type(value) == "string" and value or nil
 end
 
--- The table or function behind a shared value's field, without running metamethods.
+-- Returns the table or function in a field of a shared value, without running metamethods.
 local function field(value, name, depth)
   if type(value) ~= "table" or name == nil then return nil end
   local found = rawget(value, name)
@@ -72,8 +72,9 @@ local analyse_function
 -- The results of vec3 and quat, by their number of components.
 local vectors = { [3] = { kind = "vector", size = 3 }, [4] = { kind = "vector", size = 4 } }
 
--- The value of a function's upvalue: { kind = "shared", value }, or nil where it is a local of the kernel around a
--- closure. A closure that the kernel makes does not exist yet; its upvalues are told from the kernel's own by name.
+-- Returns the value of a function's upvalue: { kind = "shared", value }, or nil if it is a local of the kernel that
+-- encloses a closure. A closure that the kernel makes does not exist yet; its upvalues are distinguished from the
+-- kernel's own by name.
 local function upvalue_of(f, place, outer)
   if type(f) == "function" then
     local _, value = getupvalue(f, place + 1)
@@ -82,7 +83,7 @@ local function upvalue_of(f, place, outer)
   return outer and outer(util.funcuvname(f, place))
 end
 
--- The same by name, for the closures that f makes.
+-- Returns the same lookup by name, for the closures that f makes.
 local function upvalues_by_name(f, outer)
   return function(name)
     for place = 0, util.funcinfo(f).upvalues - 1 do
@@ -92,7 +93,7 @@ local function upvalues_by_name(f, outer)
   end
 end
 
--- Functions of Lua that write into an argument, by its place from 1.
+-- Lua functions that write into an argument, with the argument's position from 1.
 local writers = {
   [table.insert] = { "table.insert", 1 }, [table.remove] = { "table.remove", 1 },
   [protected.sort] = { "table.sort", 1 },
@@ -102,25 +103,26 @@ local writers = {
 -- Native functions that return their arguments, or elements of them. `pairs` and `next` are the sandbox's.
 local handing_on = { [ipairs] = true, [unpack] = true, [select] = true, [assert] = true, [setmetatable] = true }
 
--- What a call of f writes into: a name and the place of that argument from 1; nil for other functions.
+-- Returns the name of a writing function and the position from 1 of the argument that a call of f writes into, or nil
+-- for other functions.
 local function writer_of(f, env)
   if f == rawget(env, "setmetatable") then return { "setmetatable", 1 } end
   return writers[f]
 end
 
--- All other native functions that graph code finds; any further one is an iterator that it has made.
+-- All other native functions that graph code can reach; any further one is an iterator that it has made.
 local library = {}
 for _, functions in ipairs { _G, string, math, table, coroutine, bit } do
   for _, f in pairs(functions) do library[f] = true end
 end
 
--- Whether a function hands on its arguments; those of the sandbox are written in Lua, so they are known by name.
+-- Returns true if a function passes its arguments on. The sandbox's own are written in Lua, so they are known by name.
 local function hands_on(f, env)
   return handing_on[f] or f == rawget(env, "pairs") or f == rawget(env, "next") or f == rawget(env, "setmetatable")
 end
 
--- The functions that a shared table holds, and those of its metatable: indexing it by a name that is not known, going
--- over it, or an operator may call them.
+-- Analyses the functions in a shared table and in its metatable: an index by an unknown name, an iteration or an
+-- operator may call them.
 local function analyse_inside(value, found)
   if type(value) ~= "table" or found.inside[value] then return end
   found.inside[value] = true
@@ -131,8 +133,8 @@ local function analyse_inside(value, found)
   end
 end
 
--- An instruction, and the facts known there: f and pc; the operands a, b, c, d; the registers; what has been
--- found; `outer` as analyse_function() has it; the call that is being followed.
+-- An instruction and the facts known there: f and pc; the operands a, b, c, d; the registers; the findings so far;
+-- `outer` as in analyse_function(); the call that is being followed.
 local At = {}
 At.__index = At
 
@@ -153,14 +155,14 @@ function At:refuse_store(what)
   self:refuse(("%s %s; %s"):format(self.found.subject, what, self.found.remedy))
 end
 
--- The line of the first mention of a name, and its file.
+-- Records the line and file of the first mention of a name.
 function At:mention(map, name)
   map[name] = map[name] or self:line()
   local places = self.found.places
   places[name] = places[name] or { line = self:line(), source = util.funcinfo(self.f).source }
 end
 
--- Of object.key or object[key] with a constant.
+-- Reads object.key or object[key] with a constant key.
 function At:read_field(object, key)
   local found = self.found
   if key == "index" then found.asks_places = true end
@@ -179,7 +181,7 @@ function At:read_field(object, key)
   if found.methods[key] then return { kind = "method", value = key, of_unknown = true } end
 end
 
--- Of object[key] by a number, or by a value that varies: `key` is the number, if there is one.
+-- Reads object[key] with a number or a varying value as key; `key` is the number, if it is known.
 function At:read_element(object, key)
   if object and object.kind == "shared" then
     analyse_inside(object.value, self.found)
@@ -193,16 +195,16 @@ function At:write_element(object)
   end
 end
 
--- Operands of an instruction, by their kinds in vmdef.bcmode.
+-- Kinds of operands in vmdef.bcmode.
 local variable, base = 3, 2
 
 local returns = { RET = true, RET1 = true, RETM = true }
 
--- Whether the instruction does more with the set than to copy it into another register, or to find points.detail.
+-- Returns true if the instruction does more with the set than copy it into another register or find points.detail.
 function At:reads_set(name, mode)
   if name == "MOV" or name == "TGETS" and self:string_constant(self.c) == "detail" then return false end
   local regs = self.regs
-  local has_d = band(rshift(mode, 3), 15) == 0 -- one operand in place of b and c
+  local has_d = band(rshift(mode, 3), 15) == 0 -- one operand instead of b and c
   for _, operand in ipairs { { band(mode, 7), self.a }, { band(rshift(mode, 3), 15), self.b },
                              { band(rshift(mode, 7), 15), has_d and self.d or self.c } } do
     local kind, slot = operand[1], operand[2]
@@ -220,10 +222,10 @@ function At:forget(first, last)
   for slot = first, last do self.regs[slot] = nil end
 end
 
--- By opcode: what an instruction does. It returns the value of its first operand's register, or of its call.
+-- Effects of instructions by opcode. An effect returns the value of its first operand's register, or of its call.
 local effects = {}
 
--- The same effect for several opcodes.
+-- Sets the same effect for several opcodes.
 local function on(names_of_ops, effect)
   for _, name in ipairs(names_of_ops) do effects[name] = effect end
 end
@@ -324,7 +326,7 @@ function effects.FNEW(at)
   return { kind = "closure", value = child, outer = outer }
 end
 
--- By name: what a method of the point finds out about the group that it is given.
+-- Handlers by method name: each records how a method of the point uses the group passed to it.
 local group_calls = {}
 
 function group_calls.join(at, callee, group)
@@ -340,7 +342,7 @@ function group_calls.within(at, _, group)
   if group and group.kind == "string" then at.found.asks[group.value] = true else at.found.asks_any = true end
 end
 
--- A shared function, called with these shared values. Returns its result, if all points share it.
+-- Follows a call of a shared function with these shared values. Returns its result if all points share it.
 local function call_shared(at, called, given, arguments)
   local found = at.found
   local writer = writer_of(called, found.env)
@@ -359,10 +361,11 @@ local function call_shared(at, called, given, arguments)
   return result
 end
 
--- A call of `callee`, whose arguments lie in registers from `first` on. Returns its result, if all points share it.
+-- Follows a call of `callee`, whose arguments lie in registers from `first` on. Returns its result if all points share
+-- it.
 local function call_value(at, callee, first, arguments)
   local regs = at.regs
-  local given = {} -- arguments that all points share, by place from 0
+  local given = {} -- arguments that all points share, by position from 0
   for place = 0, arguments - 1 do
     local argument = regs[first + place]
     if argument and argument.kind == "shared" then given[place] = argument end
@@ -411,7 +414,7 @@ function effects.VARG(at)
   at:forget(at.a, at.a + 250)
 end
 
--- Of pairs(t): the iterator, t and the last key lie before it.
+-- pairs(t): the three registers before hold the iterator, t and the last key.
 on({ "ITERC", "ITERN" }, function(at)
   local map = at.regs[at.a - 2]
   at:forget(at.a, at.a + 250)
@@ -433,15 +436,15 @@ function effects.RETM(at) return_values(at, at.a + 250) end
 
 local tail_calls = { CALLT = true, CALLMT = true }
 
--- A shared function that is passed on, or kept in a local, may be called by whoever gets it. So may those of a table's
--- metatable, by an operator.
+-- Follows a shared function that is passed on or stored in a local, since its receiver may call it. The functions of a
+-- table's metatable are followed too, since an operator may call them.
 local function follow(value, found)
   if not value or value.kind ~= "shared" then return end
   if type(value.value) == "function" then analyse_function(value.value, found) end
   if type(value.value) == "table" and debug.getmetatable(value.value) then analyse_inside(value.value, found) end
 end
 
--- The places of the instructions that may come next.
+-- Returns the positions of the instructions that may come next.
 local function successors(name, pc, target)
   if name:find "^RET" or tail_calls[name] then return {} end
   if name == "JMP" or name == "ISNEXT" or name == "UCLO" then return { target } end
@@ -472,9 +475,9 @@ local function step(f, pc, regs, found, outer, following)
   return successors(name, pc, pc + at.d - 0x7fff)
 end
 
-local most_calls = 8 -- of one helper that are told apart by their shared values; further ones are merged
+local most_calls = 8 -- distinguished per helper by their shared values; further ones are merged
 
--- The call of f with these shared values, { given, returned }, and whether it is new.
+-- Returns the call of f with these shared values, { given, returned }, and true if it is new.
 local function call_of(f, given, found)
   local calls = found.calls_of[f] or {}
   found.calls_of[f] = calls
@@ -496,8 +499,8 @@ local function call_of(f, given, found)
   return call, true
 end
 
--- f: a function, or the prototype of one that a kernel makes; given: its shared arguments, by place from 0;
--- outer: for a prototype, finds upvalues of the functions around it by name. Returns the value that f returns, if all
+-- Analyses f, a function or the prototype of one that a kernel makes. given: its shared arguments, by position from 0;
+-- outer: for a prototype, finds upvalues of the enclosing functions by name. Returns the value that f returns if all
 -- points share it.
 function analyse_function(f, found, given, outer)
   local info = util.funcinfo(f)
@@ -547,12 +550,12 @@ local remedies = {
     "keep it in points.detail.NAME, in a :detail",
 }
 
--- Where a kernel may keep what it has kept in a wrong place.
+-- Returns the advice for a kernel that stores a value where it must not.
 local function to_remember(of_a_point)
   return of_a_point and remedies.point or remedies.set
 end
 
--- env: the environment in which the globals of f live; remedy, subject: of messages.
+-- env: the environment of f's globals; remedy, subject: parts of messages.
 local function nothing_found(env, remedy, subject, methods)
   local found = {
     reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
@@ -567,7 +570,7 @@ local function nothing_found(env, remedy, subject, methods)
   return found
 end
 
--- env: the environment in which the kernel's globals live; of_a_point: the kernel's first parameter is a point;
+-- Analyses a kernel. env: the environment of the kernel's globals; of_a_point: the kernel's first parameter is a point;
 -- point_names: the table of the host.
 local function analyse(kernel, env, of_a_point, point_names)
   local info = util.funcinfo(kernel)
@@ -575,7 +578,7 @@ local function analyse(kernel, env, of_a_point, point_names)
     error("the kernel is a function of Lua's own library; it must be one of the scene's, which may call it", 0)
   end
   local found = nothing_found(env, to_remember(of_a_point), "the kernel", point_names.methods)
-  -- Behind the point and the frame come the parameters of a Lua node, which all points share.
+  -- The parameters of a Lua node follow the point and the frame. All points share them.
   found.of_the_set = not of_a_point
   found.reads_points = found.of_the_set and util.funcinfo(kernel).isvararg or false
   analyse_function(kernel, found, { [0] = of_a_point and point or set, [2] = parameters })
@@ -585,15 +588,15 @@ local function analyse(kernel, env, of_a_point, point_names)
   return found
 end
 
--- Where a function of the frame keeps something for its next call: the `stores` of analyse().
--- cache: what the program calls the setting for snapshots.
+-- Returns the positions at which a function of the frame stores something for its next call: the `stores` of analyse().
+-- cache: the program's name for the setting of snapshots.
 local function remembers(f, env, cache)
   local found = nothing_found(env, remedies.frame:format(cache), "a function of the frame", {})
   analyse_function(f, found)
   return { stores = found.stores }
 end
 
--- A constant, as text: equal for equal ones in two states. Tables of constants hold no others.
+-- Returns a constant as a string, equal for equal constants in two states. Tables of constants hold no other values.
 local function constant_text(value)
   if type(value) == "number" then return ("%.17g"):format(value) end
   if type(value) ~= "table" then return ("%s %d:%s"):format(type(value), #tostring(value), tostring(value)) end
@@ -603,9 +606,9 @@ local function constant_text(value)
   return "{" .. table.concat(parts, ",") .. "}"
 end
 
--- All that the body of a file and the functions in it do, before it runs: a list of the lines where they begin and
--- their instructions and constants, as text, by turns, the body's first. Without the numbers of lines: a comment is no
--- other program.
+-- Returns everything that the body of a file and its functions do, before it runs: a list that alternates the lines
+-- where they begin with their instructions and constants as strings, starting with the body. Line numbers inside are
+-- left out, since a comment does not change the program.
 local function code_of(body)
   local list = {}
   local function add(f)
@@ -626,8 +629,8 @@ local function code_of(body)
   return list
 end
 
--- Instructions and constants, as text: equal for the same function in two states. Tables of constants are left out:
--- their order differs from state to state.
+-- Returns instructions and constants as a string, equal for the same function in two states. Tables of constants are
+-- left out: their order differs from state to state.
 local function fingerprint(f)
   local info = util.funcinfo(f)
   local words = { ("%s:%d"):format(info.source, info.linedefined) }
@@ -641,7 +644,7 @@ local function fingerprint(f)
   return table.concat(words, " ")
 end
 
--- The line of the last call in tail position, `return f()`: such a call leaves no frame behind that would tell it.
+-- Returns the line of the last tail call, `return f()`: such a call leaves no stack frame that would show it.
 local function tail_call_line(f)
   for pc = util.funcinfo(f).bytecodes - 1, 1, -1 do
     local name = names[band(util.funcbc(f, pc), 0xff)]

@@ -1,12 +1,12 @@
--- Values in messages. Graph code reads messages too (pcall), so no address may be in one.
+-- Formats values for messages. Graph code reads messages too (pcall), so they contain no addresses.
 local describe = {}
 
--- "nil", "a number", "a table"
+-- Returns "nil", "a number", "a table".
 function describe.kind(value)
   return value == nil and "nil" or "a " .. type(value)
 end
 
--- The frame and the step are taken for numbers: they are shown with one that they have.
+-- Formats frames and steps, which are easily mistaken for numbers, with one of their fields.
 local function text_of_cdata(value)
   local text = tostring(value)
   if text:find "^frame " then return "the frame (frame.time is a number)" end
@@ -14,7 +14,7 @@ local function text_of_cdata(value)
   return text
 end
 
--- A value as it is written, where it is short; any other by its type.
+-- Returns a short value as it is written, and any other by its type.
 function describe.value(value)
   local kind = type(value)
   if kind == "string" then return ("%q"):format(value) end
@@ -23,14 +23,14 @@ function describe.value(value)
   return describe.kind(value)
 end
 
--- The same, of a value that a formula is given: a number or a vec3 as it is written.
+-- Returns an operand of a formula: a number or a vec3 as it is written, any other by its type.
 function describe.operand(value)
   local kind = type(value)
   if kind == "number" or kind == "cdata" then return describe.value(value) end
   return describe.kind(value)
 end
 
--- A value that was used as a name.
+-- Returns a value that was used as a name.
 function describe.name(value)
   return type(value) == "string" and value or describe.value(value)
 end

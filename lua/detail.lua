@@ -4,16 +4,16 @@
 --   points:add { P = vec3(0, 1, 0), heat = 3 }      appended when the function ends; also `dt`, the time in seconds for
 --                                                   which it moves in this frame, and `group`, a name or several
 --   points:kill(i)                                  removed when the function ends
---   points:neighbours(i, radius)                    places of the points within the radius, in order, without i, by
---                                                   the positions at the first search with this radius
+--   points:neighbours(i, radius)                    indices of the points within the radius, in order, without i,
+--                                                   by the positions at the first search with this radius
 --   points:sum "heat", :mean, :min, :max, :bounds() two corners
 --   points:sort "heat", points:sort(function(p) return p.P.y end)
 --   points.detail.total = 3                         a value that kernels read as frame.detail.total
---   points.events.hits, .deaths, .births            lists of what happened in the last step, { id =, P =, time =, ... }
+--   points.events.hits, .deaths, .births            lists of the last step's events, { id =, P =, time =, ... }
 --
--- The host gives a column's memory when it is first read, and again when it is first written: until then other sets may
--- share it. Views of points are invalid when the function has ended: each knows the number of its run. The types and
--- functions are made once, as compiled code and FFI types are never freed.
+-- The host provides a column's memory when it is first read, and again when it is first written: until then other sets
+-- may share it. Views of points are invalid after the function has ended: each knows the number of its run. The types
+-- and functions are made once, as compiled code and FFI types are never freed.
 local describe = require "describe"
 local ffi = require "ffi"
 local vector = require "vec3"
@@ -46,7 +46,7 @@ end
 local function load_number(data, k) return tonumber(data[k]) end
 local function store_number(data, k, x) data[k] = x end
 
--- By type: the pointer, how a value is checked, and how it is read and written at k scalars from the first.
+-- Types of columns: the pointer, the check of a value, and how to read and write it at k scalars from the first.
 local types = {
   float = {
     pointer = "float*", scalars = 1, load = load_number, store = store_number,
@@ -85,7 +85,7 @@ local types = {
   },
 }
 
--- texts: those of attributes (lua/text.lua).
+-- texts: the strings of attributes (lua/text.lua).
 local function string_type(texts)
   return {
     pointer = "uint32_t*", scalars = 1,
@@ -99,16 +99,16 @@ end
 
 local over = "points can't be used outside the :detail function that they were given to"
 
--- native: the host's functions, all about the set that the function runs on; rand: as kernels draw; point_names: the
--- table of the host; texts: those of attributes (lua/text.lua). Returns run(f, frame, params, size, random, details):
--- the places (from 0) of the killed, and the details.
+-- native: the host's functions, which act on the set that the function runs on; rand: the random function of kernels;
+-- point_names: the table of the host; texts: the strings of attributes (lua/text.lua). Returns run(f, frame, params,
+-- size, random, details), which returns the indices (from 0) of the killed points, and the details.
 local function make(native, rand, point_names, texts)
   local of_texts = string_type(texts)
   local read_only = point_names.read_only
-  -- Of the run: one at a time.
+  -- State of the current run. Only one runs at a time.
   local columns, groups, killed, added, size, frame, random, details
-  local happened -- what points.events has, where it has been asked for
-  local serial = ffi.cast("const int32_t*", native.serial) -- of the run; another one as soon as it has ended
+  local happened -- the contents of points.events, once requested
+  local serial = ffi.cast("const int32_t*", native.serial) -- number of the run; changes as soon as it has ended
 
   -- Fields hide attributes of the same name from __index, so they have unlikely names.
   local point_view = ffi.typeof "struct { const int32_t rapid_place, rapid_serial; }"
@@ -118,7 +118,7 @@ local function make(native, rand, point_names, texts)
     local column = columns[name]
     if column and (column.writable or not writable) then return column end
     if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe.value(name)), 0) end
-    local data, stride, kind = native.column(name, writable) -- says which attributes there are
+    local data, stride, kind = native.column(name, writable) -- raises an error that lists the attributes
     local about = kind == "string" and of_texts or types[kind]
     column = {
       data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
@@ -132,19 +132,19 @@ local function make(native, rand, point_names, texts)
     local group = groups[name]
     if group and (group.writable or not writable) then return group end
     local data, stride = native.group(name, writable)
-    if not data then return nil end -- nobody is in it yet
+    if not data then return nil end -- the group has no members yet
     group = { data = ffi.cast("uint8_t*", data), stride = stride, writable = writable }
     groups[name] = group
     return group
   end
 
   local function load(name, i)
-    if name == "dt" and not native.has "dt" then return frame.dt end -- nobody is newborn
+    if name == "dt" and not native.has "dt" then return frame.dt end -- no point is newborn
     local column = column_of(name, false)
     return column.load(column.data, i * column.stride)
   end
 
-  -- Checked before any memory is touched, as scripts can call methods with any value.
+  -- Checked before any memory is touched, since scripts can call methods with any value.
   local function place_in(p, method)
     if not istype(point_view, p) then
       error(("p:%s is called on a point: with a colon, not a dot"):format(method), 0)
@@ -210,7 +210,7 @@ local function make(native, rand, point_names, texts)
     return i - 1
   end
 
-  -- Folds a column's values, in order.
+  -- Folds a column's values in order.
   local function fold(name, empty, start, step)
     local column = column_of(name, false)
     if column.kind == "quat" or column.kind == "string" then
@@ -258,7 +258,7 @@ local function make(native, rand, point_names, texts)
     check_set(points, "kill")
     killed[place_of("points:kill", i)] = true
   end
-  -- A list of numbers stands for a vector.
+  -- Accepts a list of numbers as a vector.
   local function vector_of(column, value)
     if type(value) ~= "table" then return value end
     local n = column.kind == "vec3" and 3 or column.kind == "quat" and 4
@@ -295,7 +295,7 @@ local function make(native, rand, point_names, texts)
       end
       names[#names + 1] = name
     end
-    table.sort(names) -- the first wrong one, the same each time
+    table.sort(names) -- so that the first wrong one is always the same
     for _, name in ipairs(names) do
       if name == "dt" then
         copy.dt = check_time(values.dt)
@@ -333,7 +333,7 @@ local function make(native, rand, point_names, texts)
         error(("points:sort: the key of point %d is %s; it must be a number"):format(i, describe.value(keys[i])), 0)
       end
     end
-    check_set(points, "sort") -- a key function that yields may come back when the run has ended
+    check_set(points, "sort") -- a key function that yields may be resumed after the run has ended
     table.sort(order, function(a, b)
       if keys[a] ~= keys[b] then return keys[a] < keys[b] end
       return a < b
@@ -344,7 +344,7 @@ local function make(native, rand, point_names, texts)
     for i = 1, size do killed[i - 1] = before[order[i] - 1] end
   end
 
-  -- points.detail
+  -- The view behind points.detail.
   local values_view = newproxy(true)
   local of_values = getmetatable(values_view)
   of_values.__metatable = false
@@ -359,7 +359,7 @@ local function make(native, rand, point_names, texts)
     details[name] = value
   end
 
-  -- "add, bounds, detail, ... and sum"
+  -- Returns "add, bounds, detail, ... and sum".
   local function names_of_set()
     local names = { "detail", "events" }
     for name in pairs(set) do names[#names + 1] = name end

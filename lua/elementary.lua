@@ -1,11 +1,11 @@
--- Rapid's own functions of `math`. They give the same bits on any processor, interpreted, compiled and in lanes, and
--- replace LuaJIT's before any other file is read.
+-- Rapid's own functions of `math`. Their results are bit-identical on any processor, interpreted, compiled and in
+-- lanes. They replace LuaJIT's before any other file is read.
 --
 -- LuaJIT's interpreter and its compiled code give different results for squares, for ceil between -1 and -0.5, and for
 -- min and max of NaN or of zeros of both signs. The C library's functions differ between its versions, and between
 -- processors with and without fused multiplication.
 --
--- Vararg for the reason that vec3.lua gives.
+-- The functions are vararg for the reason given in vec3.lua.
 local ffi = require "ffi"
 
 local floor, select, tonumber, type = math.floor, select, tonumber, type
@@ -37,7 +37,7 @@ local function of_two(name, own)
   end
 end
 
--- math.log, with or without a base.
+-- Returns math.log, with or without a base.
 local function logarithm(own, own_of_base)
   return function(...)
     local x, base = ...
@@ -52,8 +52,8 @@ local function logarithm(own, own_of_base)
   end
 end
 
--- math.min or math.max: NaN if one of the numbers is NaN, and zeros become +0. In these cases LuaJIT's own functions
--- return the second operand, and compiled code swaps operands.
+-- Returns math.min or math.max: NaN if one of the numbers is NaN, and zeros become +0. In these cases LuaJIT's own
+-- functions return the second operand, and compiled code swaps operands.
 local function extreme(name, of_lua)
   local function any_number(...)
     local x, y = ...
@@ -77,7 +77,7 @@ local function ceiling(...)
   return -floor(-x)
 end
 
--- math.pow, and the operator ^ with its errors (lua/power_operator.lua).
+-- Returns math.pow, which is also the operator ^ with its errors (lua/power_operator.lua).
 local function power(own)
   return function(...)
     local x, y = ...
@@ -86,7 +86,7 @@ local function power(own)
       if type(y) == "string" then y = tonumber(y) or y end
       local wrong = x
       if type(x) == "number" then wrong = y end
-      if type(wrong) == "table" or type(wrong) == "cdata" then return (x ^ y) end -- by its metatable
+      if type(wrong) == "table" or type(wrong) == "cdata" then return (x ^ y) end -- handled by its metatable
       if type(wrong) ~= "number" then
         error(("attempt to perform arithmetic on a %s value"):format(type(wrong)), 2)
       end
@@ -97,8 +97,8 @@ local function power(own)
   end
 end
 
--- functions1, functions2: light userdata of double (*)(double) and of double (*)(double, double), by their names in
--- Lua; library: the table `math`.
+-- Replaces functions in `library`, the table `math`. functions1, functions2: light userdata of double (*)(double) and
+-- of double (*)(double, double), by their names in Lua.
 local function replace(functions1, functions2, library)
   local own = {}
   for name, address in pairs(functions2) do

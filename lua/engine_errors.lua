@@ -1,15 +1,15 @@
--- What Rapid says in place of LuaJIT's own messages. Nothing but this table knows how LuaJIT words them.
+-- Rapid's replacements for LuaJIT's own messages. Only this table knows how LuaJIT words them.
 --
--- full_stack: the stack is full when the error is raised, and leaves no room for a trace. Of `endings` the text comes
--- after LuaJIT's own, which ends so.
+-- full_stack: the stack is full when the error is raised, and leaves no room for a trace. The strings of `endings` are
+-- appended to LuaJIT messages that end with their key.
 
 local function added(text, remedy) return { message = ("%s; %s"):format(text, remedy) } end
 
 local no_clock = "a script has neither a clock nor an environment: frame.time is the time, rapid.param takes values"
 local no_chance = "math.random is not there, as each run would differ: p:rand(k) of a point is the same in every run"
 
--- memory_limit: the text for a state that needs more memory than it may have. output: what the program calls the
--- setting for files of frames.
+-- memory_limit: the message for a state that exceeds its memory limit. output: the program's name for the setting of
+-- output files.
 return function(memory_limit, output)
   local no_files = ("a script has no files: rapid.points.read and rapid.mesh.read read some, :write and %s write them")
     :format(output)

@@ -1,5 +1,5 @@
--- The host runs this first in each of its states: it makes the environment of graph code, and returns the functions
--- that the host calls.
+-- The host runs this first in each of its states. It makes the environment of graph code and returns the functions that
+-- the host calls.
 --
 -- The chunk is called with the host's native functions and returns a table of entry points.
 local native = ...
@@ -23,17 +23,17 @@ local attribute_texts = require "text"
 local vector = require "vec3"
 local ffi = require "ffi"
 
--- Runs the body of a file. The place of a tail call that ends it is kept for errors, as it leaves no stack frame.
+-- Runs the body of a file. The position of a tail call that ends it is stored for errors, as it leaves no stack frame.
 local function run(chunk, name, ...)
   if native.keeps_state then native.add_code(name:gsub("^@", ""), bytecode.code_of(chunk)) end
   return native.run(chunk, (name:gsub("^@", "")), bytecode.tail_call_line(chunk), ...)
 end
 
--- Rapid's own modules are not on the search path of graph code: it loads files beside the graph, or on RAPID_PATH.
+-- Rapid's own modules are not on the search path of graph code, which loads files next to the graph or on RAPID_PATH.
 local env, loaded, load_text = sandbox.make(native, run)
-string.dump = nil -- it is reached through no copy, and through no method of strings
+string.dump = nil -- no copy and no method of strings may reach it
 
-local loading = {} -- nodes whose files run now
+local loading = {} -- nodes whose files are running
 
 local function load_node(name)
   local text, where = native.read_node(name)
@@ -109,8 +109,8 @@ end
 entry.fingerprint = bytecode.fingerprint
 entry.engine_errors = engine_errors(native.memory_limit_text, native.output_setting)
 
--- A function that runs the kernel f, with what all points share compared before and after some of its calls: the first,
--- the second, the fourth, ... Error: the kernel has changed it.
+-- Returns a function that runs the kernel f and compares the state that all points share before and after some of its
+-- calls: the first, the second, the fourth, and so on. Raises an error if the kernel has changed it.
 local function watched(f, runner, of_a_point)
   local calls = 0
   return function(...)
@@ -126,14 +126,14 @@ local function watched(f, runner, of_a_point)
     return a, b
   end
 end
-jit.off(watched) -- makes a function, which is not compiled
+jit.off(watched) -- it makes a function, which LuaJIT does not compile
 
 function entry.runner(f, layout, memory)
   local runner, set_params, translate = engine.runner(f, layout, memory)
   return watched(f, runner, true), set_params, translate
 end
 
--- The userdata that a function reaches.
+-- Returns the userdata that a function reaches.
 function entry.objects_of(f)
   local objects, walked = {}, shared_state.walk(f, env)
   for place = 1, walked and walked.count or 0 do
@@ -143,12 +143,12 @@ function entry.objects_of(f)
   return objects
 end
 
--- Shapes that move are others in each step.
+-- Moving shapes differ in each step.
 entry.forget_moving_shapes = shapes.forget_moving
 
-local details_of = {} -- by function: run_detail() for it
+local details_of = {} -- run_detail() by function
 
--- A :detail function; random: points to the key of the node's random numbers.
+-- Runs a :detail function; random: points to the key of the node's random numbers.
 function entry.detail(f, number, time, dt, params, size, random, details)
   local key = ffi.cast("const uint64_t*", random)[0]
   local runner = details_of[f] or watched(f, run_detail, false)
@@ -160,7 +160,7 @@ function entry.study()
   return studies.describe(asked)
 end
 
--- The closed form of a study at a frame, for a row of these knobs.
+-- Evaluates a study's closed form at a frame, for a row of these knobs.
 function entry.reference(number, time, dt, knobs)
   return asked.reference(engine.frame(number, time, dt), knobs)
 end
@@ -169,12 +169,12 @@ function entry.study_error(points, reference)
   return studies.error_of(asked, points, reference)
 end
 
--- Tells the host of each trace that the compiler gives up.
+-- Reports to the host each trace that the compiler gives up.
 function entry.watch_traces()
   local vmdef = require "jit.vmdef"
   local info = require("jit.util").funcinfo
   jit.attach(function(what, _, f, pc, reason, argument)
-    -- A text that is loaded ends a trace that is being recorded. The trace is not one of a kernel.
+    -- Loading a string ends a trace that is being recorded. That trace does not belong to a kernel.
     if what ~= "abort" or f == power_operator.rewrite then return end
     local place = info(f, pc)
     if type(reason) == "number" then
@@ -193,7 +193,7 @@ function entry.call(f, number, time, dt)
   return f(engine.frame(number, time, dt))
 end
 
--- x, y, z of a vec3; nothing for any other cdata.
+-- Returns x, y, z of a vec3; nothing for any other cdata.
 function entry.unpack_vec3(value)
   if ffi.istype(vector.type, value) then return value.x, value.y, value.z end
 end
@@ -204,8 +204,8 @@ end
 
 entry.make_ramp = ramp.make
 
--- Called once a pass or a frame, not worth a trace; and with jit.attach an event at a function that C calls directly
--- ends the process (LuaJIT 2.1 of 2022).
+-- Called once per pass or frame, so not worth a trace. Besides, with jit.attach an event at a function that C calls
+-- directly ends the process (LuaJIT 2.1 of 2022).
 for _, f in pairs(entry) do
   if type(f) == "function" then jit.off(f) end
 end

@@ -1,9 +1,9 @@
--- Runners: each carries a kernel over the points of a chunk.
+-- Runners: each runs a kernel over the points of a chunk.
 --
--- A kernel sees its point through a view `p` whose reads and writes go to the chunk's columns, at this one point; it
--- never gets a pointer, and can't express an index outside its own point. The trace compiler inlines all of it. Each
+-- A kernel sees its point through a view `p` whose reads and writes go to the chunk's columns, at this one point. It
+-- never gets a pointer, and cannot express an index outside its own point. The trace compiler inlines all of it. Each
 -- kernel gets a runner from generated text, with function prototypes of its own: kernels that share a runner share its
--- traces, and fall to a fifth of their speed.
+-- traces, and drop to a fifth of their speed.
 local describe = require "describe"
 local ffi = require "ffi"
 local lanes = require "lanes"
@@ -12,9 +12,9 @@ local vector = require "vec3"
 
 local vec3, quat = vector.type, vector.quat
 
-jit.off(true, true) -- all of this file, but not the runners' text
+jit.off(true, true) -- this file, but not the runners' text
 
--- One attribute's getter and setter by type. $C is its column's pointer, $I the point's place in it, $S its name.
+-- An attribute's getter and setter by type. $C is its column's pointer, $I the point's index in it, $S its name.
 local getter_text = {
   float = "return (tonumber($C[$I]))",
   int32 = "return (tonumber($C[$I]))",
@@ -60,16 +60,16 @@ local setter_text = {
     $C[i] = texts.number(x)]],
 }
 
--- As Solve holds P and v within a frame.
+-- The form in which Solve stores P and v within a frame.
 getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
 
-local most_names = 65000 -- about; each is one of the 65,536 constants that a function has
+local most_names = 65000 -- approximate; each is one of the 65,536 constants that a function can have
 
 local operators = {
   "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__concat", "__len", "__lt", "__le", "__call",
 }
 
--- Of the attributes whose types Houdini fixes, as :attribute takes them.
+-- Suggestions for :attribute, for attributes whose types Houdini fixes.
 local conventional = {
   Alpha = "Alpha = 1", Cd = "Cd = {1, 1, 1}", N = "N = {0, 0, 0}", instance = "instance = 0",
   name = "attributes = { name = \"\" }", orient = "orient = {0, 0, 0, 1}", scale = "scale = {1, 1, 1}",
@@ -80,7 +80,7 @@ local element_type = {
   int64 = "int64_t", string = "uint32_t",
 }
 
--- Lets every operator say what to compute with instead; a comparison with a number would be false, silently.
+-- Makes every operator an error with this message; a comparison with a number would silently be false.
 local function refuse_operators(what, meta)
   for _, name in ipairs(operators) do
     meta[name] = function() error(what, 0) end
@@ -92,7 +92,7 @@ local function refuse_operators(what, meta)
   return meta
 end
 
--- The host adds the place, the nearest line of graph code, and the point.
+-- The host adds the position, the nearest line of graph code, and the point.
 local function wrong_type(name, wanted, value)
   local remedy = ""
   if type(value) == "table" then
@@ -115,7 +115,7 @@ local function sorted_names(map)
   return list
 end
 
--- The errors of a view.
+-- Raises a view's error for a missing attribute.
 local function missing(name, names)
   name = describe.name(name)
   error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant " ..
@@ -123,7 +123,7 @@ local function missing(name, names)
 end
 
 -- Names are compared one after the other: in a trace they are constants, and the comparisons are folded away, while a
--- look-up in a table would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
+-- table lookup would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
 -- constants there too: the chunk's address, the view, the frame.
 local text_head = [[
 local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, texts, holder = ...
@@ -142,7 +142,7 @@ local function dead()
 end
 ]]
 
--- Those that do more than set a byte of the point; $ID is the point's id.
+-- Methods that do more than set a byte of the point; $ID is the point's id.
 local text_methods = [[
 local function rand(...)
   local _, use, frame_or_number = ...
@@ -172,7 +172,7 @@ local function kill(...)
 end
 ]]
 
--- An action gets the step in place of the frame: it has the point's own time.
+-- An action gets the step instead of the frame: it has the point's own time.
 local text_step = [[
 ffi.metatype(step_type, refuse.operators("the step is no number; compute with what it has, by name: step.dt", {
   __metatable = false,
@@ -191,12 +191,11 @@ ffi.metatype(step_type, refuse.operators("the step is no number; compute with wh
 }))
 ]]
 
--- layout.columns: { name, type, uniform, writable }; layout.groups: { name, uniform, writable };
--- layout.predicate: the kernel's result is kept, and nothing may be written; layout.action: it runs inside Solve.
--- memory: a userdata with room for rapid_chunk and, behind it, a pointer for each column and then each group. The host
--- writes it before each run().
--- Returns run(), set_params(values, details): the third argument of a Lua node's kernel, and the values of
--- frame.detail; and translate(): the kernel as a program of lanes, where it is one (lua/lanes.lua).
+-- layout.columns: { name, type, uniform, writable }; layout.groups: { name, uniform, writable }; layout.predicate: the
+-- kernel's result is stored, and nothing may be written; layout.action: it runs inside Solve. memory: a userdata with
+-- room for rapid_chunk followed by a pointer for each column and then each group. The host writes it before each run().
+-- Returns run(), set_params(values, details), which sets the third argument of a Lua node's kernel and the values of
+-- frame.detail, and translate(), which returns the kernel as a program of lanes if it can be one (lua/lanes.lua).
 local function make_runner(kernel, layout, memory, shared)
   local fields, names = { "rapid_chunk chunk;" }, { dt = true }
   for _, name in ipairs(shared.point_names.fields) do names[name] = true end
@@ -223,7 +222,7 @@ local function make_runner(kernel, layout, memory, shared)
   end
   for place in ipairs(layout.groups) do fields[#fields + 1] = ("uint8_t* g%d;"):format(place) end
 
-  -- The text of a number of the point; nil where the layout lacks the column.
+  -- Returns the text of a number of the point, or nil if the layout lacks the column.
   local function value_of(name)
     for place, column in ipairs(layout.columns) do
       if column.name == name then return ("columns.c%d[%s]"):format(place, column.uniform and "0" or "i") end
@@ -285,8 +284,8 @@ ffi.metatype(point_type, refuse.operators("p is the point; compute with what it 
   if layout.masked then body = "if chunk.members[k] ~= 0 then " .. body .. " end" end
   body = "chunk.at = k " .. body
   -- Vararg, so that no trace starts at run() itself. Single points are called without a loop: a loop that always ends
-  -- after one point is not compiled, and a trace that single calls have made of the kernel would be in a loop's way.
-  -- A trace follows the branches of the point at which it was recorded; other branches leave it, at half the speed. The
+  -- after one point is not compiled, and a trace that single calls have made of the kernel would block a loop's. A
+  -- trace follows the branches of the point at which it was recorded; other branches leave it, at half the speed. The
   -- first points are not typical, so the traces are recorded again after a while, most likely at a typical point.
   text[#text + 1] = [[
 local run
@@ -359,7 +358,7 @@ return run, set_params
   end
   local make, message = loadstring(table.concat(text, "\n"), "=[rapid runner]")
   if not make then
-    if not message:find("constants", 1, true) then error(message, 0) end -- no memory
+    if not message:find("constants", 1, true) then error(message, 0) end -- out of memory
     error(("reads and writes %d attributes and groups; a kernel has at most about %d"):format(
       #layout.columns + #layout.groups, most_names), 0)
   end
@@ -370,12 +369,12 @@ return run, set_params
   return run, set_params, function() return lanes.translate(kernel, layout, holder) end
 end
 
--- rand: a light userdata, the function that draws; adopt(object): makes a shape known to traces (lua/shape.lua);
--- point_names: the table of the host; texts: those of attributes (lua/text.lua).
+-- rand: a light userdata, the random function; adopt(object): makes a shape known to traces (lua/shape.lua);
+-- point_names: the table of the host; texts: the strings of attributes (lua/text.lua).
 local function prepare(rand, adopt, point_names, texts)
-  -- The detail values that frame.detail and step.detail show: those of the pass that runs.
+  -- Detail values that frame.detail and step.detail show: those of the running pass.
   local shown = { details = {} }
-  shown.view = newproxy(true) -- no table: table.insert would write into it
+  shown.view = newproxy(true) -- not a table: table.insert would write into it
   local of_view = getmetatable(shown.view)
   of_view.__metatable = false
   of_view.__tostring = function() return "the detail values" end

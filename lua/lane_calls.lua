@@ -1,5 +1,5 @@
--- What kernels call that has no bytecode, in programs of lanes: the point's methods, Lua's own functions, vec3 and
--- quat. Each takes the program, the state of the path and the arguments, and returns a list of results.
+-- Functions without bytecode that kernels call, in programs of lanes: the point's methods, Lua's own functions, vec3
+-- and quat. Each takes the program, the state of the path and the arguments, and returns a list of results.
 local ffi = require "ffi"
 local lane = require "lane_program"
 local vector = require "vec3"
@@ -55,7 +55,7 @@ function methods.kill(program, state)
   return {}
 end
 
--- Lua's own functions, by what they are.
+-- Lua's own functions, keyed by the function itself.
 local natives = {}
 
 local function numbers(args, count)
@@ -71,7 +71,7 @@ local function operation(op)
   end
 end
 
--- A function of bindings/host/math_functions.h that takes one number or two.
+-- Returns a translation of a function of bindings/host/math_functions.h that takes one number or two.
 local function of_host(name, count)
   return function(program, _, args)
     numbers(args, count)
@@ -111,7 +111,7 @@ natives[math.log] = function(program, state, args)
   return (#args > 1 and with_base or natural)(program, state, args)
 end
 
--- The operator ^, too. A square is a product.
+-- Also the operator ^. A square is a product.
 natives[math.pow] = function(program, _, args)
   numbers(args, 2)
   local x, y = args[1], args[2]

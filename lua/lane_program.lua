@@ -1,13 +1,13 @@
--- A program of lanes in the making (runtime/lanes/lane_program.h): its operations as nodes, what registers hold, the
--- paths that points take, columns and groups; and at the end slots for the nodes.
+-- Builds a program of lanes (runtime/lanes/lane_program.h): its operations as nodes, the values in registers, the paths
+-- that points take, columns and groups, and finally slots for the nodes.
 local ffi = require "ffi"
 local vector = require "vec3"
 
-jit.off(true, true) -- it runs once for a kernel
+jit.off(true, true) -- runs once per kernel
 
 local most_nodes = 4000
 
--- The kernel is no program, or what a path does from here on is beyond it; the reason is told to who asks.
+-- Gives up: the kernel, or the rest of this path, cannot be a program. The reason is reported on request.
 local function give_up(reason)
   error({ reason = reason }, 0)
 end
@@ -16,7 +16,7 @@ local function constant(value)
   return { kind = "constant", value = value }
 end
 local nothing = constant(nil)
-local poison = { kind = "poison" } -- what two paths leave in a register that no one reads again
+local poison = { kind = "poison" } -- differs between two paths in a register that is not read again
 
 local component_names = { "x", "y", "z", "w" }
 
@@ -31,27 +31,27 @@ local function new_program(layout, holder)
   return program
 end
 
--- Nodes by how their values vary: not within a chunk; mostly not from tile to tile, as they come from the column `dt`,
--- of which newborn points alone have other values than the rest; from point to point.
+-- Classes of nodes by how their values vary: constant within a chunk; mostly constant from tile to tile, because they
+-- come from the column `dt`, in which only newborn points differ; different from point to point.
 local shared, steady, varying = 0, 1, 2
 
 local reads_lane = { visited = true, Random = true, LoadTime = true, LoadStep = true, Index = true, LoadFlag = true }
 
--- What takes three nodes. Of two operations in one the second takes the result of the first; of a difference that is on
--- the left or, named From, on the right.
+-- Operations with three operands. A fused pair of operations uses the result of the first in the second; in a
+-- difference it is the left operand or, if the name has From, the right one.
 local takes_three = { Choose = true }
 local of_two = { Add = true, Subtract = true, Multiply = true }
 for first in pairs(of_two) do
   for _, second in ipairs { "Add", "Subtract", "SubtractFrom", "Multiply" } do takes_three[first .. second] = true end
 end
 
--- The operands of a node that are nodes.
+-- Returns the operands of a node that are nodes.
 local function operands(node)
   return { node.a, node.b, takes_three[node.op] and node.c or nil }
 end
 
--- The node of an operation; the same for the same one. number: of a column, a group, a function, a constant. varies:
--- beyond what its operands do.
+-- Returns the node of an operation; equal operations share one. number: of a column, a group, a function or a constant.
+-- varies: how much it varies in addition to its operands.
 function Program:emit(op, a, b, c, number, varies)
   local key = ("%s %s %s %s %s"):format(op, a or "", b or "", c or "", number and ("%.17g"):format(number) or "")
   local id = self.known[key]
@@ -77,18 +77,18 @@ local function constant_of(program, value)
   return node and node.op == "constant" and node.number or nil
 end
 
--- Whether it is a vec3: ffi.istype() takes a type for one of its values.
+-- Returns true for a vec3. ffi.istype() alone also accepts the type itself.
 local function is_vec3(value)
   return type(value) == "cdata" and ffi.istype(vector.type, value) and not rawequal(value, vector.type)
 end
 
--- A number that all points share, which `get` finds anew for each chunk.
+-- Adds a number that all points share. `get` reads it again for each chunk.
 function Program:input(get)
   self.getters[#self.getters + 1] = get
   return { kind = "number", id = self:emit("input", nil, nil, nil, #self.getters) }
 end
 
--- A value that all points share: `get` finds it again. Rapid's own never change.
+-- Adds a value that all points share: `get` finds it again. Rapid's own values never change.
 function Program:shared(value, get, is_own)
   if type(value) == "number" then
     if is_own then return self:number(value) end
@@ -109,7 +109,7 @@ function Program:shared(value, get, is_own)
   return constant(value)
 end
 
--- Flags: true, false, or a node.
+-- A flag is true, false, or a node.
 
 function Program:no_flag()
   return self:emit("AndNot", self.visited, self.visited)
@@ -138,7 +138,7 @@ local function as_value(flag)
   return type(flag) == "boolean" and constant(flag) or { kind = "flag", id = flag }
 end
 
--- State of a path: registers, memory (columns, groups, kill), the mask of the points that come there.
+-- The state of a path: registers, memory (columns, groups, kill), and the mask of the points that reach it.
 
 local function copy(map)
   local result = {}
@@ -150,7 +150,7 @@ local function copy_state(state)
   return { regs = copy(state.regs), memory = copy(state.memory), mask = state.mask, results = state.results }
 end
 
--- The states of the points with a flag, and of those without.
+-- Returns the states of the points with a flag, and of those without.
 function Program:split(state, flag)
   local with, without = copy_state(state), copy_state(state)
   with.mask = self:emit("And", state.mask, flag)
@@ -212,7 +212,7 @@ function Program:join(a, b)
   return joined
 end
 
--- Columns and groups. A key of memory is a column's place, a group's place as "g1", or "kill".
+-- Columns and groups. A key of memory is a column's index, a group's index as "g1", or "kill".
 
 local loads = { float = "LoadFloat", vec3 = "LoadFloat", quat = "LoadFloat", vec3d = "LoadDouble", int32 = "LoadInt32",
                 int64 = "LoadInt64" }
@@ -220,7 +220,7 @@ local stores = { float = "StoreFloat", vec3 = "StoreFloatVector", quat = "StoreF
                  int32 = "StoreInt32", int64 = "StoreInt64" }
 local sizes = { vec3 = 3, vec3d = 3, quat = 4 }
 local checks = { int32 = "CheckInt32", int64 = "CheckInt64" }
--- What a column does to a number that is stored in it.
+-- Conversions of a number when it is stored in a column.
 local conversions = { float = "Round", vec3 = "Round", quat = "Round", int32 = "Whole", int64 = "Whole" }
 
 function Program:initial(key)
@@ -288,7 +288,7 @@ end
 local has_effect = { Fail = true, CheckFloat = true, CheckInt32 = true, CheckInt64 = true }
 local is_given = { visited = true, chunk = true, constant = true, input = true }
 
--- Which nodes what is stored, and what may fail, comes from. Operands lie before their nodes.
+-- Returns the set of nodes that the stores and the possible failures depend on. Operands precede their nodes.
 function Program:needed(stores_of)
   local needed = {}
   for _, store in ipairs(stores_of) do
@@ -304,7 +304,7 @@ function Program:needed(stores_of)
   return needed
 end
 
--- Puts an operation and the one that alone takes its result into one, which saves writing and reading it.
+-- Fuses an operation with the only one that uses its result, which saves writing and reading it.
 function Program:fuse(needed, stores_of)
   local nodes, uses = self.nodes, {}
   local function count(ids)
@@ -331,7 +331,8 @@ function Program:fuse(needed, stores_of)
   end
 end
 
--- The first slots, of what is given; the constants in their order, and the slot behind.
+-- Assigns the first slots to inputs and the next ones to constants. Returns the slots, the constants in order, and the
+-- first free slot.
 function Program:given_slots(needed)
   local slot_of, constants = { [self.visited] = 0 }, {}
   for id, node in ipairs(self.nodes) do
@@ -357,8 +358,8 @@ local function instruction(nodes, slot_of, node)
            node.number or 0 }
 end
 
--- The program as the host takes it: instructions are an operation's name and to, a, b, c and number.
--- stores_of: the instructions at its end, { op, nodes, component, number }: of one node, or of the three of a vector.
+-- Returns the program in the host's form: instructions are an operation's name and to, a, b, c and number. stores_of:
+-- the instructions at its end, { op, nodes, component, number }, with one node, or the three of a vector.
 function Program:assemble(stores_of)
   local nodes, needed = self.nodes, self:needed(stores_of)
   self:fuse(needed, stores_of)
@@ -371,7 +372,7 @@ function Program:assemble(stores_of)
     return next_slot - 1
   end
 
-  -- By places in the code: a slot is free again behind the last instruction that reads it.
+  -- By position in the code: a slot is free again after the last instruction that reads it.
   local code, last = {}, {}
   for id, node in ipairs(nodes) do
     if needed[id] and not is_given[node.op] then
@@ -400,7 +401,7 @@ function Program:assemble(stores_of)
     for _, operand in ipairs(operands(node)) do
       if last[operand] == place and nodes[operand].varies == varying and operand ~= self.visited then
         free[#free + 1] = slot_of[operand]
-        last[operand] = nil -- it may be an operand twice
+        last[operand] = nil -- both operands may be the same node
       end
     end
   end

@@ -1,11 +1,11 @@
--- Kernels for many points at once: a kernel's bytecode, followed for values that are not known, into a program of lanes
--- (runtime/lanes/lane_program.h).
+-- Translates kernels into programs for many points at once (runtime/lanes/lane_program.h), by following a kernel's
+-- bytecode with unknown values.
 --
--- Every register holds a description of its value: numbers and vectors are nodes of the program, what all points share
--- is known. Calls are followed into the function's own bytecode, those of vec3.lua too, so that there is one meaning of
--- each. Where a condition differs from point to point both sides are followed, each under a mask, and joined where they
--- meet. What the program can't say (a loop, a table, a text, an error) makes the kernel one for the trace compiler;
--- under a mask it makes the tile one, when a point comes there.
+-- Every register holds a description of its value: numbers and vectors are nodes of the program, and values that all
+-- points share are known. Calls are followed into the function's own bytecode, including that of vec3.lua, so that each
+-- operation has one definition. If a condition differs from point to point, both sides are followed, each under a mask,
+-- and joined where they meet. If the program cannot express something (a loop, a table, a string, an error), the kernel
+-- goes to the trace compiler; under a mask only the tiles in which a point gets there do.
 local bit = require "bit"
 local calls = require "lane_calls"
 local lane = require "lane_program"
@@ -18,7 +18,7 @@ local Program, give_up, constant, nothing = lane.Program, lane.give_up, lane.con
 local constant_of, truth_of, as_value, is_flag = lane.constant_of, lane.truth_of, lane.as_value, lane.is_flag
 local component_names = lane.component_names
 
-jit.off(true, true) -- it runs once for a kernel, and what runs for a chunk is short
+jit.off(true, true) -- the translation runs once per kernel, and the code per chunk is short
 
 local names = {}
 for op = 0, #vmdef.bcnames / 6 - 1 do
@@ -27,9 +27,9 @@ end
 
 local most_steps, most_depth = 20000, 30
 
-local run -- of a function
+local run -- follows a function; defined below
 
--- Results of a call, and the state behind it; no state where every path ends.
+-- Returns the results of a call and the state after it; the state is nil if every path ends.
 function Program:call(state, callee, args, depth)
   if callee.kind == "method" then
     if not (args[1] and args[1].kind == "point") then give_up "a method is called without its point" end
@@ -43,7 +43,7 @@ function Program:call(state, callee, args, depth)
   return run(self, f, args, state, depth + 1)
 end
 
--- One result of a function of vec3.lua.
+-- Returns one result of a function of vec3.lua.
 function Program:of_vectors(state, name, a, b, depth)
   local with = a.kind == "vector" and a or b
   if with.kind ~= "vector" then give_up "an operator is given something else" end
@@ -70,7 +70,7 @@ function Program:attribute(state, name)
   give_up("no attribute " .. name)
 end
 
--- object.name; the state behind it, as vectors have functions.
+-- Returns object.name, and the state after it, since vectors look their fields up in functions.
 function Program:field(state, object, name, depth)
   local kind = object.kind
   if kind == "point" then return self:attribute(state, name), state end
@@ -167,7 +167,7 @@ function Program:equal(state, a, b, depth)
   return false, state
 end
 
--- Instructions: what each does to a path. `at` has f, the operands, program, state, args and depth; the value of its
+-- The effect of each instruction on a path. `at` has f, the operands, program, state, args and depth; the value of its
 -- first operand's register is returned.
 local effects = {}
 
@@ -260,7 +260,7 @@ function effects.TGETV(at)
   return value
 end
 
-local statements = {} -- those that write no register, or several
+local statements = {} -- instructions that write no register, or several
 
 function statements.TSETS(at)
   if reg(at, at.b).kind ~= "point" then give_up "it writes into a table" end
@@ -279,7 +279,7 @@ function statements.KNIL(at)
   for slot = at.a, at.d do at.state.regs[slot] = nothing end
 end
 
--- Puts `values` into registers from `first` on: `count` of them, or all, as the results of a call with any number.
+-- Puts `values` into registers from `first` on: `count` of them, or all, as results of a call with any number.
 local function spread(at, first, values, count)
   if count < 0 then
     at.state.results = { first = first, values = values }
@@ -288,7 +288,8 @@ local function spread(at, first, values, count)
   for k = 1, count do at.state.regs[first + k - 1] = values[k] or nothing end
 end
 
--- The values of `count` registers from `first` on, and then those of the last call with any number of results.
+-- Returns the values of `count` registers from `first` on, followed by those of the last call with any number of
+-- results.
 local function gather(at, first, count, with_results)
   local list = {}
   for k = 1, count do list[k] = reg(at, first + k - 1) end
@@ -328,7 +329,7 @@ local returns = {
   CALLMT = function(at) return call(at, at.d, true) end,
 }
 
--- Conditions: the flag under which the jump behind the instruction is taken.
+-- Conditions: each returns the flag under which the jump after the instruction is taken.
 local conditions = {}
 function conditions.ISLT(at) return at.program:compare("Less", reg(at, at.a), reg(at, at.d)) end
 function conditions.ISGE(at) return at.program:inverse(conditions.ISLT(at)) end
@@ -353,17 +354,18 @@ for suffix, operand in pairs {
 end
 function conditions.IST(at) return truth_of(reg(at, at.d)) end
 function conditions.ISF(at) return at.program:inverse(truth_of(reg(at, at.d))) end
--- With a copy where the jump is taken.
+-- These also copy the value if the jump is taken.
 conditions.ISTC, conditions.ISFC = conditions.IST, conditions.ISF
 
--- What a kernel does that no program does, by its instruction.
+-- Instructions that no program can express, with the reason.
 local beyond = {
   TNEW = "it makes a table", TDUP = "it makes a table", FNEW = "it makes a function", CAT = "it joins texts",
   LEN = "it takes a length", LOOP = "it has a loop", ITERC = "it has a loop", ITERN = "it has a loop",
   USETV = "it assigns an upvalue", UCLO = "it makes a function",
 }
 
--- One instruction of a path. Returns "return" and values; "jump" and where; "branch", a flag and where; or nothing.
+-- Runs one instruction of a path. Returns "return" and values; "jump" and its target; "branch", a flag and its target;
+-- or nothing.
 local function step(at)
   local name = at.name
   if returns[name] then return "return", returns[name](at) end
@@ -379,8 +381,8 @@ local function step(at)
   if at.state then at.state.regs[at.a] = value end
 end
 
--- A function that is followed: the path that comes to the next instruction, none where all have gone elsewhere; those
--- that come to a place by a jump; and those that have returned.
+-- A function that is followed: the path that reaches the next instruction, nil if all have gone elsewhere; the paths
+-- that arrive at a position by a jump; and those that have returned.
 local Activation = {}
 Activation.__index = Activation
 
@@ -390,15 +392,15 @@ function Activation:send(place, from, path)
   table.insert(self.pending[place], path)
 end
 
--- Joins the paths that come to a place. The last to have been sent is the innermost: so masks become those of their
--- parents again.
+-- Joins the paths that arrive at a position. The last one sent is the innermost, so that masks return to those of their
+-- parents.
 function Activation:arrive(pc)
   local paths = self.pending[pc] or {}
   self.pending[pc] = nil
   for k = #paths, 1, -1 do self.path = self.program:join(self.path, paths[k]) end
 end
 
--- The path goes on where the flag of a condition leads it; the jump's own place is passed over.
+-- Continues the path where the flag of a condition leads it, skipping the jump instruction itself.
 function Activation:branch(at, flag, target)
   local path = at.state
   self.path = nil
@@ -417,7 +419,7 @@ function Activation:branch(at, flag, target)
   end
 end
 
--- A loop over numbers that are known: once for each. Returns the place behind it.
+-- Unrolls a loop over known numbers. Returns the position after it.
 function Activation:unroll(at)
   local program, behind = self.program, at.pc + at.d - 0x7fff
   local value, last, by = constant_of(program, reg(at, at.a)), constant_of(program, reg(at, at.a + 1)),
@@ -434,7 +436,7 @@ end
 local is_loop = { FORI = true, JFORI = true }
 local loop_end = { FORL = true, IFORL = true, JFORL = true }
 
--- The instruction at pc. Returns the place of the next one.
+-- Runs the instruction at pc. Returns the position of the next one.
 function Activation:advance(pc)
   local program, path = self.program, self.path
   program.steps = program.steps + 1
@@ -451,7 +453,7 @@ function Activation:advance(pc)
     return step(at)
   end)
   if not done then
-    -- Under a mask it is a matter of the points that come here.
+    -- Under a mask the failure depends on the points that get here.
     if type(what) ~= "table" or mask == program.visited then error(what, 0) end
     program:emit("Fail", mask)
     program.failure = program.failure or what.reason
@@ -482,7 +484,7 @@ function Activation:follow(first, last)
   end
 end
 
--- The results of all paths that have returned, and the memory and mask behind them.
+-- Joins the paths that have returned: their results, memory and mask.
 function Activation:joined_ends()
   local results, after
   for k = #self.ends, 1, -1 do
@@ -501,8 +503,8 @@ function Activation:joined_ends()
   return results, after
 end
 
--- Follows f, called with these values by the points of a state. Returns its results and the state behind it; nothing
--- where no path returns.
+-- Follows f, called with these values by the points of a state. Returns its results and the state after it, or nothing
+-- if no path returns.
 function run(program, f, args, state, depth)
   if depth > most_depth then give_up "its calls are nested" end
   local info = util.funcinfo(f)
@@ -517,12 +519,12 @@ function run(program, f, args, state, depth)
   if not after then return nil end
   return results, { regs = state.regs, memory = after.memory, mask = after.mask, results = state.results }
 end
--- The instructions that store what a state's memory has: columns, then groups, then death.
+-- Returns the instructions that store a state's memory: columns, then groups, then deaths.
 local function stores_of_memory(program, state)
   local layout, memory, list = program.layout, state.memory, {}
   for place, column in ipairs(layout.columns) do
     local value, op = memory[place], lane.stores[column.type]
-    -- The store converts the number by itself.
+    -- The store itself converts the number.
     local function stored(id)
       local node = program.nodes[id]
       return node.op == lane.conversions[column.type] and node.a or id
@@ -544,9 +546,9 @@ local function stores_of_memory(program, state)
   return list
 end
 
--- The program of a kernel for a layout (lua/kernel.lua), or nil and why there is none. holder: its `values` and
+-- Returns the program of a kernel for a layout (lua/kernel.lua), or nil and the reason. holder: its `values` and
 -- `details` are the node's parameters and the detail values of the pass. program.inputs_now() returns true and the
--- inputs, or false where what all points share is no longer of the same kind.
+-- inputs, or false if a value that all points share has changed its kind.
 local function translate(kernel, layout, holder)
   local program = lane.new(layout, holder)
   local done, result = pcall(function()

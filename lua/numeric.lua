@@ -1,15 +1,15 @@
 -- rapid.math: functions for artists' formulas, in kernels and in a graph's body.
 --
 --   clamp(x, lo, hi)             x, but at least lo and at most hi
---   fit(x, lo, hi, from, to)     x carried from [lo, hi] to [from, to], and held at its ends
+--   fit(x, lo, hi, from, to)     x mapped from [lo, hi] to [from, to], and clamped to its ends
 --   smoothstep(lo, hi, x)        0 up to lo, 1 from hi on, smooth between: t² (3 - 2t)
---   noise(P, time, octaves, seed)         a number in [-1, 1] that changes smoothly in place (and time)
+--   noise(P, time, octaves, seed)         a number in [-1, 1] that changes smoothly with position (and time)
 --   curl_noise(P, time, octaves, seed)    a vec3, about 1 long: a flow that neither gathers nor spreads points
---   rotation(axis, degrees)      a quat: the turn about an axis of any length but zero
---   rotation_between(from, to)   a quat: the shortest turn of one direction into another
+--   rotation(axis, degrees)      a quat: the rotation about an axis of any nonzero length
+--   rotation_between(from, to)   a quat: the shortest rotation of one direction into another
 --
 -- The noises are those of runtime/noise.h: cells of 1 m and 1 s. All but P are optional (0 s, 1 octave, seed 0).
--- The functions are vararg for the reason that vec3.lua gives.
+-- The functions are vararg for the reason given in vec3.lua.
 local ffi = require "ffi"
 local describe = require "describe"
 local vector = require "vec3"
@@ -34,7 +34,7 @@ function numeric.clamp(...)
     need_numbers("clamp(x, lo, hi)", x, lo, hi)
   end
   if lo > hi then error(("clamp(x, lo, hi): lo = %g is above hi = %g"):format(lo, hi), 0) end
-  return (min(hi, max(lo, x))) -- no branch, which would differ from point to point
+  return (min(hi, max(lo, x))) -- no branch, which could differ from point to point
 end
 
 function numeric.fit(...)
@@ -83,7 +83,8 @@ function numeric.rotation_between(...)
   if lengths == 0 then
     need_direction("rotation_between(from, to)", istype(vec3, from) and from:length() > 0 and to or from)
   end
-  -- (from x to, |from||to| + from·to) is twice the half turn's cosine long; for opposite directions it vanishes.
+  -- The length of (from x to, |from||to| + from·to) is twice the cosine of half the angle; it vanishes for opposite
+  -- directions.
   local w = lengths + from:dot(to)
   if w <= 1e-12 * lengths then
     local side = abs(from.x) < abs(from.y) and vec3(0, -from.z, from.y) or vec3(-from.z, 0, from.x)
@@ -111,7 +112,7 @@ local function is_legal(...)
     and seed >= 0 and seed <= 4294967295 and floor(seed) == seed
 end
 
--- noise_function, curl_function: light userdata, the functions of the host.
+-- noise_function, curl_function: light userdata, the host's functions.
 local function make(noise_function, curl_function)
   local noise = ffi.cast("rapid_noise", noise_function)
   local curl_noise = ffi.cast("rapid_curl_noise", curl_function)

@@ -3,13 +3,13 @@
 --
 --   -a.b ^ 2 ^ c      becomes      -(POWER(a.b,((POWER(2,(c))))))
 --
--- The parentheses keep one value of each operand, and keep `return a ^ b` from being a tail call: LuaJIT compiles no
--- more than fifteen of these in a trace.
+-- The parentheses keep one value of each operand, and keep `return a ^ b` from being a tail call: LuaJIT compiles at
+-- most fifteen of these in a trace.
 --
 -- The left operand is the simple expression before the operator. The right operand may start with unary operators and
 -- includes any ^ that follows it. A function as an operand is left to LuaJIT, which raises the error.
 
--- An upward arrow: a valid name for LuaJIT that no script uses.
+-- An upward arrow: a valid name in LuaJIT that no script uses.
 local name = "\226\134\145"
 
 local keywords = {}
@@ -104,7 +104,7 @@ end
 -- Tokens that may be followed by a call's arguments or an index.
 local is_end_of_prefix = { name = true, string = true, [")"] = true, ["]"] = true, ["}"] = true }
 
--- Returns the first token of the simple expression whose last token is at `place`, or nil for a function.
+-- Returns the first token of the simple expression whose last token is at `place`, or nil if it is a function.
 local function first_of_left(tokens, other, place)
   while true do
     local kind = tokens[place].kind
@@ -124,7 +124,7 @@ end
 
 local is_unary = { ["-"] = true, ["not"] = true, ["#"] = true }
 
--- Returns the last token of the operand that begins at `place`, or nil for a function.
+-- Returns the last token of the operand that begins at `place`, or nil if it is a function.
 local function last_of_right(tokens, other, place)
   while is_unary[tokens[place].kind] do place = place + 1 end
   local kind = tokens[place].kind
@@ -151,7 +151,7 @@ end
 local function with_calls(text)
   local tokens = tokens_of(text)
   local other = pairs_of_brackets(tokens)
-  -- By places of tokens: operators that become calls; how many calls begin and end there.
+  -- By index of tokens: operators that become calls; how many calls begin and end there.
   local calls, begun, ended = {}, {}, {}
   for place, token in ipairs(tokens) do
     local first = token.kind == "^" and first_of_left(tokens, other, place - 1)

@@ -1,13 +1,14 @@
--- The functions of Lua that call a script's functions, as scripts see them. LuaJIT's own can end the process:
+-- Lua's functions that call a script's functions, in the form that scripts see. LuaJIT's own can end the process:
 --
---   pcall, xpcall   called by each other they do not check the size of the stack; here each call has a frame of Lua,
---                   which does
---   memory          an error for want of memory that is caught in compiled code leaves a broken state; no protected
---                   call is compiled, and this error passes through all of them
---   C functions     that call Lua, and coroutines, nest on the C stack, whose depth Lua does not limit; here it is
+--   pcall, xpcall   when they call each other they do not check the size of the stack; here each call has a Lua
+--                   frame, which does
+--   memory          an out-of-memory error that is caught in compiled code leaves a broken state; no protected call is
+--                   compiled, and this error passes through all of them
+--   C functions     those that call Lua, and coroutines, nest on the C stack, whose depth Lua does not limit; here
+--                   it is
 local describe = require "describe"
 
-local out_of_memory = "not enough memory" -- LuaJIT's own text
+local out_of_memory = "not enough memory" -- LuaJIT's own message
 
 local most_nested = 100
 local nested = 0
@@ -24,7 +25,7 @@ local function leave(...)
   return ...
 end
 
--- The results of a protected call, unless it failed for want of memory.
+-- Returns the results of a protected call, unless it ran out of memory.
 local function caught(ok, message, ...)
   if not ok and message == out_of_memory then error(message, 0) end
   return ok, message, ...
@@ -46,7 +47,7 @@ local function handled(handler, ok, ...)
   return false, select(2, caught(pcall(handler, (...))))
 end
 
--- The handler is called when the stack is unwound: scripts have no means to look at it.
+-- Calls the handler after the stack is unwound: scripts have no means to look at it.
 function protected.xpcall(f, handler, ...)
   if type(handler) ~= "function" then
     error("xpcall takes a function and a handler of errors, not " .. describe.kind(handler), 2)
@@ -76,7 +77,7 @@ function protected.resume(thread, ...)
   return caught(leave(coroutine.resume(thread, ...)))
 end
 
-local wrapped = setmetatable({}, { __mode = "k" }) -- the coroutines of what coroutine.wrap has returned
+local wrapped = setmetatable({}, { __mode = "k" }) -- coroutines by the function that coroutine.wrap returned
 
 function protected.wrap(f)
   if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. describe.kind(f), 2) end
@@ -89,17 +90,17 @@ function protected.wrap(f)
   return run
 end
 
--- The coroutine that a result of coroutine.wrap resumes; nil for any other function.
+-- Returns the coroutine that a function from coroutine.wrap resumes; nil for any other function.
 function protected.thread_of(f)
   return wrapped[f]
 end
 
--- Whether a call of f with these arguments resumes a coroutine.
+-- Returns true if a call of f with these arguments resumes a coroutine.
 function protected.resumes(f, first)
   return wrapped[f] ~= nil or (f == protected.resume and first ~= nil)
 end
 
--- Of a function that calls its first argument with further ones: the place of the first of these, from 0; else nil.
+-- Returns the position, from 0, of the first argument that f passes on to its first one; nil for other functions.
 function protected.place_of_arguments(f)
   return f == protected.pcall and 1 or f == protected.xpcall and 2 or nil
 end

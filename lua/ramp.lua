@@ -1,9 +1,10 @@
 -- Ramps: numbers or vec3 values, linear between keys {position, value}, and constant beyond the first and the last.
 --
--- A ramp is a function from generated text, with a branch for each interval: compiled traces have no loop and no table.
+-- A ramp is a function from generated text, with a branch for each interval, so that compiled traces have no loop and
+-- no table.
 local vector = require "vec3"
 
-jit.off(true, true) -- all of this file, but not the functions that it makes
+jit.off(true, true) -- this file, but not the functions that it makes
 
 local format = string.format
 
@@ -12,11 +13,11 @@ local function literal(value)
   return format("vec3(%.17g, %.17g, %.17g)", value.x, value.y, value.z)
 end
 
--- By text: a kernel gets its ramp once a frame; if it were a new function each time, traces would not last.
+-- Ramps by their text. A kernel gets its ramp once per frame; a new function each time would invalidate traces.
 local made, count = {}, 0
-local most = 1000 -- kept; a ramp that is a function of the frame may be another one in each
+local most = 1000 -- cached; a ramp that is a function of the frame may differ in each
 
--- keys: a list of {position, value}, which the host has checked: rising positions, values of one type.
+-- keys: a list of {position, value}, checked by the host: rising positions, values of one type.
 local function make(keys)
   local text = { "local vec3 = ...", "return function(...)", "  local x = ...",
                  format("  if x <= %.17g then return %s end", keys[1][1], literal(keys[1][2])) }

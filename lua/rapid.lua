@@ -1,6 +1,6 @@
--- The graph language: the table that `require "rapid"` gives to graph code.
+-- The graph language: the table that `require "rapid"` returns to graph code.
 --
--- Everything here only gathers arguments; the host makes the values, checks them and remembers the places of the calls.
+-- This file only gathers arguments. The host makes the values, checks them and remembers the positions of the calls.
 -- Positional arguments (a path, a mesh, a motion) are turned into named ones.
 local ffi = require "ffi"
 local vector = require "vec3"
@@ -24,11 +24,11 @@ local function names_of(map)
 end
 
 -- native: the host's functions; load_node(name): the definition of a Lua node found on the search path, or nil;
--- numeric: what rapid.math holds; shapes: what can be asked of shapes (lua/shape.lua); studies: lua/study.lua.
+-- numeric: the contents of rapid.math; shapes: queries of shapes (lua/shape.lua); studies: lua/study.lua.
 local function make(native, load_node, numeric, shapes, studies)
   local rapid = { math = numeric }
 
-  -- A maker with the named positional arguments first.
+  -- Returns a maker with the named positional arguments first.
   local function maker(what, ...)
     local positional = { ... }
     local shown = "rapid." .. what:gsub("^motion%.", "")
@@ -43,7 +43,7 @@ local function make(native, load_node, numeric, shapes, studies)
     end
   end
 
-  -- Of a file; or, where the path names a sequence, a function of the frame.
+  -- Returns a reader of a file or, if the path names a sequence, of a function of the frame.
   local function reader(what)
     local read = maker(what, "path")
     return function(...)
@@ -106,7 +106,7 @@ local function make(native, load_node, numeric, shapes, studies)
       if not (length >= 0 and nodes[i] < 2 ^ 15) then fault("size", "at least 0 m, and below 32,768 voxels") end
     end
     local all = nodes[1] * nodes[2] * nodes[3]
-    local bytes = 48 * all -- of the list, which grows by halves
+    local bytes = 48 * all -- for the list, which grows by halves
     native.require_memory(("rapid.grid.from: %.3g nodes"):format(all), bytes, "give a larger voxel")
     local values, n = {}, 0
     for i = 0, nodes[1] - 1 do
@@ -135,7 +135,7 @@ local function make(native, load_node, numeric, shapes, studies)
   }
   rapid.fog = { read = maker("fog.read", "path"), from_points = maker("fog.from_points", "points") }
   rapid.curve = { read = maker("curve.read", "path"), from = maker "curve.from" }
-  -- Points at even distances along a curve, with its direction as N and the part of its length as u.
+  -- Returns points at even distances along a curve, with its direction as N and the fraction of its length as u.
   local function along(curve, options)
     options = options_of("rapid.points.along", options)
     for name in pairs(options) do
@@ -162,7 +162,7 @@ local function make(native, load_node, numeric, shapes, studies)
     end
     if #places < 2 then error("rapid.points.along: a curve is a list of at least two points", 2) end
     if closed then places[#places + 1] = places[1] end
-    local from = { 0 } -- the length up to each place
+    local from = { 0 } -- length up to each position
     for k = 2, #places do from[k] = from[k - 1] + (places[k] - places[k - 1]):length() end
     local whole = from[#from]
     if not (whole > 0 and whole < math.huge) then error("rapid.points.along: the curve has no length", 2) end
@@ -209,17 +209,17 @@ local function make(native, load_node, numeric, shapes, studies)
     return native.attribute(name)
   end
 
-  -- A shape, a mesh or points that the program offers which has opened the scene.
+  -- Returns a shape, a mesh or points offered by the program that has opened the scene.
   function rapid.host(name)
     return native.host(name)
   end
 
-  -- A number, a boolean, a string or a vec3 that --set can replace.
+  -- Returns a number, a boolean, a string or a vec3 that --set can replace.
   function rapid.param(name, default, doc)
     return native.param(name, default, doc)
   end
 
-  -- Positional forms: a name and a kernel.
+  -- Returns a method with positional forms: a name and a kernel.
   local function named_kernel(type_name)
     return function(input, name, kernel)
       if type(name) == "table" and kernel == nil then return native.node(type_name, name, input) end
@@ -266,7 +266,7 @@ local function make(native, load_node, numeric, shapes, studies)
         local expand = definition.expand
         method = function(input, options)
           local node = expand(input, native.complete(type_name, options or {}))
-          return node -- no tail call: one that expands into itself must end, by the size of the stack
+          return node -- not a tail call: a node that expands into itself must end, by the size of the stack
         end
       else
         method = function(input, options, ...)
@@ -285,7 +285,7 @@ local function make(native, load_node, numeric, shapes, studies)
     return call("create", options)
   end
 
-  -- A node written in Lua; returned by its file.
+  -- Checks and returns the definition of a node written in Lua, for its file to return.
   function rapid.node(definition)
     if type(definition) ~= "table" then error("rapid.node takes a table", 2) end
     native.define(definition)
@@ -304,7 +304,7 @@ local function make(native, load_node, numeric, shapes, studies)
       return native.make("levelset.combine", { levelset = object, other = other, how = how })
     end
   end
-  -- A tool with one argument of its own, or with options.
+  -- Returns a tool with one argument of its own, or with options.
   local function tool(name, argument)
     return function(object, value)
       local options = argument and { [argument] = value } or options_of("levelset:" .. name, value)
@@ -312,7 +312,7 @@ local function make(native, load_node, numeric, shapes, studies)
       return native.make("levelset." .. name, options)
     end
   end
-  -- A grid is written under the name of the option `grid`.
+  -- Returns a method that writes a grid under the name of the option `grid`.
   local function write_by(usual)
     return function(object, path, options)
       if path == nil then error("grid:write: the path is missing", 2) end
@@ -355,7 +355,7 @@ local function make(native, load_node, numeric, shapes, studies)
 
   native.set_index(function(...)
     local object, name = ...
-    local query = shapes.queries[name] -- first, as traces of kernels can follow it
+    local query = shapes.queries[name] -- first, since traces of kernels can follow it
     if query and shapes.pointer_of(object) then return query end
     if name == "sample" then
       if shapes.grid_of(object) then return shapes.sample end
@@ -380,7 +380,7 @@ local function make(native, load_node, numeric, shapes, studies)
     return (native.make("levelset.at", { levelset = object, frame = frame.number }))
   end)
 
-  -- A misspelt name is an error of its own, before it is called.
+  -- Makes a misspelt name an error of its own, before it is called.
   local function closed(library, what)
     return setmetatable(library, {
       __index = function(_, name)

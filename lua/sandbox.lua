@@ -1,8 +1,8 @@
--- The environment of graph code: ordinary Lua without a way out.
+-- The environment of graph code: ordinary Lua that cannot escape.
 --
--- Out of reach: files, processes, ffi, debug, bytecode, other environments, addresses, and all sources of chance (the
--- order of a string hash, math.random). Libraries are copies, so changes that graph code makes to them do not reach
--- Rapid's own.
+-- Out of reach are files, processes, ffi, debug, bytecode, other environments, addresses, and all sources of randomness
+-- (the order of a string hash, math.random). Libraries are copies, so changes that graph code makes to them do not
+-- reach Rapid's own.
 local ffi = require "ffi"
 local describe = require "describe"
 local power_operator = require "power_operator"
@@ -19,7 +19,7 @@ local function copy(library, without)
   return result
 end
 
--- tostring without addresses.
+-- Returns tostring(value) without addresses.
 local function safe_tostring(value)
   local text = raw_tostring(value)
   if type(value) ~= "string" and type(text) == "string" and text:find "0x%x%x%x" then
@@ -28,8 +28,8 @@ local function safe_tostring(value)
   return text
 end
 
--- Keys in an order that does not depend on the hash: numbers, then strings, then false, true. Of other keys (tables,
--- functions, nodes) there may be one: their order would be that of their addresses.
+-- Returns keys in an order that does not depend on the hash: numbers, then strings, then false, true. At most one other
+-- key (a table, a function, a node) is allowed, since their order would be that of their addresses.
 local function sorted_keys(map, what)
   local meta = debug.getmetatable(map)
   if meta and rawget(meta, "__mode") ~= nil then error(weak, 3) end
@@ -97,15 +97,15 @@ local function safe_format(format, ...)
 end
 jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
 
--- native.read_module(name) returns the text and the chunk name of a module that stands beside the graph, or nil and
--- where it was looked for; native.outside_kernels(what, remedy) is an error while a kernel runs. In a quiet environment
--- (a worker's) print does nothing: the first state has printed.
+-- native.read_module(name) returns the text and the chunk name of a module next to the graph, or nil and the searched
+-- paths; native.outside_kernels(action, remedy) raises an error while a kernel runs. In a quiet environment (a
+-- worker's) print does nothing: the first state has printed.
 local function make(native, run)
   local env = {}
   local strings = copy(string, { "dump" })
   strings.format, strings.gsub = safe_format, protected.gsub
 
-  -- The methods of strings are a copy that graph code can't reach, since Rapid's own modules call them, too.
+  -- The methods of strings are a copy that graph code cannot reach, since Rapid's own modules call them, too.
   local of_strings = debug.getmetatable("")
   of_strings.__index = copy(strings)
   of_strings.__metatable = false
@@ -151,7 +151,7 @@ local function make(native, run)
     if not chunk then return nil, message end
     return setfenv(chunk, env)
   end
-  -- A chunk named "=..." would pass for one of Rapid's own.
+  -- A chunk named "=..." would be taken for one of Rapid's own.
   function env.load(text, name)
     native.outside_kernels("load", "what it makes can't be checked there")
     return load_text(text, "@" .. (type(name) == "string" and name:gsub("^[@=]", "") or "text given to load"))

@@ -1,25 +1,25 @@
--- What kernels and graph code ask of a shape, a level set or a grid of vectors:
+-- Queries of shapes, level sets and grids of vectors by kernels and graph code:
 --
---   shape:distance(P)    m, negative inside; beyond a level set's band a bound of the right sign
---   shape:gradient(P)    a vec3 out of the shape, of length 1 where the distance is exact; zero where there is none
---   shape:velocity(P)    a vec3, m/s, of what is there of the shape
---   shape:closest(P)     a vec3, the place of the surface that is nearest; beyond a level set's band about there
---   mesh:closest(P, "Cd")  the mesh's attribute at that place: a number or a vec3
---   grid:sample(P)       a vec3, between the voxels' values; of a fog a number, the density
+--   shape:distance(P)    m, negative inside; beyond a level set's band a bound with the right sign
+--   shape:gradient(P)    a vec3 out of the shape, of length 1 if the distance is exact; zero if no gradient exists
+--   shape:velocity(P)    a vec3, m/s: the velocity of the shape there
+--   shape:closest(P)     a vec3, the nearest point of the surface; approximate beyond a level set's band
+--   mesh:closest(P, "Cd")  the mesh's attribute at that point: a number or a vec3
+--   grid:sample(P)       a vec3, interpolated between voxels; for a fog a number, the density
 --
--- Shapes that move or deform, and meshes, can be asked in kernels alone, where they are as in the step.
+-- Shapes that move or deform, and meshes, can be queried in kernels only, where they are as in the step.
 --
--- An object's pointer is asked of the host once, and then found in a table, which compiled traces can do; of a shape
--- that moves once a chunk. The functions are vararg for the reason that vec3.lua gives.
+-- The host is asked for an object's pointer once; then a table holds it, which compiled traces can read. The pointer of
+-- a moving shape is looked up once per chunk. The functions are vararg for the reason given in vec3.lua.
 local describe = require "describe"
 local ffi = require "ffi"
 local vector = require "vec3"
 
 local vec3, istype = vector.type, ffi.istype
 
--- native.shape(object): light userdata, a shape; nil for any other object; and whether it moves, so that the pointer is
--- another one later. native.vector_grid, native.fog likewise. native.shape_distance, native.shape_velocity,
--- native.vector_grid_sample, native.fog_sample: the functions to ask.
+-- native.shape(object) returns a shape as light userdata, or nil for any other object, and true if it moves, so that
+-- the pointer changes later. native.vector_grid and native.fog do likewise. native.shape_distance,
+-- native.shape_velocity, native.vector_grid_sample and native.fog_sample are the query functions.
 local function make(native)
   local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
   local ask_velocity = ffi.cast("rapid_shape_velocity", native.shape_velocity)
@@ -28,7 +28,7 @@ local function make(native)
   local ask_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
   local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
 
-  -- The pointer of an object that `find` knows; false for any other. The second function forgets those that move.
+  -- Returns the pointer of an object that `find` knows, or false. The second function forgets those that move.
   local function pointers_by(find)
     local pointers = setmetatable({}, { __mode = "k" })
     local moving = {}

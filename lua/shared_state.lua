@@ -1,13 +1,13 @@
--- What all points share: the tables, functions and coroutines that a kernel can reach. A kernel must leave them as they
--- are. Its bytecode shows most changes before it runs (lua/bytecode.lua); those that it hides, in a table of its own or
--- behind a coroutine, are found by comparing before and after its first points.
+-- State that all points share: the tables, functions and coroutines that a kernel can reach. A kernel must not change
+-- them. Its bytecode shows most changes before it runs (lua/bytecode.lua); those that it hides, in a table of its own
+-- or behind a coroutine, are found by comparing before and after its first points.
 local protected = require "protected"
 
 local getinfo, getlocal, getupvalue, getmeta = debug.getinfo, debug.getlocal, debug.getupvalue, debug.getmetatable
 
-local most_values = 10000 -- that are compared: the walk takes a fraction of a millisecond
+local most_values = 10000 -- compared at most: the walk takes a fraction of a millisecond
 
--- The values that are reached, in a fixed order, each with the name that it is kept under.
+-- The values reached, in a fixed order, each with the name that leads to it.
 local Walk = {}
 Walk.__index = Walk
 
@@ -34,7 +34,7 @@ local function is_ours(f)
   return getinfo(f, "S").source:find "^=%[rapid" ~= nil
 end
 
--- Rapid's own functions keep nothing for a script, but for those that resume a coroutine.
+-- Rapid's own functions hold no state for a script, except those that resume a coroutine.
 Walk["function"] = function(self, f)
   local thread = protected.thread_of(f)
   if thread then self:note(thread, "a coroutine") end
@@ -61,7 +61,7 @@ function Walk:thread(thread)
   end
 end
 
--- Nil where there are too many values to compare.
+-- Returns nil if there are too many values to compare.
 local function walk(f, env)
   local self = setmetatable({ count = 0, values = {}, names = {}, seen = {}, open = {} }, Walk)
   self:note(f)
@@ -75,7 +75,7 @@ local function walk(f, env)
   return self
 end
 
--- The first name of a walk that is not in another: a table's order is another one when it has grown.
+-- Returns the first name of a walk that another lacks: a table that has grown changes its order.
 local function new_name(walked, known)
   local names = {}
   for place = 1, known.count do names[known.names[place] or false] = true end
@@ -85,7 +85,7 @@ local function new_name(walked, known)
   end
 end
 
--- The name of the first value that differs; nil where none does. after: nil where there are too many now.
+-- Returns the name of the first value that differs, or nil. after: nil if there are too many now.
 local function difference(before, after)
   if not after then return "it has grown" end
   for place = 1, math.max(before.count, after.count) do
@@ -96,7 +96,7 @@ local function difference(before, after)
   end
 end
 
--- Seldom called: no trace is worth its while.
+-- Seldom called, so not worth a trace.
 for _, f in ipairs { Walk.note, Walk.table, Walk["function"], Walk.thread, is_ours, walk, new_name, difference } do
   jit.off(f)
 end

@@ -1,7 +1,7 @@
 -- rapid.study: error and run time of one scene at many settings of its knobs.
 --
 -- A study file returns rapid.study{ ... }. The command runs the file once for its description, then once more, in a
--- fresh session, for each choice of the knobs: the graph is then that which study.scene returns.
+-- fresh session, for each choice of the knobs: the graph is then the one that study.scene returns.
 local describe = require "describe"
 
 local function names_of(map)
@@ -19,14 +19,14 @@ local shown = describe.value
 
 -- native: the host's functions; vector: lua/vec3.lua.
 local function make(native, vector)
-  local definitions = setmetatable({}, { __mode = "k" }) -- by what rapid.study returned
+  local definitions = setmetatable({}, { __mode = "k" }) -- keyed by the table that rapid.study returned
 
   local function is_knob(value)
     return type(value) == "string" or type(value) == "boolean"
       or type(value) == "number" and value == value and math.abs(value) < math.huge
   end
 
-  -- The host adds the place of the graph code that called.
+  -- Raises an error. The host adds the position of the graph code that called.
   local function wrong(...)
     error("rapid.study: " .. string.format(...), 0)
   end
@@ -92,7 +92,7 @@ local function make(native, vector)
     return study
   end
 
-  -- The description that the command needs before it runs a scene. Fields that are not given have the host's defaults.
+  -- Returns the description that the command needs before it runs a scene. Missing fields have the host's defaults.
   local function describe_study(definition)
     local own = type(definition.error) == "function"
     local lines = definition.lines
@@ -108,7 +108,7 @@ local function make(native, vector)
     }
   end
 
-  -- The values of a flat column, of `width` numbers each.
+  -- Returns the values of a flat column, of `width` numbers each.
   local function column_of(flat, width)
     if width == 1 then return flat end
     local values = {}

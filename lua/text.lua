@@ -1,8 +1,8 @@
--- Texts of attributes. A column holds a number for each text, the same for equal ones in the whole process. Each state
--- keeps those that it has met: what a kernel reads and writes is a look-up in a table, which traces hold.
+-- Strings of attributes. A column holds a number for each string, the same for equal ones in the whole process. Each
+-- state caches those that it has met, so that a kernel reads and writes by a table lookup, which traces support.
 --
--- Functions are vararg, so that no trace starts at them, and compiled, as kernels call them.
-local most = 65536 -- that are kept; then it begins anew
+-- The functions are vararg, so that no trace starts at them, and compiled, since kernels call them.
+local most = 65536 -- cached; the cache is cleared when full
 
 -- native.text(number), native.number(text)
 local function make(native)

@@ -2,12 +2,12 @@
 --
 -- They are const structs: assigning a component is an error of the language, and compiled traces keep them in
 -- registers, so arithmetic on them allocates nothing. The functions are vararg because the trace compiler starts no
--- trace at such a function: they are called so often that it would, in vain, and then refuse the loops that call them.
--- And none ends in a tail call, hence the parentheses: the compiler gives up after fifteen tail calls.
+-- trace at such a function. They are called so often that it otherwise would, in vain, and then refuse the loops that
+-- call them. None ends in a tail call, hence the parentheses: the compiler gives up after fifteen tail calls.
 local ffi = require "ffi"
 local describe = require "describe"
 
--- Locals: in a trace they are constants, and a global is looked up.
+-- Locals are constants in a trace, while globals are looked up.
 local sqrt, sin, acos = math.sqrt, math.sin, math.acos
 local istype, type = ffi.istype, type
 
@@ -56,7 +56,7 @@ local function length(...)
   return (sqrt(a.x * a.x + a.y * a.y + a.z * a.z))
 end
 
--- Of length 1; the zero vector stays zero.
+-- Returns the vector with length 1; the zero vector stays zero.
 local function normalized(...)
   local a = ...
   if not istype(vec3, a) then need_vec3("v:normalized()", a) end
@@ -65,7 +65,7 @@ local function normalized(...)
   return (vec3(a.x / size, a.y / size, a.z / size))
 end
 
--- a at t = 0, b at t = 1.
+-- Returns a at t = 0, b at t = 1.
 local function lerp(...)
   local a, b, t = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:lerp(w, t)", a, b) end
@@ -73,7 +73,7 @@ local function lerp(...)
   return (vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t))
 end
 
--- Of numbers, strings and vec3 values.
+-- Concatenates numbers, strings and vec3 values.
 local function concat(a, b)
   for _, value in ipairs { a, b } do
     local kind = type(value)
@@ -134,7 +134,7 @@ local of_vec3 = {
   end,
   __index = function(...)
     local _, name = ...
-    -- Compared one after the other: traces fold the comparisons away, while a look-up in a table leaves its checks.
+    -- Compared one after the other: traces fold the comparisons away, while a table lookup leaves its checks.
     if name == "cross" then return cross end
     if name == "dot" then return dot end
     if name == "length" then return length end
@@ -150,7 +150,7 @@ local function need_quat(what, value)
   if not istype(quat, value) then error(("%s takes a quat, not %s"):format(what, show(value)), 0) end
 end
 
--- v, rotated: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
+-- Rotates v: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
 local function rotate(...)
   local q, v = ...
   if not istype(quat, q) then need_quat("q:rotate(v)", q) end
@@ -161,7 +161,7 @@ local function rotate(...)
     v.z + 2 * (w * z + q.x * y - q.y * x)))
 end
 
--- The inverse rotation, for a quaternion of length 1.
+-- Returns the inverse rotation, for a quaternion of length 1.
 local function inverse(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:inverse()", q) end
@@ -174,7 +174,7 @@ local function quat_length(...)
   return (sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w))
 end
 
--- Of length 1; zero becomes the identity.
+-- Returns the quaternion with length 1; zero becomes the identity.
 local function quat_normalized(...)
   local q = ...
   if not istype(quat, q) then need_quat("q:normalized()", q) end
@@ -183,7 +183,7 @@ local function quat_normalized(...)
   return (quat(q.x / size, q.y / size, q.z / size, q.w / size))
 end
 
--- The shortest rotation from q (t = 0) to r (t = 1), at constant speed; both of length 1.
+-- Returns the shortest rotation from q (t = 0) to r (t = 1), at constant speed; both of length 1.
 local function slerp(...)
   local q, r, t = ...
   if not istype(quat, q) then need_quat("q:slerp(r, t)", q) end
@@ -202,7 +202,7 @@ local function slerp(...)
 end
 
 local of_quat = {
-  -- The rotation r, and then q.
+  -- Returns the rotation r followed by q.
   __mul = function(...)
     local q, r = ...
     if not (istype(quat, q) and istype(quat, r)) then
@@ -235,7 +235,7 @@ local of_quat = {
 }
 ffi.metatype(quat, of_quat)
 
--- From four numbers.
+-- Makes a quat from four numbers.
 local function make_quat(...)
   local x, y, z, w = ...
   if not (type(x) == "number" and type(y) == "number" and type(z) == "number" and type(w) == "number") then
@@ -244,7 +244,7 @@ local function make_quat(...)
   return (quat(x, y, z, w))
 end
 
--- From three numbers, or a list of three.
+-- Makes a vec3 from three numbers, or a list of three.
 local function make_vec3(...)
   local x, y, z = ...
   if type(x) == "table" then x, y, z = x[1], x[2], x[3] end
@@ -257,7 +257,7 @@ local function make_vec3(...)
   return (vec3(x, y, z))
 end
 
--- The metatable of one of the types.
+-- Returns the metatable of one of the types.
 local function operators(of)
   return rawequal(of, vec3) and of_vec3 or of_quat
 end

@@ -1,6 +1,6 @@
--- align: turns the `orient` of points until an axis of theirs points along an attribute, by the shortest way.
+-- align: turns the `orient` of points along the shortest arc until one of their axes points along an attribute.
 --
---   the angle between the two falls as e^(-t / response); at once where response is 0
+--   the angle between the two falls as e^(-t / response); immediately if response is 0
 --
 -- A point whose attribute is zero keeps its orientation.
 local rapid = require "rapid"

@@ -1,7 +1,7 @@
--- align_to_velocity: turns the `orient` of points to where they go: its z axis along v, its y axis towards `up`.
+-- align_to_velocity: turns the `orient` of points to their motion: the z axis along v, the y axis towards `up`.
 --
--- First the shortest turn of z into the direction of v, then the turn about that direction by which y comes nearest to
--- `up`. A point that is slower than `least` keeps its orientation.
+-- First comes the shortest turn of z into the direction of v, then the turn about that direction that brings y nearest
+-- to `up`. A point slower than `least` keeps its orientation.
 local rapid = require "rapid"
 
 local y, z = vec3(0, 1, 0), vec3(0, 0, 1)

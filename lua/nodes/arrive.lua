@@ -1,10 +1,10 @@
--- arrive: points go to a place, slower as they come near, and never beyond it.
+-- arrive: moves points to a target, more slowly as they come near, and never past it.
 --
 --   d' = -speed            d: from the target, beyond the radius
 --   d' = -speed d / radius            within it
 --
--- Solved over the frame, so that a point that heads for the target is where these say at any frame rate. Other velocity
--- falls to 1/e in the response time; a point that is faster is slowed down where it enters the radius.
+-- Solved over the frame, so that a point that heads for the target follows these equations at any frame rate. Other
+-- velocity falls to 1/e in the response time. A point that is faster is slowed down at the radius.
 local rapid = require "rapid"
 
 return rapid.node {
@@ -23,7 +23,7 @@ return rapid.node {
     if dt <= 0 or d == 0 then return end
     local n = way / d
     local v = (n * params.speed):lerp(p.v, math.exp(-dt / params.response))
-    -- As far as it may come: at the greater of both speeds up to the radius, and slowing down in the time that is left.
+    -- The longest way it may go: at the greater of both speeds up to the radius, then slowing down in the time left.
     local closing = v:dot(n)
     local speed, free = math.max(closing, params.speed), math.max(d - params.radius, 0)
     local inside = math.max(dt - free / speed, 0)

@@ -1,8 +1,9 @@
--- avoid: points near a shape are pushed away from it, the more the nearer.
+-- avoid: pushes points away from a shape, more strongly the nearer they are.
 --
---   v' = strength (1 - d / distance) n            d: from the surface, where 0 < d < distance;  n: out of the shape
+--   v' = strength (1 - d / distance) n            d: distance to the surface, 0 < d < distance;  n: out of the shape
 --
--- Inside the full strength acts. A level set knows d within its band alone: make its half_width reach that far.
+-- Inside the shape the full strength acts. A level set knows d within its band only: make its half_width reach that
+-- far.
 local rapid = require "rapid"
 
 return rapid.node {

@@ -1,6 +1,6 @@
--- color_by_speed: from one colour to another with the speed.
+-- color_by_speed: blends from one colour to another with the speed.
 --
---   Cd = slow + (fast - slow) t            t = (|v| - low) / (high - low), held in [0, 1]
+--   Cd = slow + (fast - slow) t            t = (|v| - low) / (high - low), clamped to [0, 1]
 local rapid = require "rapid"
 
 return rapid.node {

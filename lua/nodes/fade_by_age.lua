@@ -1,8 +1,8 @@
--- fade_by_age: an attribute goes from one value to another in the course of each point's life.
+-- fade_by_age: changes an attribute from one value to another over each point's life.
 --
---   a = first + (last - first) t            t = (age / life - hold) / (1 - hold), held in [0, 1]
+--   a = first + (last - first) t            t = (age / life - hold) / (1 - hold), clamped to [0, 1]
 --
--- The age is the one at the frame's end, as it is written. A point that lives for ever keeps the first value.
+-- The age is that at the frame's end, as it is written. A point that lives for ever keeps the first value.
 local rapid = require "rapid"
 
 return rapid.node {

@@ -1,12 +1,12 @@
--- follow_curve: each point runs along a curve from where it was born, as if the curve began there.
+-- follow_curve: moves each point along a curve from its birthplace, as if the curve began there.
 --
 --   P(age) = P(0) + C(age / duration) - C(0)            C: a Catmull-Rom spline through the points, C(0) to C(1)
 --
--- The velocity is the chord of the point's time, so Solve takes it there exactly; beyond the end it keeps the last
--- direction and speed.
+-- The velocity is the chord over the point's time, so Solve moves it there exactly. Beyond the end the point keeps its
+-- last direction and speed.
 local rapid = require "rapid"
 
--- The curve at u, in spans; the tangents at both ends are those of the last spans.
+-- Returns the curve at u, in spans; the tangents at both ends are those of the last spans.
 local function at(points, u)
   local spans = #points - 1
   local k = math.min(math.floor(u), spans - 1)

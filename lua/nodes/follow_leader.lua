@@ -1,10 +1,10 @@
--- follow_leader: points of a group go behind one of them, each at a place of its own in the train.
+-- follow_leader: points of a group follow one of their members, each at its own place in the train.
 --
 --   v' = (w - v) / response            w = u + (place - P) / time, at most speed
 --   place = L - (distance + r1 length) û + r2 width            L, u: place and velocity of the leader
 --
--- solved over the frame with w held; r1, r2 are the point's own, and its place is across û by up to width. The leader
--- is the member of `leader` with the least id, and does as other nodes tell it; where there is none, nothing happens.
+-- Solved over the frame with w held. r1 and r2 are the point's own numbers; its place is across û by up to width. The
+-- leader is the member of `leader` with the least id, and is moved by other nodes. Without a leader nothing happens.
 local rapid = require "rapid"
 
 local function across(along, p)

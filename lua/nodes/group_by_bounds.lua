@@ -1,4 +1,4 @@
--- group_by_bounds: who is in a box is in a group, at each frame.
+-- group_by_bounds: puts the points in a box into a group, at each frame.
 local rapid = require "rapid"
 
 return rapid.node {

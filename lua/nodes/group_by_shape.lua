@@ -1,6 +1,6 @@
--- group_by_shape: who is in a shape, or near it, is in a group, at each frame.
+-- group_by_shape: puts the points in or near a shape into a group, at each frame.
 --
--- A level set knows distances within its band alone: `distance` beyond it means as far as the band goes.
+-- A level set knows distances within its band only: a larger `distance` reaches no farther than the band.
 local rapid = require "rapid"
 
 return rapid.node {

@@ -1,8 +1,8 @@
--- impact_spin: what hits a surface is set turning, up to the rate at which it would roll.
+-- impact_spin: sets points that hit a surface spinning, up to the rate at which they would roll.
 --
 --   w' = w + grip (n × u / r - w)            u: velocity relative to the surface;  r: pscale
 --
--- in the frame after a contact that :collide{ record = true } has written to the hit attributes.
+-- This acts in the frame after a contact that :collide{ record = true } has written to the hit attributes.
 local rapid = require "rapid"
 
 return rapid.node {

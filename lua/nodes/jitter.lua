@@ -2,8 +2,7 @@
 --
 --   v += strength sqrt(dt) k            k: each component uniform in [-1, 1], so that |k|² is 1 on average
 --
--- Kicks that know nothing of each other add up as the root of their number: with the root of dt, points scatter alike
--- at any frame rate.
+-- Independent kicks add up as the root of their number: with the root of dt, points scatter alike at any frame rate.
 local rapid = require "rapid"
 
 return rapid.node {

@@ -1,6 +1,6 @@
 -- kill_slow: removes points that have come to rest, so that a heap of debris costs nothing.
 --
--- Tested before the frame's motion: the speed is the one with which the point left the frame before.
+-- The test precedes the frame's motion: the speed is that at the end of the previous frame.
 local rapid = require "rapid"
 
 return rapid.node {

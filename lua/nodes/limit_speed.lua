@@ -1,4 +1,4 @@
--- limit_speed: keeps directions, and holds speeds between two bounds.
+-- limit_speed: clamps speeds between two bounds and keeps directions.
 --
 --   v = v / |v| clamp(|v|, min, max)            a point at rest has no direction, and stays at rest
 local rapid = require "rapid"

@@ -1,16 +1,16 @@
 -- look_ahead: points see a shape that they are about to hit, and turn aside in time.
 --
---   v' = 4 m n / t²            at most `strength`, at the same speed
+--   v' = 4 m n / t²            at most `strength`; the speed does not change
 --
 --   t    until the straight path is nearest to the shape, or deepest in it
---   m    by how much that is nearer than `clearance`
+--   m    the part of `clearance` that is missing there
 --   n    out of the shape there, across the path
 --
--- The path is searched in steps of the distance, at least a 24th of its length: that should be below the size of what
--- is to be seen. A level set knows distances within its band alone: make its half_width reach as far as `clearance`.
+-- The path is searched in steps of the distance, at least a 24th of its length: that should be below the size of the
+-- obstacles. A level set knows distances within its band only: make its half_width reach as far as `clearance`.
 local rapid = require "rapid"
 
--- Across the direction `along`, for a path that meets the shape head-on: the point's own side.
+-- Returns a direction across `along`, for a path that meets the shape head-on: the point's own random side.
 local function any_side(along, p)
   local axis = math.abs(along.y) < 0.9 and vec3(0, 1, 0) or vec3(1, 0, 0)
   return along:cross(axis):normalized() * (p:rand(1) < 0.5 and -1 or 1)
@@ -42,7 +42,7 @@ return rapid.node {
     local side = n - along * n:dot(along)
     if side:length() < 1e-3 then side = any_side(along, p) end
     local t = at / speed
-    -- Near the shape no more than what brings the path to the clearance at once.
+    -- Near the shape, no more than the turn that brings the path to the clearance at once.
     local turn = math.min(4 * missing / (t * t), params.strength, missing / (t * p.dt)) * p.dt
     p.v = (p.v + side:normalized() * turn):normalized() * speed
   end,

@@ -1,6 +1,6 @@
--- ramp: one attribute drawn from another through keys, between which it is linear.
+-- ramp: computes one attribute from another through keys, linearly between them.
 --
--- A vec3 is looked up by its length. The keys' values are numbers or vec3s, as the attribute that is written.
+-- A vec3 is looked up by its length. The keys' values are numbers or vec3s, matching the attribute that is written.
 local rapid = require "rapid"
 
 return rapid.node {

@@ -1,4 +1,4 @@
--- swirl: a wind about an axis, the faster the farther from it.
+-- swirl: a wind about an axis that grows with the distance from it.
 --
 --   v' = strength n x (P - center)            n = axis / |axis|
 local rapid = require "rapid"

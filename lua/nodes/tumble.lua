@@ -2,7 +2,7 @@
 --
 --   w' = -drag w            orient' = rotation(w, |w| (1 - e^(-drag dt)) / drag) orient: exact over the frame
 --
--- For points that no :contact{ spin = true } turns.
+-- This is for points that no :contact{ spin = true } turns.
 local rapid = require "rapid"
 
 return rapid.node {

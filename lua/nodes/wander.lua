@@ -1,4 +1,4 @@
--- wander: points give way to a turbulent flow that neither gathers nor spreads them.
+-- wander: drags points along a turbulent flow that neither gathers nor spreads them.
 --
 --   v' = (u - v) / response            u = speed curl_noise(P / size, change time), solved over the frame with u held
 local rapid = require "rapid"

@@ -1,18 +1,18 @@
 -- Assertions about points, besides busted's own:
 --
---   assert.near(expected, actual, tolerance)          numbers and vec3 (length of the difference); NaN is near nothing
+--   assert.near(expected, actual, tolerance)          numbers and vec3 (length of the difference); NaN is never near
 --   assert.points(p).finite()                         no NaN, no infinity
 --   assert.points(p).outside(distance, tolerance)     distance(P) >= -tolerance for every point
 --   assert.points(p).inside(distance, tolerance)      distance(P) <= tolerance
---   assert.conserved(result, quantity, tolerance)     the sum of quantity(point), numbers or vec3, is that of the first
---                                                     frame at every frame
---   assert.same_points(a, b)                          the same points, attributes and groups, bit by bit
+--   assert.conserved(result, quantity, tolerance)     the sum of quantity(point), numbers or vec3, equals that of the
+--                                                     first frame at every frame
+--   assert.same_points(a, b)                          the same points, attributes and groups, bitwise
 local assert = require "luassert"
 local say = require "say"
 local vector = require "vec3"
 local ffi = require "ffi"
 
--- An assertion whose callback returns the fault as a text, or nil.
+-- Registers an assertion whose callback returns the fault as a string, or nil.
 local function register(name, find_fault)
   local key = "assertion." .. name
   say:set(key .. ".positive", "%s")
@@ -51,7 +51,7 @@ return function(native)
   end)
 
   assert:register("modifier", "points", function(state, arguments)
-    -- Called again, without arguments, where the assertion is made.
+    -- Called again without arguments by the assertion itself.
     if arguments then rawset(state, "points", arguments[1]) end
   end)
 
@@ -67,7 +67,7 @@ return function(native)
     return native.not_finite(points_of(state))
   end)
 
-  -- The point furthest on the wrong side; sign is 1 where outside is right.
+  -- Returns the point furthest on the wrong side; sign is 1 if outside is right.
   local function wrong_side(points, distance, tolerance, sign, side)
     local worst, fault = tolerance or 0, nil
     for i = 1, #points do
@@ -88,7 +88,7 @@ return function(native)
     return wrong_side(points_of(state), arguments[1], arguments[2], -1, "outside")
   end)
 
-  -- The sum of a quantity, and each point's own by id.
+  -- Returns the sum of a quantity, and each point's own by id.
   local function sum_of(points, quantity)
     local sum, by_id = nil, {}
     for i = 1, #points do
@@ -99,7 +99,7 @@ return function(native)
     return sum or 0, by_id
   end
 
-  -- The point whose quantity differs most between two frames.
+  -- Returns the point whose quantity differs most between two frames.
   local function most_changed(before, after, points)
     local most, what = -1, "no point is left"
     for i = 1, #points do

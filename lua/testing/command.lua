@@ -6,7 +6,7 @@
 --   result.status, result.stdout, result.stderr
 local command = {}
 
--- As one word of the shell.
+-- Returns the string quoted as one word of the shell.
 local function quoted(text)
   return "'" .. text:gsub("'", "'\\''") .. "'"
 end
@@ -23,7 +23,7 @@ end
 local Folder = {}
 Folder.__index = Folder
 
--- The path of a file in it.
+-- Returns the path of a file in the folder.
 function Folder:file(name)
   return self.path .. "/" .. name
 end
@@ -36,12 +36,12 @@ function Folder:write(name, text)
   return self:file(name)
 end
 
--- The text of a file; nil where there is none.
+-- Returns the text of a file, or nil if it does not exist.
 function Folder:read(name)
   return read(self:file(name))
 end
 
--- The names of all files below it, sorted, hidden ones included.
+-- Returns the names of all files below the folder, sorted, hidden ones included.
 function Folder:list()
   local names = {}
   local pipe = assert(io.popen("cd " .. quoted(self.path) .. " && find . -type f | sed 's|^\\./||' | LC_ALL=C sort"))
@@ -50,7 +50,7 @@ function Folder:list()
   return names
 end
 
--- A new empty folder. It is removed when the state closes, however the tests ended.
+-- Makes an empty folder. It is removed when the state closes, however the tests ended.
 function command.folder()
   local pipe = assert(io.popen "mktemp -d")
   local path = pipe:read "*l"
@@ -61,7 +61,7 @@ function command.folder()
   return folder
 end
 
--- Runs a line of the shell; $RAPID is the command. options: cwd, a folder; environment, a table. The shell, or
+-- Runs a shell command; $RAPID is the command under test. options: cwd, a folder; environment, a table. The shell, or
 -- the program that has replaced it, ends when this process does.
 function command.shell(line, options)
   options = options or {}
@@ -84,7 +84,7 @@ function command.rapid(arguments, options)
   return command.shell('exec "$RAPID" ' .. arguments, options)
 end
 
--- The command under test: the one that runs the tests, or $RAPID_BIN.
+-- Returns the command under test: the one that runs the tests, or $RAPID_BIN.
 function command.binary()
   return os.getenv "RAPID_BIN" or error("RAPID_BIN is not set; it must be the path of the command rapid", 0)
 end

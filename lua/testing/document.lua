@@ -8,7 +8,7 @@ function document.read(path)
   return text
 end
 
--- The part of a text from a heading ("## rapid run") to the next one of its level or above.
+-- Returns the part of a text from a heading ("## rapid run") to the next one of its level or above.
 function document.section(text, heading)
   local hashes = heading:match "^#+"
   local from = assert(text:find("\n" .. heading .. "\n", 1, true), "no section " .. heading)
@@ -23,7 +23,7 @@ function document.section(text, heading)
   return text:sub(from, to)
 end
 
--- Iterates over the rows of all tables: a list of the text of each cell.
+-- Iterates over the rows of all tables. Each is a list of the text of its cells.
 function document.rows(text)
   return coroutine.wrap(function()
     for line in text:gmatch "[^\n]+" do
@@ -39,14 +39,14 @@ function document.rows(text)
   end)
 end
 
--- What stands in backticks, as a set.
+-- Returns the words in backticks, as a set.
 function document.code(text)
   local words = {}
   for word in text:gmatch "`([^`]+)`" do words[word] = true end
   return words
 end
 
--- The blocks between ```LANGUAGE and ```.
+-- Returns the blocks between ```LANGUAGE and ```.
 function document.blocks(text, language)
   local blocks = {}
   for block in text:gmatch("\n```" .. language .. "\n(.-)\n```") do blocks[#blocks + 1] = block end

@@ -1,13 +1,13 @@
 -- The module `rapid` of script-level tests: runs scenes, and shows the points of their frames.
 --
 --   local result = rapid.run("graphs/sparks.lua", { frames = {1, 48}, set = { rate = 1000 } })
---   result[48]                 the points of a frame: of the output main, or of the only one
+--   result[48]                 the points of a frame: of the output main, or of the only output
 --   result:frames()            iterates: frame, points
---   result:output "smoke"      the same of another output
+--   result:output "smoke"      the frames of another output
 --   result.warnings            a list of messages
---   result.trace_aborts        the same of what LuaJIT did not compile, after { watch_traces = true }; then kernels go
---                              over one point at a time
---   result.no_lanes            the same of kernels that do so in any case, and why, after { watch_lanes = true }
+--   result.trace_aborts        messages on traces that LuaJIT gave up, after { watch_traces = true }; such kernels
+--                              process one point at a time
+--   result.no_lanes            messages on kernels that always do so, with reasons, after { watch_lanes = true }
 --   #points, points[1].P, points:by_id(7).heat, points:min "P", points:mean "v", points:group "hot"
 local vector = require "vec3"
 local ffi = require "ffi"
@@ -15,14 +15,14 @@ local ffi = require "ffi"
 return function(native)
   local rapid = {}
 
-  -- A value from its numbers.
+  -- Returns a value from its components.
   local function value_of(x, y, z, w)
     if w then return vector.quat(x, y, z, w) end
     if z then return vector.make(x, y, z) end
     return x
   end
 
-  -- One point: its attributes by name, and its groups.
+  -- A point: its attributes by name, and its groups.
   local point_methods = {}
   function point_methods:within(group)
     return native.within(self[1], self[2], group)
@@ -94,7 +94,7 @@ return function(native)
     return result_of(self.run, name)
   end
 
-  -- As --set has it on the command line.
+  -- Formats a value as --set takes it on the command line.
   local function setting(name, value)
     if type(value) == "number" then return ("%.17g"):format(value) end
     if type(value) == "boolean" or type(value) == "string" then return tostring(value) end
@@ -115,8 +115,8 @@ return function(native)
     return value
   end
 
-  -- Runs the frames of a scene from its first to frames[2] and keeps those from frames[1]. Raises what `rapid run`
-  -- would print.
+  -- Runs the frames of a scene from its first to frames[2] and stores those from frames[1]. Raises the error that
+  -- `rapid run` would print.
   function rapid.run(path, options)
     options = options or {}
     if type(path) ~= "string" then error("rapid.run takes the path of a graph", 2) end

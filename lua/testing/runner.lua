@@ -1,6 +1,6 @@
--- Runs one file of tests in busted's language, and tells the host of each test.
+-- Runs one file of tests in busted's language, and reports each test to the host.
 --
--- busted's own command line is not used: output, search for files and exit status are those of `rapid test`.
+-- busted's own command line is not used: output, file search and exit status are those of `rapid test`.
 local native, path, filter, already_run = ...
 
 local ok, busted = pcall(function()
@@ -19,7 +19,7 @@ rawset(_G, "vec3", require("vec3").make)
 rawset(_G, "quat", require("vec3").make_quat)
 require "testing.assertions" (native)
 
--- The names of the enclosing describe blocks and of the test itself.
+-- Returns the names of the enclosing describe blocks and of the test itself.
 local function full_name(element)
   local names = {}
   while element and element.descriptor ~= "file" and (element.name or element.descriptor) do
@@ -29,8 +29,8 @@ local function full_name(element)
   return #names > 0 and table.concat(names, " ") or path
 end
 
-local message -- of the running test, once something is wrong with it
-local tests = 0 -- started; the first `already_run` of them did so in an earlier process of this file
+local message -- of the running test, once it has failed
+local tests = 0 -- tests started; the first `already_run` of them ran in an earlier process of this file
 
 busted.subscribe({ "test", "start" }, function(element)
   message = nil
@@ -51,10 +51,10 @@ busted.subscribe({ "test", "end" }, function(element, _, status)
   return nil, true
 end)
 
--- In a test the message is kept until the test ends. A file or a describe block that does not run hides its tests. A
--- failure before or after tests (before_each, setup, ...) is reported by itself.
+-- During a test the message is stored until the test ends. A file or a describe block that does not run hides its
+-- tests. A failure before or after tests (before_each, setup, ...) is reported separately.
 local function failed(element, _, text, trace)
-  -- An error of a scene names the scene's file: the test's own line comes before it.
+  -- An error of a scene names the scene's file, so the test's own line is put before it.
   if not text:find(path .. ":", 1, true) then
     local _, place = tostring(trace and trace.traceback):find(path .. ":", 1, true)
     local line = place and trace.traceback:match("^%d+", place + 1)
@@ -75,6 +75,6 @@ busted.subscribe({ "error" }, failed)
 require "busted.modules.filter_loader" () (busted, { filter = filter ~= "" and { filter } or {}, nokeepgoing = false })
 
 local body, get_trace = require("busted.modules.files.lua").load(busted, path)
-if not body then return end -- told of by `failed`
+if not body then return end -- reported by `failed`
 busted.executors.file(path, setmetatable({ getTrace = get_trace }, { __call = body }))
 require "busted.execute" (busted) (1, {})

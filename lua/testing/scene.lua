@@ -1,11 +1,11 @@
--- Runs scenes from texts.
+-- Runs scenes given as strings.
 --
 --   local scene = require "testing.scene"
 --   local result = scene.run("return rapid.create { points = two } :solve {}", { frames = {1, 4} })
 --   local message = scene.error "return rapid.create {} :gravty {}"
 --
 -- A scene begins with `rapid` and `two`, a set of the points (0, 1, 0) and (1, 1, 0), both at rest. Its text begins in
--- line 1 of scene.lua; in messages its folder is left out.
+-- line 1 of scene.lua. Messages leave out its folder.
 local command = require "testing.command"
 
 local scene = {}
@@ -13,21 +13,21 @@ local rapid = require "rapid" -- the module of tests
 
 local head = [[local rapid = require "rapid" ; local two = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } ; ]]
 
--- Where the scenes of this file of tests lie: scene.folder:write(name, text) puts a module beside them.
+-- The folder of this test file's scenes: scene.folder:write(name, text) puts a module next to them.
 scene.folder = command.folder()
 
 function scene.write(text)
   return scene.folder:write("scene.lua", head .. text)
 end
 
--- options: as rapid.run's; frames 1 to 3 where none are given.
+-- options: as in rapid.run; frames 1 to 3 by default.
 function scene.run(text, options)
   local given = { frames = {1, 3} }
   for name, value in pairs(options or {}) do given[name] = value end
   return rapid.run(scene.write(text), given)
 end
 
--- The message of a run that must fail.
+-- Returns the message of a run that must fail.
 function scene.error(text, options)
   local ok, message = pcall(scene.run, text, options)
   if ok then error("the scene ran, where an error was due:\n" .. text, 2) end
@@ -42,13 +42,13 @@ function scene.command(name, text, arguments, options)
   return command.rapid(("%s scene.lua %s"):format(name, arguments or ""), options)
 end
 
--- The points of frame 2 after a kernel with this body, function(p, frame), has edited `two`.
+-- Returns the points of frame 2 after a kernel with this body, function(p, frame), has edited `two`.
 --   columns: further columns, "heat = {1, 2}"; before: text in front of the graph, of one line.
 function scene.kernel(body, columns, before)
   return scene.run(scene.kernel_text(body, columns, before), { frames = {2, 2} })[2]
 end
 
--- The message of a kernel that must fail. Its body is in line 2.
+-- Returns the message of a kernel that must fail. Its body is in line 2.
 function scene.kernel_error(body, columns, before)
   return scene.error(scene.kernel_text(body, columns, before), { frames = {2, 2} })
 end

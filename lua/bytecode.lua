@@ -546,7 +546,7 @@ local remedies = {
     "the whole set in :detail",
   set = "a frame depends on the points that enter it, and nothing else: keep it in a detail value, " ..
     "points.detail.NAME = value",
-  frame = "no snapshot of --cache can hold what a function of the frame remembers: find it from frame.number, or " ..
+  frame = "no snapshot of %s can hold what a function of the frame remembers: find it from frame.number, or " ..
     "keep it in points.detail.NAME, in a :detail",
 }
 

@@ -1,7 +1,7 @@
 -- Rapid's replacements for LuaJIT's own messages. Only this table knows how LuaJIT words them.
 --
--- full_stack: the stack is full when the error is raised, and leaves no room for a trace. The strings of `endings` are
--- appended to LuaJIT messages that end with their key.
+-- full_stack: the stack is full when the error is raised, and leaves no room for a trace. is_memory: memory ran out.
+-- The strings of `endings` are appended to LuaJIT messages that end with their key.
 
 local function added(text, remedy) return { message = ("%s; %s"):format(text, remedy) } end
 
@@ -14,7 +14,9 @@ return function(memory_limit, output)
   local no_files = ("a script has no files: rapid.points.read and rapid.mesh.read read some, :write and %s write them")
     :format(output)
   return {
-    ["not enough memory"] = { message = memory_limit },
+    ["not enough memory"] = { message = memory_limit, is_memory = true },
+    -- Functions for Lua turn their exceptions into errors: this one found no memory for that.
+    ["C++ exception"] = { message = "C++ exception", is_memory = true },
     ["stack overflow"] = { message = "stack overflow: a function calls itself without end", full_stack = true },
     -- `p.v.x = 1`
     ["attempt to write to constant location"] = {

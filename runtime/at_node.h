@@ -31,7 +31,7 @@ decltype(auto) at_node(const std::string& node, const Location& location, const 
         } catch (const Error&) {
             throw;
         } catch (const std::bad_alloc&) {
-            throw Error("out of memory");
+            throw Error("out of memory", ErrorKind::OutOfMemory);
         } catch (const std::exception& fault) {
             throw Error(fault.what());
         }

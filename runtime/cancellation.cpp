@@ -11,7 +11,7 @@ thread_local const Cancellation* of_thread = nullptr;
 
 const Cancellation* Cancellation::current() { return of_thread; }
 
-void Cancellation::request(const std::string& why)
+void Cancellation::request(const Error& why)
 {
     const std::lock_guard lock(mutex_);
     if (!is_requested()) why_ = why;
@@ -35,12 +35,11 @@ void Cancellation::check_current()
     if (of_thread) of_thread->check();
 }
 
-Error Cancellation::error(const std::string& message) const
+Error Cancellation::placed(Error error) const
 {
-    Error result(message);
     const std::lock_guard lock(mutex_);
-    if (place_) result.in_node(place_->node_).at(place_->location_);
-    return result;
+    if (place_) error.in_node(place_->node_).at(place_->location_);
+    return error;
 }
 
 Cancellation::Place::Place(const std::string& node, const Location& location)

@@ -11,10 +11,11 @@ namespace rapid {
 
 class Cancellation {
 public:
-    static constexpr char text[] = "the run was cancelled";
+    // What is thrown if there is no other reason.
+    static Error cancelled() { return Error("the run was cancelled", ErrorKind::Cancelled); }
 
-    // Thread-safe. Subsequent checks throw an Error with this reason. The first reason counts.
-    void request(const std::string& why = text);
+    // From any thread. Whoever asks afterwards ends with this error; the first one counts.
+    void request(const Error& why = cancelled());
     void forget();
     bool is_requested() const { return requested_.load(std::memory_order_relaxed); }
     // Throws Error if cancellation has been requested.
@@ -55,15 +56,15 @@ public:
         const Location& location_;
         friend class Cancellation;
     };
-    // Returns an error with the node that is being evaluated, if there is one.
-    Error error(const std::string& message) const;
+    // The error, at the node that is evaluated now, if there is one.
+    Error placed(Error error) const;
 
 private:
     [[noreturn]] void fail() const;
 
     std::atomic<bool> requested_ = false;
     mutable std::mutex mutex_;
-    std::string why_;
+    Error why_ = cancelled();
     mutable const Place* place_ = nullptr;
 };
 

@@ -32,25 +32,29 @@ Error& Error::with_trace(std::string trace)
     return *this;
 }
 
-namespace {
-
-constexpr std::size_t most_of_message = 4000, most_of_name = 200;  // bytes
-constexpr std::size_t most_of_path = 4096;                         // longer ones name no file
-
-}  // namespace
-
-void Error::compose()
+Error Error::reworded(std::string message) const
 {
-    text_.clear();
-    if (!location_.file.empty()) {
-        text_ += shortened(location_.file, most_of_path);
-        if (location_.line > 0) text_ += fmt::format(":{}", location_.line);
-        text_ += ": ";
+    Error result = *this;
+    result.message_ = std::move(message);
+    result.compose();
+    return result;
+}
+
+std::string error_text(const Location& location, std::string_view node, std::string_view message)
+{
+    constexpr std::size_t most_of_message = 4000, most_of_name = 200;  // bytes
+    constexpr std::size_t most_of_path = 4096;                         // longer ones name no file
+    std::string text;
+    if (!location.file.empty()) {
+        text += shortened(location.file, most_of_path);
+        if (location.line > 0) text += fmt::format(":{}", location.line);
+        text += ": ";
     }
-    if (!node_.empty()) text_ += fmt::format("node \"{}\": ", shortened(node_, most_of_name));
-    text_ += shortened(message_, most_of_message);
+    if (!node.empty()) text += fmt::format("node \"{}\": ", shortened(node, most_of_name));
+    text += shortened(message, most_of_message);
     // what() would end there.
-    for (std::size_t zero; (zero = text_.find('\0')) != std::string::npos;) text_.replace(zero, 1, "\\x00");
+    for (std::size_t zero; (zero = text.find('\0')) != std::string::npos;) text.replace(zero, 1, "\\x00");
+    return text;
 }
 
 namespace {

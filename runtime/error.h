@@ -2,8 +2,8 @@
 //
 //   FILE:LINE: node "NAME": what is wrong; what would be right
 //
-// An Error is thrown where the fault is found, and gets its node, file and line as it propagates. Faults that only a
-// bug of Rapid can cause are for RAPID_ASSERT.
+// An Error is thrown where the fault is found, and gets its node, file and line as it propagates. Its kind says what
+// the caller can do about it. Faults that only a bug of Rapid can cause are for RAPID_ASSERT.
 #pragma once
 
 #include <exception>
@@ -18,9 +18,23 @@ struct Location {
     int line = 0;      // from 1; 0 where unknown
 };
 
+// FILE:LINE: node "NAME": MESSAGE, as far as they are known, each shortened if it is endless.
+std::string error_text(const Location& location, std::string_view node, std::string_view message);
+
+enum class ErrorKind {
+    Fault,        // a scene, an argument or a file is wrong, or the system refused something
+    WrongCall,    // a program called a function at the wrong time or with a wrong argument; nothing has changed
+    Cancelled,    // on request
+    TooLong,      // a script exceeded its time
+    OutOfMemory,  // the system has no more, or a limit does not allow it
+};
+
 class Error : public std::exception {
 public:
-    explicit Error(std::string message) : message_(std::move(message)) { compose(); }
+    explicit Error(std::string message, ErrorKind kind = ErrorKind::Fault) : message_(std::move(message)), kind_(kind)
+    {
+        compose();
+    }
 
     // Each sets what is not set yet: the location nearest to the fault is kept.
     Error& at(const Location& location);
@@ -29,17 +43,22 @@ public:
     // Only for --verbose: the call stack of the script.
     Error& with_trace(std::string trace);
 
+    // The same error in other words.
+    Error reworded(std::string message) const;
+
     const char* what() const noexcept override { return text_.c_str(); }
+    ErrorKind kind() const { return kind_; }
     const std::string& message() const { return message_; }
     const Location& location() const { return location_; }
     const std::string& node() const { return node_; }
     const std::string& trace() const { return trace_; }
 
 private:
-    void compose();
+    void compose() { text_ = error_text(location_, node_, message_); }
 
     std::string message_, node_, trace_, text_;
     Location location_;
+    ErrorKind kind_;
 };
 
 // The name among `names` that `name` was probably meant to be: the one with the smallest edit distance, regardless of

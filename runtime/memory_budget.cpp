@@ -116,7 +116,8 @@ Error beyond_memory(const std::string& what, double bytes, const std::string& re
 {
     return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set {}", what, memory_text(bytes),
                              memory_text(static_cast<double>(free_memory())),
-                             memory_text(static_cast<double>(memory_budget())), remedy, name_of(Setting::Memory)));
+                             memory_text(static_cast<double>(memory_budget())), remedy, name_of(Setting::Memory)),
+                 ErrorKind::OutOfMemory);
 }
 
 std::string memory_text(double bytes)

@@ -86,19 +86,19 @@ void MemoryWatch::watch(std::uint64_t most)
         bytes = memory.bytes();
     } while (bytes <= most);
 
-    std::string message = "out of memory";
+    Error error("out of memory", ErrorKind::OutOfMemory);
     try {
-        message = fmt::format(
+        error = error.reworded(fmt::format(
             "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set {}",
-            memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)), name_of(Setting::Memory));
-        beyond_(message);
+            memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)), name_of(Setting::Memory)));
+        beyond_(error);
     } catch (const std::exception&) {  // this thread has no caller
     }
     if (!too_late_) return;
     for (double waited = 0; waited < grace_seconds && memory.bytes() <= most + most / 16; waited += look_seconds)
         if (ends_within(look_seconds)) return;
     try {
-        too_late_(message);
+        too_late_(error);
     } catch (const std::exception&) {
     }
 }

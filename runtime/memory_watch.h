@@ -8,11 +8,13 @@
 #include <string>
 #include <thread>
 
+#include "runtime/error.h"
+
 namespace rapid {
 
 class MemoryWatch {
 public:
-    using Tell = std::function<void(const std::string& message)>;
+    using Tell = std::function<void(const Error& error)>;
 
     // Watches the process during its lifetime if a budget is set (memory_budget.h). The limit is at least 128 MiB above
     // `at_first`, because two allocations too small to be checked may coincide. Both functions are called from a

@@ -16,9 +16,9 @@ class MemoryLimit {
 public:
     MemoryLimit(const std::string& file, const std::function<void(const std::string& message)>& end)
         : watch_(
-              MemoryWatch::now(), [this](const std::string& message) { cancellation_.request(message); },
-              [this, file, end](const std::string& message) {
-                  end(cancellation_.error(message).at({file, 0}).what());
+              MemoryWatch::now(), [this](const Error& error) { cancellation_.request(error); },
+              [this, file, end](const Error& error) {
+                  end(cancellation_.placed(error).at({file, 0}).what());
               })
     {
     }

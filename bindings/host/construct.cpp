@@ -41,8 +41,8 @@ int make_object(State& state)
             const auto make = [&] { return maker.make(maker, *options, context); };
             return host.maker_cache ? host.maker_cache->get(maker, options, make) : make();
         } catch (const Error& error) {
-            throw Error(
-                fmt::format("{}: {}", shown_name(maker, *options), error.what()));  // with the file that it names
+            throw Error(fmt::format("{}: {}", shown_name(maker, *options), error.what()),
+                        error.kind());  // with the file that it names
         }
     });
 }

@@ -42,14 +42,14 @@ int construct(State& state, const F& make)
             host.made[call] = object;
             push_object(state, object);
         } catch (const Error& error) {
-            host.made[call] = std::string(error.what());
+            host.made[call] = error;
             throw;
         }
         return 1;
     }
     if (call >= host.made.size())
         throw Error("the graph file made more in a worker than at first; it must do the same each time it is run");
-    if (const auto* failed = std::get_if<std::string>(&host.made[call])) throw Error(*failed);
+    if (const auto* failed = std::get_if<Error>(&host.made[call])) throw Error(*failed);
     push_object(state, std::get<ObjectPtr>(host.made[call]));
     return 1;
 }

@@ -30,10 +30,9 @@ void call_function(const Kernel& function, const PointSet& points, const Evaluat
     try {
         state.call(8, 2);
     } catch (const Error& error) {
-        const Location where = error.location().file.empty() ? function.source.location : error.location();
-        Error placed(fmt::format("{} (frame {})", error.message(), now.frame.number));
-        placed.at(where).in_node(now.node).with_trace(error.trace());
-        throw placed;
+        throw error.reworded(fmt::format("{} (frame {})", error.message(), now.frame.number))
+            .at(function.source.location)
+            .in_node(now.node);
     }
 }
 

@@ -12,8 +12,6 @@
 #include <lua.hpp>
 #include <utility>
 
-#include "runtime/error.h"
-
 namespace rapid {
 namespace {
 
@@ -78,21 +76,19 @@ Interruption::~Interruption()
     if (thread_.joinable()) thread_.join();
 }
 
-void Interruption::request(const std::string& message, Why why)
+void Interruption::request(const Error& why)
 {
     const std::lock_guard lock(mutex_);
-    if (why_ != None || stop_) return;
-    message_ = message;
+    if (is_requested() || stop_) return;
     why_ = why;
+    is_requested_ = true;
     thread_ = std::thread([this] { signal_until_over(); });
 }
 
 void Interruption::check() const
 {
-    if (why_ != None) fail();
+    if (is_requested()) throw Error(why_);
 }
-
-void Interruption::fail() const { throw Error(message_); }
 
 Interruption::Slot::Slot(Interruption& owner) : owner_(owner)
 {
@@ -113,9 +109,9 @@ Interruption::Call::Call(Slot& slot, lua_State* L) : slot_(slot), lua_(L), outer
     if (slot_.calls_.load() == 0) slot_.thread_ = pthread_self();
     slot_.calls_.fetch_add(1);
     innermost = this;
-    if (slot_.owner_.why_ == None) return;
+    if (!slot_.owner_.is_requested()) return;
     end();
-    slot_.owner_.fail();
+    slot_.owner_.check();
 }
 
 Interruption::Call::~Call() { end(); }
@@ -125,7 +121,7 @@ void Interruption::Call::end()
 {
     innermost = outer_;
     slot_.calls_.fetch_sub(1);
-    if (slot_.owner_.why_ != None) const std::lock_guard lock(slot_.owner_.mutex_);
+    if (slot_.owner_.is_requested()) const std::lock_guard lock(slot_.owner_.mutex_);
 }
 
 void Interruption::Call::has_left() const
@@ -171,7 +167,7 @@ void Interruption::install_handler()
 void Interruption::on_signal(int signal, siginfo_t* info, void* context)
 {
     Call* const call = innermost;
-    if (!call || call->slot_.owner_.why_ == None) {
+    if (!call || !call->slot_.owner_.is_requested()) {
         if (handler_before.sa_flags & SA_SIGINFO)
             handler_before.sa_sigaction(signal, info, context);
         else if (handler_before.sa_handler != SIG_DFL && handler_before.sa_handler != SIG_IGN)
@@ -187,7 +183,7 @@ void Interruption::on_signal(int signal, siginfo_t* info, void* context)
 // The hook stays: what catches the error is stopped, too.
 void Interruption::stop(lua_State* L, lua_Debug*)
 {
-    if (innermost) luaL_error(L, "%s", innermost->slot_.owner_.message_.c_str());
+    if (innermost) luaL_error(L, "%s", innermost->slot_.owner_.why_.message().c_str());
 }
 
 void Interruption::signal_until_over()

@@ -15,6 +15,8 @@
 #include <string>
 #include <thread>
 
+#include "runtime/error.h"
+
 struct lua_Debug;
 struct lua_State;
 
@@ -22,19 +24,18 @@ namespace rapid {
 
 class Interruption {
 public:
-    enum Why { None, Late, Asked };
-
     Interruption() = default;
     ~Interruption();
     Interruption(const Interruption&) = delete;
     Interruption& operator=(const Interruption&) = delete;
 
-    // Stops what runs, and refuses what would run later. The first text counts. From any thread.
-    void request(const std::string& message, Why why);
-    Why why() const { return why_.load(); }
-    // Error, with the text, where it has been requested.
+    // Stops what runs, and refuses what would run later, with this error. The first one counts. From any thread.
+    void request(const Error& why);
+    bool is_requested() const { return is_requested_.load(); }
+    // Throws the error if it has been requested.
     void check() const;
-    [[noreturn]] void fail() const;
+    // Precondition: it has been requested.
+    const Error& why() const { return why_; }
 
     // A state of Lua, and the thread that runs in it.
     class Slot {
@@ -95,14 +96,14 @@ private:
     static void stop(lua_State* L, lua_Debug* where);
     void signal_until_over();
 
-    std::atomic<Why> why_ = None;
+    std::atomic<bool> is_requested_ = false;
     std::atomic<bool> jumps_ = false;  // the hooks have had their time
     bool is_any_running() const;
 
     std::mutex mutex_;
     std::condition_variable stopping_;
     std::set<const Slot*> slots_;
-    std::string message_;  // set once, before why_
+    Error why_{""};  // set once, before is_requested_
     bool stop_ = false;
     std::thread thread_;  // made by the first request
 };

@@ -175,10 +175,9 @@ Error KernelPass::placed(const Error& error, const rapid_chunk& chunk, const rap
         at = fmt::format("point id {}, {}", points_.id()[point], at);
         if (after.not_finite == after.at) at += "; " + text_of_point(points_, point);
     }
-    const Location where = error.location().file.empty() ? kernel_.source.location : error.location();
-    Error result(fmt::format("{} ({})", error.message(), at));
-    result.at(where).in_node(caller_.node).with_trace(error.trace());
-    return result;
+    return error.reworded(fmt::format("{} ({})", error.message(), at))
+        .at(kernel_.source.location)
+        .in_node(caller_.node);
 }
 
 }  // namespace rapid

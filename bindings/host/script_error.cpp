@@ -17,11 +17,13 @@ namespace {
 constexpr int levels_searched = 50;  // for an error's own line, which `error(text, level)` may put further down
 constexpr char engine_errors[] = "rapid.engine_errors";  // in the registry
 
-enum Description { message_field = 1, place_field, trace_field };  // of the table that describe_error() makes
+// Of the table that describe_error() makes.
+enum Description { message_field = 1, place_field, trace_field, is_memory_field };
 
 struct EngineError {
     std::string message;
     bool full_stack;  // Lua leaves no more than a few slots to the message handler
+    bool is_memory;   // there was none left
 };
 
 // The text for one of LuaJIT's own errors, those of limits and of assignments to constants.
@@ -34,10 +36,15 @@ std::optional<EngineError> engine_error(lua_State* L, const std::string& message
         lua_pushlstring(L, message.data(), message.size());
         lua_rawget(L, -2);
         if (lua_istable(L, -1)) {
-            lua_getfield(L, -1, "full_stack");
-            const bool full_stack = lua_toboolean(L, -1) != 0;
-            lua_getfield(L, -2, "message");
-            found = {text_at(L, -1), full_stack};
+            const auto is_set = [&](const char* name) {
+                lua_getfield(L, -1, name);
+                const bool set = lua_toboolean(L, -1) != 0;
+                lua_pop(L, 1);
+                return set;
+            };
+            const bool full_stack = is_set("full_stack"), is_memory = is_set("is_memory");
+            lua_getfield(L, -1, "message");
+            found = {text_at(L, -1), full_stack, is_memory};
         }
     }
     lua_settop(L, top);
@@ -114,14 +121,14 @@ Location parse_place(const std::string& place)
 
 // Lua has positions only as the beginning of a message, "file:12: what": one that is there, as the compiler's and the
 // nodes' messages have it, comes before `place`.
-Error with_place(const std::string& message, const std::string& place)
+Error with_place(const std::string& message, const std::string& place, ErrorKind kind)
 {
     const std::size_t end = message.find(": ");
     const std::size_t colon = end == std::string::npos ? end : message.rfind(':', end - 1);
     if (colon != std::string::npos && colon + 1 < end && message.find_first_not_of("0123456789", colon + 1) == end)
-        return Error(message.substr(end + 2)).at(parse_place(message.substr(0, end)));
-    if (!place.empty()) return Error(message).at(parse_place(place));
-    return Error(message);
+        return Error(message.substr(end + 2), kind).at(parse_place(message.substr(0, end)));
+    if (!place.empty()) return Error(message, kind).at(parse_place(place));
+    return Error(message, kind);
 }
 
 }  // namespace
@@ -138,27 +145,36 @@ int describe_error(lua_State* L)
         trace = text_at(L, -1);
     }
     lua_settop(L, 0);
-    lua_createtable(L, 3, 0);
+    lua_createtable(L, 4, 0);
     set_field(L, 1, message_field, message);
     set_field(L, 1, place_field, place);
     set_field(L, 1, trace_field, trace);
+    lua_pushboolean(L, of_engine && of_engine->is_memory);
+    lua_rawseti(L, 1, is_memory_field);
     return 1;
 }
 
-Error take_error(lua_State* L)
+Error take_error(lua_State* L, int status)
 {
     const int top = lua_gettop(L);
     std::string message, place, trace;
+    bool is_memory = status == LUA_ERRMEM;
     if (lua_istable(L, top)) {
         message = get_field(L, top, message_field);
         place = get_field(L, top, place_field);
         trace = get_field(L, top, trace_field);
+        lua_rawgeti(L, top, is_memory_field);
+        is_memory = is_memory || lua_toboolean(L, -1) != 0;
     } else {  // no handler was called, or it failed: there was no memory, or no stack, to describe the error
         message = lua_isstring(L, top) ? text_at(L, top) : "an error that could not be described";
-        if (const auto of_engine = engine_error(L, message)) message = of_engine->message;
+        if (const auto of_engine = engine_error(L, message)) {
+            message = of_engine->message;
+            is_memory = is_memory || of_engine->is_memory;
+        }
     }
     lua_settop(L, top - 1);
-    return with_place(message, place).with_trace(trace);
+    const ErrorKind kind = is_memory ? ErrorKind::OutOfMemory : State::of(L).kind_of(message);
+    return with_place(message, place, kind).with_trace(trace);
 }
 
 void set_engine_errors(lua_State* L) { lua_setfield(L, LUA_REGISTRYINDEX, engine_errors); }
@@ -170,9 +186,14 @@ int guarded(lua_State* L, int (*f)(State& state))
     try {
         const State::InCoroutine running(state, L);
         return f(state);
+    } catch (const Error& error) {  // its text has the place and the node that it knows
+        message = error.what();
+        state.pass(error);
     } catch (const std::bad_alloc&) {
-        message = "out of memory";
-    } catch (const std::exception& error) {  // an Error's text has the place and the node that it knows
+        const Error error("out of memory", ErrorKind::OutOfMemory);
+        message = error.what();
+        state.pass(error);
+    } catch (const std::exception& error) {
         message = error.what();
     }
     state.leave_if_broken();

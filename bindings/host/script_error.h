@@ -15,8 +15,8 @@ class State;
 // A message handler of lua_pcall: replaces the error by a description, for take_error().
 int describe_error(lua_State* L);
 
-// The error at the top of the stack that a call with the handler has left; takes it off.
-Error take_error(lua_State* L);
+// The error at the top of the stack that a call has left with this status, not 0; takes it off.
+Error take_error(lua_State* L, int status);
 
 // Takes the table of lua/engine_errors.lua off the stack: what Rapid says in place of LuaJIT's own messages.
 void set_engine_errors(lua_State* L);

@@ -25,7 +25,7 @@ Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
     if (options.interruptible)
         return [this, tell = options.on_timeout](const std::string& message) {
             if (tell) tell(message);
-            interruption.request(message, Interruption::Late);
+            interruption.request(Error(message, ErrorKind::TooLong));
             return Watchdog::GoOn;
         };
     return [tell = options.on_timeout](const std::string& message) {
@@ -127,7 +127,7 @@ void ScriptHost::apply_arguments()
         graph = with_arguments(graph, arguments);
     } catch (const Error& error) {
         if (!error.node().empty()) throw;
-        throw Error(fmt::format("{} {}", name_of(Setting::Value), error.what())).at({graph.file, 0});
+        throw Error(fmt::format("{} {}", name_of(Setting::Value), error.what()), error.kind()).at({graph.file, 0});
     }
 }
 

@@ -53,7 +53,7 @@ public:
 
     // The objects that the constructors of the main state made, in order; a worker's calls take them from here. A call
     // that failed left its message.
-    using Made = std::variant<ObjectPtr, std::string>;
+    using Made = std::variant<ObjectPtr, Error>;
     std::deque<Made> made;
     // Of the function of the frame that runs now; else null.
     MakerCache* maker_cache = nullptr;

@@ -140,7 +140,7 @@ void check_default(const Param& param, const std::string& what)
     try {
         if (!param.fallback.is_nil()) param.assign(param, &scratch, param.fallback);
     } catch (const Error& error) {
-        throw Error(fmt::format("{}: the default {}", what, error.message()));
+        throw Error(fmt::format("{}: the default {}", what, error.message()), error.kind());
     }
 }
 

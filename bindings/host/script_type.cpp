@@ -78,7 +78,7 @@ std::vector<AttributeSpec> read_makes(const Value& makes, const std::string& wha
     try {
         read_value(param, makes, attributes);
     } catch (const Error& error) {
-        throw Error(fmt::format("{}: {}", what, error.message()));
+        throw Error(fmt::format("{}: {}", what, error.message()), error.kind());
     }
     std::vector<AttributeSpec> specs;
     for (const auto& [name, value] : attributes) specs.push_back({name, value});

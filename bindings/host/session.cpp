@@ -20,8 +20,8 @@ const std::map<std::string, std::vector<Session::FunctionCode>>& Session::code()
 std::vector<std::string> Session::take_warnings() { return std::exchange(host_->warnings, {}); }
 
 void Session::use_from_this_thread() { host_->use_from_this_thread(); }
-void Session::interrupt(const std::string& why) { host_->interruption.request(why, Interruption::Asked); }
-Interruption::Why Session::interrupted() const { return host_->interruption.why(); }
+void Session::interrupt(const Error& why) { host_->interruption.request(why); }
+bool Session::is_interrupted() const { return host_->interruption.is_requested(); }
 
 Registry Session::all_node_types()
 {

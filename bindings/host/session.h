@@ -35,7 +35,7 @@ struct KernelOrder {
 struct Offers;  // offers.h
 
 struct SessionOptions {
-    std::map<std::string, std::string> set;            // --set NAME=VALUE and NODE.PARAM=VALUE
+    std::map<std::string, std::string> set;            // NAME or NODE.PARAM, and the value
     double script_timeout = 600;                       // s in scripts, for each frame and for loading
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory for each state
     bool may_write = false;                            // whether levelset:write acts; in a run only
@@ -93,10 +93,10 @@ public:
     // From now on this is the thread that uses the session, between two calls of which it may change.
     void use_from_this_thread();
 
-    // Stops the scripts that run now, in all threads, and all that would run later: Error, with this text. From any
-    // thread; in an interruptible session.
-    void interrupt(const std::string& why);
-    Interruption::Why interrupted() const;
+    // Stops the scripts that run now, in all threads, and all that would run later, with this error. From any thread;
+    // in an interruptible session.
+    void interrupt(const Error& why);
+    bool is_interrupted() const;
     // With keeps_state, by file: a hash of each of its functions, and the line in which it begins; the body's first.
     // Equal for programs that do the same, whatever their comments and their lines.
     struct FunctionCode {

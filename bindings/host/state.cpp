@@ -88,7 +88,7 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
     const std::exception_ptr error = set_up();
     if (!error) return;
     close();
-    if (is_at_limit_) throw Error(memory_limit_text());
+    if (is_at_limit_) throw beyond_limit();
     std::rethrow_exception(error);
 }
 
@@ -206,7 +206,8 @@ void State::run_host_file()
 {
     const std::filesystem::path folder = lua_folder();
     const std::string text = read_text(folder / "host.lua");
-    if (luaL_loadbuffer(L_, text.data(), text.size(), "=[rapid host]") != 0) throw Error(lua_tostring(L_, -1));
+    if (const int status = luaL_loadbuffer(L_, text.data(), text.size(), "=[rapid host]"); status != 0)
+        throw Error(lua_tostring(L_, -1), status == LUA_ERRMEM ? ErrorKind::OutOfMemory : ErrorKind::Fault);
     push_natives(*this, read_text(folder / "chunk.h"));
     call(1, 1);
     entries_ = luaL_ref(L_, LUA_REGISTRYINDEX);
@@ -233,7 +234,7 @@ void State::call(int arguments, int results)
         return protected_call(arguments, results, base);
     }();
     lua_remove(L_, base);
-    if (status != 0) throw take_error(L_);
+    if (status != 0) throw take_error(L_, status);
 }
 
 // The status of lua_pcall.
@@ -250,9 +251,27 @@ int State::protected_call(int arguments, int results, int handler)
 void State::fail_broken() const
 {
     host_.interruption.check();
-    if (is_at_limit_) throw Error(memory_limit_text());
+    if (is_at_limit_) throw beyond_limit();
     throw std::bad_alloc();
 }
+
+void State::pass(const Error& error)
+{
+    if (error.kind() == ErrorKind::Fault) return;
+    passed_ = error.what();
+    passed_kind_ = error.kind();
+}
+
+ErrorKind State::kind_of(const std::string& text) const
+{
+    if (!passed_.empty() && text.find(passed_) != text.npos) return passed_kind_;
+    const Interruption& interruption = host_.interruption;
+    if (interruption.is_requested() && text.find(interruption.why().message()) != text.npos)
+        return interruption.why().kind();
+    return ErrorKind::Fault;
+}
+
+Error State::beyond_limit() const { return Error(memory_limit_text(), ErrorKind::OutOfMemory); }
 
 std::string State::memory_limit_text() const
 {

@@ -44,6 +44,12 @@ public:
     // graph code; the stack is then as before the function was pushed.
     void call(int arguments, int results);
 
+    // Notes an Error that goes on as a Lua error: Lua knows its text alone.
+    void pass(const Error& error);
+    // The kind of an error that came out of Lua with this text: that of the last Error that was passed, or of the
+    // interruption, if the text contains theirs.
+    ErrorKind kind_of(const std::string& text) const;
+
     // Where a call within another one was left by a jump: leaves the other one, too, as Lua can't return into it. To be
     // called by functions that Lua has called, behind their objects of C++.
     void leave_if_broken() const;
@@ -111,6 +117,7 @@ public:
     std::string memory_limit_text() const;
 
 private:
+    Error beyond_limit() const;
     // While Lua runs in a protected call, its errors have somewhere to go.
     class Protected {
     public:
@@ -137,11 +144,13 @@ private:
     bool main_;
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
-    bool limited_ = false;            // to options().script_memory, now
-    bool has_libraries_ = false;      // those of LuaJIT itself
-    bool is_broken_ = false;          // compiled code was left by a jump
-    bool is_at_limit_ = false;        // memory was last refused as the script asked for more than it may have
-    bool protected_ = false;          // now
+    bool limited_ = false;        // to options().script_memory, now
+    bool has_libraries_ = false;  // those of LuaJIT itself
+    bool is_broken_ = false;      // compiled code was left by a jump
+    bool is_at_limit_ = false;    // memory was last refused as the script asked for more than it may have
+    bool protected_ = false;      // now
+    std::string passed_;          // the text of the last Error that was passed, unless it was a fault
+    ErrorKind passed_kind_ = ErrorKind::Fault;
     std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory
     Interruption::Slot slot_;
     lua_State* L_ = nullptr;

@@ -123,7 +123,7 @@ PointSet Session::study_reference(const Frame& frame, const Knobs& knobs) const
         const Table arguments{{}, {}, {{"columns", found}}};
         return std::dynamic_pointer_cast<const PointsObject>(maker.make(maker, arguments, context))->points;
     } catch (const Error& error) {
-        throw Error(fmt::format("the study's reference, frame {:g}: {}", frame.number, error.what()))
+        throw Error(fmt::format("the study's reference, frame {:g}: {}", frame.number, error.what()), error.kind())
             .at({host_->graph.file, 0});
     }
 }

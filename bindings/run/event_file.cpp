@@ -173,7 +173,7 @@ void EventFile::check_log(std::uint64_t bytes) const
     try {
         read_log(bytes, [](const PointSet&) {});
     } catch (const Error& error) {
-        throw Error(fmt::format("its events in {}: {}", log_path_.string(), error.what()));
+        throw Error(fmt::format("its events in {}: {}", log_path_.string(), error.what()), error.kind());
     }
 }
 

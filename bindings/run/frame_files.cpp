@@ -188,7 +188,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
                 volumes_[*pattern] = {static_cast<const Rasterize*>(planned.op->fields()), planned.node->name,
                                       planned.node->location};
         } catch (const Error& error) {
-            throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()))
+            throw Error(fmt::format("file = {}: {}", describe(file->second), error.message()), error.kind())
                 .in_node(planned.node->name)
                 .at(planned.node->location);
         }
@@ -204,7 +204,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
                                      Sequence{target.to.pattern, output, of.fps, of.start});
             }
         } catch (const Error& error) {
-            throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()));
+            throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()), error.kind());
         }
     }
 }
@@ -214,14 +214,17 @@ void FrameFiles::claim(WrittenNames& names, const RunFrames& frames) const
     for (const auto& [pattern, node, location] : of_nodes_) try {
             names.add(FramePattern(pattern), "main", frames, fmt::format("node \"{}\"", node));
         } catch (const Error& error) {
-            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message())).in_node(node).at(location);
+            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message()), error.kind())
+                .in_node(node)
+                .at(location);
         }
     for (const Target& target : targets_)
         for (const std::string& output : target.outputs) try {
                 names.add(FramePattern(target.to.pattern), output, frames,
                           name_of(Setting::Output) + " " + target.text);
             } catch (const Error& error) {
-                throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()));
+                throw Error(fmt::format("{} {}: {}", name_of(Setting::Output), target.text, error.message()),
+                            error.kind());
             }
 }
 
@@ -230,7 +233,9 @@ void FrameFiles::claim(const std::filesystem::path& folder, const std::string& w
     for (const auto& [pattern, node, location] : of_nodes_) try {
             claim_among_processes(folder, who, FramePattern(pattern).of_output("main"));
         } catch (const Error& error) {
-            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message())).in_node(node).at(location);
+            throw Error(fmt::format("file = \"{}\": {}", pattern, error.message()), error.kind())
+                .in_node(node)
+                .at(location);
         }
 }
 

@@ -28,7 +28,7 @@ struct PartRecord {
         std::string hash;
     };
     std::map<std::int64_t, File> files;  // by frame
-    // What decides the bits of a run, by names that a user knows: "rate", "--seed", "content of fog.vdb" (a hash).
+    // What decides the bits of a run, by name: "rate", "--seed", "content of fog.vdb" (a hash).
     std::map<std::string, std::string> identity;
 
     // Adds the files that the run reads, and the version of Rapid.

@@ -19,9 +19,9 @@ class WrittenNames {
 public:
     // What the run reads before its first frame.
     void reads(const std::filesystem::path& file);
-    // One file. who: "--stats". Error: it is read, or another's.
+    // One file. who: "statistics". Error: it is read, or another's.
     void add(const std::filesystem::path& file, std::string who);
-    // One file for each frame, or of all where the pattern has no frame number. who: "-o x.####.csv".
+    // One file for each frame, or of all where the pattern has no frame number. who: "output x.####.csv".
     void add(const FramePattern& pattern, std::string_view output, const RunFrames& frames, std::string who);
 
 private:

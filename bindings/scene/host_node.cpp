@@ -315,7 +315,7 @@ try {
     };
     return type;
 } catch (const Error& error) {
-    throw Error(fmt::format("the program's node \"{}\": {}", node.name, error.message()));
+    throw Error(fmt::format("the program's node \"{}\": {}", node.name, error.message()), error.kind());
 }
 
 }  // namespace rapid

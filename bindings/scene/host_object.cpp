@@ -107,7 +107,7 @@ ObjectPtr make_object(const std::string& name, const HostObject& offered, bool g
         if (const auto* points = std::get_if<HostPoints>(&offered)) return make_points(*points);
         return make_shape(name, std::get<HostShape>(offered), guarded);
     } catch (const Error& error) {
-        throw Error(fmt::format("the program offers \"{}\": {}", name, error.message()));
+        throw Error(fmt::format("the program offers \"{}\": {}", name, error.message()), error.kind());
     }
 }
 

@@ -5,6 +5,7 @@
 
 #include "bindings/run/run_parts.h"
 #include "bindings/scene/scene_error.h"
+#include "runtime/cancellation.h"
 
 namespace rapid {
 
@@ -28,7 +29,7 @@ Result<MergedFiles> merge_files(const std::vector<std::string>& patterns, const 
             const std::uint64_t points = parts.write_frame(frame, output);
             merged.points += points;
             ++merged.frames;
-            if (progress && !call_program("progress", progress, frame, points)) end_as_cancelled();
+            if (progress && !call_program("progress", progress, frame, points)) throw Cancellation::cancelled();
         }
         return merged;
     } catch (...) {

@@ -198,7 +198,7 @@ namespace {
 // want of points, and what runs into a limit may do so in the trial alone.
 bool is_of_kernel(const Plan& plan, const Error& error)
 {
-    if (error.message().find("memory") != std::string::npos) return false;
+    if (error.kind() != ErrorKind::Fault) return false;
     return std::any_of(plan.nodes.begin(), plan.nodes.end(), [&](const PlannedNode& planned) {
         const auto& arguments = planned.node->arguments;
         return planned.node->name == error.node() &&
@@ -225,13 +225,12 @@ Result<std::string> SceneInside::advice_on(Scene& scene, const FileOutputs& file
                     const FrameFigures found = Evaluator(output.plan).examine();
                     text = advice(found.stiff) + text_of(found.resolution);
                 } catch (const Error& error) {
-                    if (impl.is_late || !is_of_kernel(output.plan, error)) throw;
+                    if (!is_of_kernel(output.plan, error)) throw;
                     raised = error;
                 }
             });
         } catch (const Error& error) {
-            if (error.message().find(Cancellation::text) != std::string::npos) throw;
-            impl.is_late = false;
+            if (error.kind() == ErrorKind::Cancelled || error.kind() == ErrorKind::WrongCall) throw;
             if (!impl.evaluator) impl.start_again();  // without what a limit has stopped
             impl.cancellation.forget();               // of a limit of memory
         }

@@ -6,7 +6,7 @@
 
 namespace rapid {
 
-// Error: a size or an angle that can't be, or an output that is none.
+// Error: a size or an angle that can't be; an output that is none.
 FrameFiles frame_files(const FileOutputs& files);
 
 // Error: frames that do not go up, or that no file's name or format holds.

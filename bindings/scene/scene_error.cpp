@@ -2,23 +2,35 @@
 
 #include <new>
 
-#include "runtime/cancellation.h"
-#include "runtime/setting_names.h"
-
 namespace rapid {
 namespace {
 
-// Whether it is of memory that the system or a limit refuses. Errors pass through Lua as their text, so that is all
-// that tells: Rapid's (runtime/at_node.h), LuaJIT's, and those of the limits. "C++ exception" is LuaJIT's word for one
-// that passes through it: functions for Lua turn theirs into errors (guarded()), so it is one for which there was no
-// memory, neither.
-bool is_of_memory(std::string_view message)
+SceneError error_in_header(const Error& error, SceneError::Kind fault)
 {
-    for (const std::string& words :
-         {std::string("out of memory"), std::string("not enough memory"), std::string("C++ exception"),
-          name_of(Setting::ScriptMemory) + " sets the limit", "or set " + name_of(Setting::Memory)})
-        if (message.find(words) != message.npos) return true;
-    return false;
+    SceneError result;
+    switch (error.kind()) {
+        case ErrorKind::Fault:
+            result.kind = fault;
+            break;
+        case ErrorKind::WrongCall:
+            result.kind = SceneError::WrongCall;
+            break;
+        case ErrorKind::Cancelled:
+            result.kind = SceneError::Cancelled;
+            break;
+        case ErrorKind::TooLong:
+            result.kind = SceneError::TooLong;
+            break;
+        case ErrorKind::OutOfMemory:
+            result.kind = SceneError::OutOfMemory;
+            break;
+    }
+    result.message = error.message();
+    result.file = error.location().file;
+    result.line = error.location().line;
+    result.node = error.node();
+    result.script_stack = error.trace();
+    return result;
 }
 
 SceneError error_of(SceneError::Kind kind, std::string message)
@@ -33,11 +45,7 @@ SceneError error_of(SceneError::Kind kind, std::string message)
 
 std::string_view version() { return RAPID_VERSION; }
 
-std::string SceneError::text() const
-{
-    Error error(message);
-    return error.in_node(node).at({file, line}).what();
-}
+std::string SceneError::text() const { return error_text({file, line}, node, message); }
 
 SceneError wrong_call(std::string message) { return error_of(SceneError::WrongCall, std::move(message)); }
 
@@ -48,21 +56,14 @@ SceneError busy()
         "the scene is in another call: of another thread, or the one that has called back; wait for its end");
 }
 
-void end_as_cancelled() { throw SceneException(error_of(SceneError::Cancelled, Cancellation::text)); }
-
-SceneError caught_error(SceneError::Kind kind)
+SceneError caught_error(SceneError::Kind fault)
 {
     try {
         throw;
+    } catch (const Error& error) {
+        return error_in_header(error, fault);
     } catch (const SceneException& exception) {
         return exception.error();
-    } catch (const Error& error) {
-        SceneError result = error_of(is_of_memory(error.message()) ? SceneError::OutOfMemory : kind, error.message());
-        result.file = error.location().file;
-        result.line = error.location().line;
-        result.node = error.node();
-        result.script_stack = error.trace();
-        return result;
     } catch (const std::bad_alloc&) {
         return error_of(SceneError::OutOfMemory, "out of memory");
     } catch (const std::exception& error) {

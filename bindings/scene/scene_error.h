@@ -17,12 +17,10 @@ SceneError wrong_call(std::string message);
 SceneError busy();  // of a call while the scene is in another one
 
 // Refuses the call.
-[[noreturn]] inline void refuse(std::string message) { throw SceneException(wrong_call(std::move(message))); }
-// Where the program's callback has said so.
-[[noreturn]] void end_as_cancelled();
+[[noreturn]] inline void refuse(std::string message) { throw Error(std::move(message), ErrorKind::WrongCall); }
 
-// What is being handled, inside of a catch block. kind: of an Error.
-SceneError caught_error(SceneError::Kind kind);
+// What is being handled, inside of a catch block. fault: the kind of an ErrorKind::Fault.
+SceneError caught_error(SceneError::Kind fault);
 
 // On a thread that may have no caller: what it throws is dropped.
 template <class T>

@@ -48,10 +48,9 @@ std::optional<SceneError> fault_of(const SceneOptions& options)
     return std::nullopt;
 }
 
-SceneError Scene::Impl::error_of_call(SceneError::Kind kind)
+SceneError Scene::Impl::error_of_call(SceneError::Kind fault)
 {
-    SceneError error = caught_error(is_late.exchange(false) ? SceneError::TooLong : kind);
-    if (error.message.find(Cancellation::text) != std::string::npos) error.kind = SceneError::Cancelled;
+    SceneError error = caught_error(fault);
     if (error.kind == SceneError::Cancelled || error.kind == SceneError::OutOfMemory) cancellation.forget();
     return error;
 }
@@ -67,10 +66,7 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
     for (const std::string& path : options.paths) result.paths.emplace_back(path);
     result.may_write = may_write;
     result.interruptible = true;
-    result.on_timeout = [this](const std::string& message) {
-        is_late = true;
-        call_hook(hooks.late, message);
-    };
+    result.on_timeout = [this](const std::string& message) { call_hook(hooks.late, message); };
     if (hooks.reads || read)
         result.on_read = [this, read = std::move(read)](const std::filesystem::path& path) {
             if (read) read->add(path);
@@ -123,7 +119,7 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
     const std::stop_callback stop(hooks.stop, [&opening, scripts = session_with.interruption]() noexcept {
         try {
             opening.request();
-            scripts->request(Cancellation::text, Interruption::Asked);
+            scripts->request(Cancellation::cancelled());
         } catch (...) {  // for want of memory
         }
     });
@@ -194,7 +190,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
 void Scene::Impl::start_again()
 {
     cancellation.forget();
-    if (session->interrupted() != Interruption::None) return load(settings);
+    if (session->is_interrupted()) return load(settings);
     start(std::make_unique<Plan>(session->graph(), plan_options()));
 }
 
@@ -229,7 +225,7 @@ void Scene::Impl::cancel() noexcept
     try {
         cancellation.request();
         const std::lock_guard lock(scripts_mutex);
-        if (scripts) scripts->interrupt(Cancellation::text);
+        if (scripts) scripts->interrupt(Cancellation::cancelled());
     } catch (...) {
     }
 }
@@ -238,7 +234,7 @@ Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scrip
     : scope(&impl.cancellation), stop(impl.hooks.stop, [&impl, scripts] {
           try {
               impl.cancellation.request();
-              scripts->request(Cancellation::text, Interruption::Asked);
+              scripts->request(Cancellation::cancelled());
           } catch (...) {  // for want of memory
           }
       })
@@ -246,19 +242,19 @@ Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scrip
     if (impl.hooks.watch_memory)
         watch.emplace(
             impl.memory_at_first,
-            [&impl, scripts](const std::string& message) {
-                impl.cancellation.request(message);
-                scripts->request(message, Interruption::Asked);
+            [&impl, scripts](const Error& error) {
+                impl.cancellation.request(error);
+                scripts->request(error);
             },
             impl.too_late());
     impl.cancellation.check();
 }
 
-std::function<void(const std::string& message)> Scene::Impl::too_late() const
+MemoryWatch::Tell Scene::Impl::too_late() const
 {
     if (!hooks.beyond_memory) return {};
-    return [this](const std::string& message) {
-        call_hook(hooks.beyond_memory, cancellation.error(message).at({file, 0}).what());
+    return [this](const Error& error) {
+        call_hook(hooks.beyond_memory, cancellation.placed(error).at({file, 0}).what());
     };
 }
 

@@ -71,16 +71,16 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::optional<tbb::task_arena> arena;
     std::atomic<bool> is_busy = false;
     std::uint64_t memory_at_first = MemoryWatch::now();
-    std::atomic<bool> is_late = false;  // a script has been stopped in this call
 
     // What cancel() may do while another thread is in a call.
     Cancellation cancellation;
     std::mutex scripts_mutex;
     Session* scripts = nullptr;  // that an advance runs now
 
-    // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors.
+    // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors. fault:
+    // the kind of an ErrorKind::Fault.
     template <class F>
-    auto call(SceneError::Kind kind, const F& f)->Result<decltype(f())>
+    auto call(SceneError::Kind fault, const F& f)->Result<decltype(f())>
     {
         if (is_busy.exchange(true)) return busy();
         struct Free {
@@ -90,7 +90,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         try {
             std::optional<decltype(f())> value;
             const auto run = [&] {
-                if (hooks.stop.stop_requested()) throw Error(Cancellation::text);
+                if (hooks.stop.stop_requested()) throw Cancellation::cancelled();
                 const MemoryBudget budget(options.memory);
                 if (session) session->use_from_this_thread();
                 // Of the loops of this scene no thread that waits takes up another scene.
@@ -99,12 +99,12 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             arena ? arena->execute(run) : run();
             return std::move(*value);
         } catch (...) {
-            return error_of_call(kind);
+            return error_of_call(fault);
         }
     }
 
     // What is being handled, inside of a catch block.
-    SceneError error_of_call(SceneError::Kind kind);
+    SceneError error_of_call(SceneError::Kind fault);
     // read: keeps the contents of what the session reads; may be null.
     SessionOptions session_options(const std::map<std::string, std::string>& set,
                                    std::shared_ptr<InputContents> read = nullptr);
@@ -124,13 +124,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     static std::uint64_t next_number();
     // From any thread. For want of memory scripts go on to the next chunk.
     void cancel() noexcept;
-    // Of points from the first frame on. fault: what ended it before the last one; null: nothing did.
-    struct Traced {
-        SceneTrace trace;
-        std::exception_ptr fault;
-        bool is_late = false;
-    };
-    Traced trace(const TraceOptions& asked);
+    SceneTrace trace(const TraceOptions& asked);
     SceneFrame points_behind(const std::string& node, std::int64_t frame);
     // Computes frames of another plan of the session. Scripts that had to be stopped do not run again.
     template <class F>
@@ -139,7 +133,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         try {
             compute();
         } catch (...) {
-            if (session->interrupted() != Interruption::None) {
+            if (session->is_interrupted()) {
                 evaluator.reset();
                 ended_by = std::current_exception();
             }
@@ -158,7 +152,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     void refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const;
     void refuse_unless_kept() const;  // keep_state
     // What SceneHooks::beyond_memory asks for, with the place of what is computed; empty where nobody does.
-    std::function<void(const std::string& message)> too_late() const;
+    MemoryWatch::Tell too_late() const;
 
     // For as long as it lives, cancel() stops scripts.
     struct Scripts {
@@ -192,9 +186,9 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             if (impl.hooks.watch_memory)
                 watch.emplace(
                     impl.memory_at_first,
-                    [&impl](const std::string& message) {
-                        impl.session->interrupt(message);
-                        impl.cancellation.request(message);
+                    [&impl](const Error& error) {
+                        impl.session->interrupt(error);
+                        impl.cancellation.request(error);
                     },
                     impl.too_late());
             impl.cancellation.check();

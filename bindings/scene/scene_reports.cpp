@@ -53,7 +53,7 @@ Result<std::string> SceneInside::graph_json(Scene& scene, GraphLayout* kept)
     });
 }
 
-Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
+SceneTrace Scene::Impl::trace(const TraceOptions& asked)
 {
     Biographer(*plan, asked.ids, asked.create);  // throws Error if there is no such create
     if (asked.last < plan->first_frame())
@@ -67,14 +67,13 @@ Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
     Evaluator run(traced, {}, biographer.results());
     run.leave_out_errors();
     biographer.watch(run);
-    Traced result;
+    SceneTrace result;
     try {
         while (run.next_frame() <= asked.last) biographer.add(run.advance());
     } catch (const Error& error) {
-        if (session->interrupted() != Interruption::None) evaluator.reset();  // its scripts do not run again
-        if (error.message().find(Cancellation::text) != std::string::npos) throw;
-        result.fault = std::current_exception();
-        result.is_late = is_late.exchange(false);
+        if (session->is_interrupted()) evaluator.reset();  // its scripts do not run again
+        if (error.kind() == ErrorKind::Cancelled) throw;
+        result.fault = caught_error(SceneError::FailedFrame);
         cancellation.forget();  // of a limit of memory
     }
     session->take_warnings();  // of frames, which the run tells
@@ -83,31 +82,24 @@ Scene::Impl::Traced Scene::Impl::trace(const TraceOptions& asked)
     std::vector<Biography> lives = biographer.lives();
     for (const std::int64_t id : asked.ids)
         if (std::none_of(lives.begin(), lives.end(), [&](const Biography& life) { return life.id == id; }))
-            result.trace.unborn.push_back(id);
+            result.unborn.push_back(id);
     for (Biography& life : lives)
         std::erase_if(life.steps, [&](const Biography::Step& step) {
             return step.frame < first || step.frame > asked.last || (step.frame - first) % asked.step != 0;
         });
-    result.trace.lives = {to_text(lives), to_json(lives)};
+    result.lives = {to_text(lives), to_json(lives)};
     return result;
 }
 
 Result<SceneTrace> Scene::trace(const TraceOptions& options)
 {
-    Result<Impl::Traced> traced = impl_->call(SceneError::WrongCall, [&] {
+    return impl_->call(SceneError::WrongCall, [&] {
         if (options.ids.empty()) refuse("there are no ids; give those of the points that are to be told of");
         if (options.last < options.first)
             refuse(fmt::format("frames {} to {} end before they begin", options.first, options.last));
         if (options.step < 1) refuse(fmt::format("step = {}; it must be at least 1", options.step));
         return impl_->trace(options);
     });
-    if (!traced) return traced.error();
-    if (traced->fault) try {
-            std::rethrow_exception(traced->fault);
-        } catch (...) {
-            traced->trace.fault = caught_error(traced->is_late ? SceneError::TooLong : SceneError::FailedFrame);
-        }
-    return std::move(traced->trace);
 }
 
 }  // namespace rapid

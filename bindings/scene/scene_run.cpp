@@ -189,7 +189,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
             try {
                 names.add(file, option);
             } catch (const Error& error) {
-                throw Error(fmt::format("{} {}: {}", option, file, error.message()));
+                throw Error(fmt::format("{} {}: {}", option, file, error.message()), error.kind());
             }
         };
         if (cache.asked())

@@ -47,7 +47,8 @@ enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
 
 struct Header {
     Outcome outcome;
-    std::size_t bytes;  // size of the message
+    std::size_t bytes;                  // of the message
+    ErrorKind kind = ErrorKind::Fault;  // of what was refused
 };
 
 std::function<void()>& further_limits()
@@ -158,10 +159,10 @@ void confine(pid_t parent, const Limits& limits)
 
 Header outcome_of(const std::function<void(MessageWriter&)>& read, const SharedMemory& shared)
 {
-    const auto refused = [&](const char* why) {
+    const auto refused = [&](const char* why, ErrorKind kind = ErrorKind::Fault) {
         MessageWriter writer(shared.message());
         writer.put_text(why);
-        return Header{Outcome::Refused, writer.bytes()};
+        return Header{Outcome::Refused, writer.bytes(), kind};
     };
     try {
         MessageWriter writer(shared.message());
@@ -169,6 +170,8 @@ Header outcome_of(const std::function<void(MessageWriter&)>& read, const SharedM
         return {Outcome::Read, writer.bytes()};
     } catch (const std::bad_alloc&) {
         return {Outcome::OutOfMemory, 0};
+    } catch (const Error& error) {
+        return refused(error.what(), error.kind());
     } catch (const std::exception& error) {
         return refused(error.what());
     } catch (...) {
@@ -191,7 +194,8 @@ Error beyond_limit(const Limits& limits)
         return Error(
             fmt::format("can't be read: its reader takes more than the {} that are left for it; read a smaller file, "
                         "or set {}",
-                        memory_text(static_cast<double>(limits.memory)), name_of(Setting::Memory)));
+                        memory_text(static_cast<double>(limits.memory)), name_of(Setting::Memory)),
+            ErrorKind::OutOfMemory);
     return Error(
         fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged", limits.memory >> 20));
 }
@@ -239,7 +243,7 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
         case Outcome::Read:
             return receive(reader);
         case Outcome::Refused:
-            throw Error(reader.take_text());
+            throw Error(reader.take_text(), header.kind);
         case Outcome::OutOfMemory:
             throw beyond_limit(limits);
         case Outcome::None:

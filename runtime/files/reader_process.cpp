@@ -71,32 +71,34 @@ bool take_text(int pipe, std::string& text)
 // The header of an answer: a message from the reader, or the text of an error.
 struct AnswerHeader {
     bool refused;
+    ErrorKind kind;  // if it is refused
     std::size_t bytes;
 };
 
-bool put_answer(int pipe, bool refused, const void* from, std::size_t bytes)
+bool put_answer(int pipe, const AnswerHeader& header, const void* from)
 {
-    const AnswerHeader header{refused, bytes};
-    return put(pipe, &header, sizeof header) && put(pipe, from, bytes);
+    return put(pipe, &header, sizeof header) && put(pipe, from, header.bytes);
 }
 
 bool answer(int pipe, const ReadRequest& request, std::size_t most_memory)
 {
-    const auto refuse = [&](const std::string& why) { return put_answer(pipe, true, why.data(), why.size()); };
+    const auto refuse = [&](const std::string& why, ErrorKind kind) {
+        return put_answer(pipe, {true, kind, why.size()}, why.data());
+    };
     bool sent = false;
     try {
         read_in_copy(
             request,
             [&](MessageReader& message) {
                 const std::span<const unsigned char> bytes = message.left();
-                sent = put_answer(pipe, false, bytes.data(), bytes.size());
+                sent = put_answer(pipe, {false, ErrorKind::Fault, bytes.size()}, bytes.data());
             },
             most_memory);
         return sent;
     } catch (const Error& error) {
-        return refuse(error.message());
+        return refuse(error.message(), error.kind());
     } catch (const std::exception& error) {
-        return refuse(fmt::format("can't be read: {}", error.what()));
+        return refuse(fmt::format("can't be read: {}", error.what()), ErrorKind::Fault);
     }
 }
 
@@ -166,7 +168,7 @@ public:
             if (!take(from, bytes.get(), header.bytes)) throw Error("can't be read: the reader process has ended");
         }
         const std::span<const unsigned char> message(bytes.get(), header.bytes);
-        if (header.refused) throw Error(std::string(message.begin(), message.end()));
+        if (header.refused) throw Error(std::string(message.begin(), message.end()), header.kind);
         MessageReader reader(message);
         receive(reader);
     }

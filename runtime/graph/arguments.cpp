@@ -53,9 +53,7 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
         if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
         param.assign(param, op.fields(), in_step(param, result, clock, frame));
     } catch (const Error& error) {
-        Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
-        placed.at(error.location()).with_trace(error.trace());
-        throw placed;
+        throw error.reworded(fmt::format("{} (frame {})", error.message(), frame.number));
     }
 }
 

@@ -93,9 +93,7 @@ private:
             param.type = "list of vec3, or points";
             return curves_of(points_in(param, value), closed_, "curve");
         } catch (const Error& error) {
-            Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
-            placed.at(error.location()).with_trace(error.trace());
-            throw placed;
+            throw error.reworded(fmt::format("{} (frame {})", error.message(), frame.number));
         }
     }
 

@@ -25,8 +25,7 @@ public:
                             "rapid.rotate, rapid.scale, or a product",
                             name_, describe(value)));
         } catch (const Error& error) {
-            Error placed(fmt::format("{} (frame {})", error.message(), frame.number));
-            placed.at(error.location()).with_trace(error.trace());
+            Error placed = error.reworded(fmt::format("{} (frame {})", error.message(), frame.number));
             if (const auto* written = dynamic_cast<const Located*>(function_.get())) placed.at(written->location());
             throw placed;
         }

@@ -265,7 +265,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
         try {
             field = token_of(*text);
         } catch (const Error& error) {
-            throw Error(fmt::format("{}: {}", param.name, error.what()));
+            throw Error(fmt::format("{}: {}", param.name, error.what()), error.kind());
         }
         return;
     }

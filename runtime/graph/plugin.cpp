@@ -22,7 +22,7 @@ std::string text_of(const std::string& file)
     try {
         return std::string(InputFile(file).text());
     } catch (const Error& error) {
-        throw Error(fmt::format("{}: the plugin {}", file, error.message()));
+        throw Error(fmt::format("{}: the plugin {}", file, error.message()), error.kind());
     }
 }
 
@@ -65,7 +65,7 @@ void load_plugin(const std::string& file)
     try {
         Registry();
     } catch (const Error& error) {
-        throw Error(fmt::format("{}: {}", file, error.message()));
+        throw Error(fmt::format("{}: {}", file, error.message()), error.kind());
     }
     loaded().push_back(file);
 }

@@ -334,7 +334,7 @@ PointSet read_npz(const std::filesystem::path& path)
                 LeftOut::add(
                     fmt::format("the array \"{}\", which is not of numbers or texts of each point", member.name));
         } catch (const Error& error) {
-            throw Error(fmt::format("\"{}\": {}", member.name, error.what()));
+            throw Error(fmt::format("\"{}\": {}", member.name, error.what()), error.kind());
         }
     };
 

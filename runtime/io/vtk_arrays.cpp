@@ -232,8 +232,8 @@ std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
         }
         return texts;
     } catch (const Error& error) {
-        throw Error(
-            fmt::format("the array \"{}\" of {} texts: {}", node.attribute("Name").value(), rows, error.what()));
+        throw Error(fmt::format("the array \"{}\" of {} texts: {}", node.attribute("Name").value(), rows, error.what()),
+                    error.kind());
     }
 }
 
@@ -262,7 +262,7 @@ std::optional<VtkArray> VtkFile::array(pugi::xml_node node, std::size_t rows) co
             array.decoded = decode(data, base64, rows * row);
         }
     } catch (const Error& error) {
-        throw Error(fmt::format("the array \"{}\" of {} rows: {}", name, rows, error.what()));
+        throw Error(fmt::format("the array \"{}\" of {} rows: {}", name, rows, error.what()), error.kind());
     }
     array.bytes = array.decoded;
     return array;

@@ -152,7 +152,7 @@ struct Merge {
             try {
                 append_input(result, ids_in_result, i, std::move(inputs[i]), now);
             } catch (Error& error) {
-                throw Error(fmt::format("input {}: {}", i + 1, error.message()));
+                throw Error(fmt::format("input {}: {}", i + 1, error.message()), error.kind());
             }
         }
         return result;

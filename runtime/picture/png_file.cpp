@@ -75,7 +75,7 @@ std::string encode_png(const Picture& picture)
         append_chunk(file, "IEND", "");
         return file;
     } catch (const std::bad_alloc&) {
-        throw Error("can't be written: out of memory");
+        throw Error("can't be written: out of memory", ErrorKind::OutOfMemory);
     }
 }
 

@@ -112,7 +112,8 @@ std::string_view Token::text() const { return number == 0 ? std::string_view("")
 Token token_of_number(std::uint32_t number)
 {
     if (number >= table().size())
-        throw Error(fmt::format("no text has the number {}; token_of() gives those that there are", number));
+        throw Error(
+            fmt::format("no text has the number {}; rapid_frame_token_of() gives those that there are", number));
     return {number};
 }
 

@@ -127,7 +127,7 @@ TEST_CASE("sessions that are stopped before their libraries are loaded leave not
     const auto stopped_session = [&] {
         SessionOptions options;
         options.interruption = std::make_shared<Interruption>();
-        options.interruption->request("stopped", Interruption::Asked);
+        options.interruption->request(Error("stopped"));
         CHECK_THROWS_WITH(Session(file, std::move(options)), "stopped");
     };
     stopped_session();

@@ -46,6 +46,16 @@ TEST_CASE("as an error rises, the place and the node nearest to the fault stay",
     CHECK(std::string(error.what()) == "lift.lua:16: node \"lift1\": x");
 }
 
+TEST_CASE("an error in other words is the same one", "[error]")
+{
+    Error error("x", ErrorKind::OutOfMemory);
+    error.at({"lift.lua", 16}).in_node("lift1").with_trace("lift.lua:16: in run");
+    const Error reworded = error.reworded("x (frame 3)");
+    CHECK(std::string(reworded.what()) == "lift.lua:16: node \"lift1\": x (frame 3)");
+    CHECK(reworded.kind() == ErrorKind::OutOfMemory);
+    CHECK(reworded.trace() == error.trace());
+}
+
 TEST_CASE("a script's call stack is kept apart from the message", "[error]")
 {
     Error error("x");

@@ -34,11 +34,11 @@ void take(Told& told, std::size_t mebibytes, bool leave)
     malloc_trim(0);  // releases memory that other tests freed, which the watch would do otherwise
     const MemoryWatch watch(
         MemoryWatch::now(),
-        [&](const std::string& message) {
-            told.message = message;
+        [&](const Error& error) {
+            told.message = error.message();
             ++told.beyond;
         },
-        [&](const std::string&) { ++told.too_late; });
+        [&](const Error&) { ++told.too_late; });
     const std::vector<char> memory(mebibytes << 20, 1);
     if (leave)
         told.waits_for(told.beyond);
@@ -69,7 +69,7 @@ TEST_CASE("little memory is let pass whatever the budget", "[memory]")
     const MemoryBudget budget(1);
     int told = 0;
     {
-        const MemoryWatch watch(MemoryWatch::now(), [&](const std::string&) { ++told; }, {});
+        const MemoryWatch watch(MemoryWatch::now(), [&](const Error&) { ++told; }, {});
         const std::vector<char> memory(std::size_t{32} << 20, 1);
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }

@@ -532,6 +532,40 @@ TEST_CASE("limits of memory are errors of the scene that has them", "[scene]")
     good(Scene::open_text("grid.lua", grid));
 }
 
+TEST_CASE("the kind of an error does not follow from its words", "[scene]")
+{
+    for (const char* words : {"the run was cancelled", "out of memory", "not enough memory in the tank",
+                              "set a limit, or set --memory", "--script-memory sets the limit"}) {
+        INFO(words);
+        const std::string script = std::string("error '") + words + "'";
+        CHECK(Scene::open_text("cloud.lua", script).error().kind == SceneError::WrongScene);
+        Scene scene = opened(
+            "local rapid = require 'rapid'\n"
+            "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }\n"
+            "  :points('fails', function(p) " +
+            script + " end) :solve {}");
+        CHECK(scene.advance().error().kind == SceneError::FailedFrame);
+    }
+}
+
+TEST_CASE("an error that a script catches and raises again keeps its kind", "[scene]")
+{
+    SceneOptions options;
+    options.memory = std::uint64_t{64} << 20;
+    const auto error = [&](const std::string& inner) {
+        return Scene::open_text("cloud.lua",
+                                "local rapid = require 'rapid'\n"
+                                "local _, why = pcall(function() " +
+                                    inner + " end)\nerror('again: ' .. why)",
+                                options)
+            .error();
+    };
+    const SceneError memory = error("rapid.points.grid { size = {10, 10, 10}, spacing = 0.05 }");
+    CHECK_THAT(memory.message, Contains("again: ") && Contains("would take about"));
+    CHECK(memory.kind == SceneError::OutOfMemory);
+    CHECK(error("rapid.points.grid { size = {10, 10, 10}, spacing = -1 }").kind == SceneError::WrongScene);
+}
+
 TEST_CASE("a scene whose frames take more memory than it has is an error, and goes on", "[scene]")
 {
     // Texts of details, a few hundred MiB in each frame, which nobody estimates.

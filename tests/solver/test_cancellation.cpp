@@ -39,7 +39,7 @@ TEST_CASE("a step of hours ends when another thread cancels it", "[solve][thread
         message = error.what();
     }
     other.join();
-    CHECK(message == Cancellation::text);
+    CHECK(message == Cancellation::cancelled().message());
 
     // Outside of the scope nothing is cancelled.
     Scene next(points(places));

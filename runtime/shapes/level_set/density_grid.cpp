@@ -144,7 +144,7 @@ DensityGridPtr fog_of_file(const std::filesystem::path& path, const std::string&
     try {
         return std::make_shared<OpenDensityGrid>(grid);
     } catch (const Error& error) {
-        throw Error(fmt::format("cannot use \"{}\": {}", path.string(), error.message()));
+        throw Error(fmt::format("cannot use \"{}\": {}", path.string(), error.message()), error.kind());
     }
 }
 

@@ -113,7 +113,7 @@ typename Grid::Ptr read_grid_apart(const ApartReader<typename Grid::Ptr>& reader
         return reader(path, name);
     } catch (Error& error) {
         if (error.message().find(path.string()) != std::string::npos) throw;
-        throw Error(fmt::format("cannot read \"{}\": {}", path.string(), error.message()));
+        throw Error(fmt::format("cannot read \"{}\": {}", path.string(), error.message()), error.kind());
     }
 }
 

@@ -141,7 +141,7 @@ MeshFile read_mesh_file(const std::filesystem::path& path)
         file = read_any(path, extension);
         check(file);
     } catch (const Error& error) {
-        throw Error(fmt::format("cannot read the mesh \"{}\": {}", path.string(), error.message()));
+        throw Error(fmt::format("cannot read the mesh \"{}\": {}", path.string(), error.message()), error.kind());
     }
     for (std::size_t i = 0; i < file.positions.size(); ++i)
         if (!file.positions[i].allFinite())

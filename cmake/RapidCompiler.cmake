@@ -39,6 +39,11 @@ target_compile_options(rapid_private INTERFACE
   # The same for executables as for the library, so that they share precompiled headers. Calls inside the library may
   # be inlined although it is shared: nobody replaces a function of it.
   -fPIC -fno-semantic-interposition)
+# Without collecting garbage g++ takes 10 to 20 % less time and 15 % more memory (1.4 GB for the largest batch).
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(rapid_private INTERFACE
+    "SHELL:--param ggc-min-expand=400" "SHELL:--param ggc-min-heapsize=2000000")
+endif()
 # g++ 12 sees overlapping copies in `"text" + std::string` where there are none (its bug 105651, mended in 13), and
 # uninitialised values in its own AVX-512 functions (105593) and in vectors that Eigen leaves for the caller to set.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)

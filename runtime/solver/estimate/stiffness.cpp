@@ -163,11 +163,12 @@ public:
     {
         const Eigen::Matrix3d &J = by.by_position, &K = by.by_velocity;
         if (!J.allFinite() || !K.allFinite() || (J.isZero(0) && K.isZero(0))) return;
-        Eigen::Matrix<double, 6, 6> both;
+        Eigen::MatrixXd both(6, 6);
         both << Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Identity(), J, K - k * Eigen::Matrix3d::Identity();
-        const Eigen::EigenSolver<Eigen::Matrix<double, 6, 6>> oscillating(both, false);
+        // Both have the type of matrices of any size, because each type of matrix takes 12 s to compile.
+        const Eigen::EigenSolver<Eigen::MatrixXd> oscillating(both, false);
         add(Stiffness::Oscillation, i, dt * oscillating.eigenvalues().imag().cwiseAbs().maxCoeff());
-        const Eigen::EigenSolver<Eigen::Matrix3d> decaying(K, false);
+        const Eigen::EigenSolver<Eigen::MatrixXd> decaying(Eigen::MatrixXd(K), false);
         add(Stiffness::Decay, i, -dt * decaying.eigenvalues().real().minCoeff());
     }
 

@@ -11,14 +11,14 @@ namespace {
 //
 //   J  = ∫ e^-k(t-s) H(s) ds     by which H' exceeds b times e^-kt
 //   h  = (1 - e^-kt)/k
-struct Response {
+struct ImpulseResponse {
     double H, J, y0, decay, log_scale;  // y0: the response to y(0) = 1, y'(0) = 0; decay: e^-kt
     double Q, J2;                       // ∫ H and ∫ J, if there is a series; log_scale is then 0
     bool is_series;
 };
 
 // Taylor series in t; k t up to 2 and |b| t² up to 1, for which terms decrease as 2^n/n!.
-Response response_by_series(double k, double b, double t)
+ImpulseResponse response_by_series(double k, double b, double t)
 {
     const double kt = k * t, bt2 = b * t * t;
     double before = 0, term = 1, j = 0;  // coefficients of H and J
@@ -39,7 +39,7 @@ Response response_by_series(double k, double b, double t)
 }
 
 // Closed form with exponentials, R² = k²/4 + b > 0.
-Response by_exponentials(double k, double b, double R, double t)
+ImpulseResponse by_exponentials(double k, double b, double R, double t)
 {
     const double rho = R + 0.5 * k, sigma = b / rho;  // H = (e^(sigma t) - e^(-rho t)) / 2R
     const double e = std::exp(-2 * R * t), decay = std::exp(-rho * t);
@@ -48,14 +48,14 @@ Response by_exponentials(double k, double b, double R, double t)
 }
 
 // Closed form with sine and cosine, w² = -R² >= 0.
-Response by_oscillation(double k, double b, double w, double t)
+ImpulseResponse by_oscillation(double k, double b, double w, double t)
 {
     const double angle = w * t, half = std::exp(-0.5 * k * t), decay = std::exp(-k * t);
     const double H = half * (angle > 0 ? std::sin(angle) / w : t), slope = half * std::cos(angle) - 0.5 * k * H;
     return {H, (slope - decay) / b, slope + k * H, decay, 0, 0, 0, false};
 }
 
-Response respond_of(double k, double b, double t)
+ImpulseResponse respond_of(double k, double b, double t)
 {
     if (k * t <= 2 && std::abs(b) * t * t <= 1) return response_by_series(k, b, t);
     const double R2 = 0.25 * k * k + b;
@@ -88,7 +88,7 @@ Dragged one_way(double v, double g, double k, double c, double t)
         found.rate = k + std::log1p(drag_alone) / t;
         return found;
     }
-    const Response r = respond_of(k, b, t);
+    const ImpulseResponse r = respond_of(k, b, t);
     const double y = r.y0 + c * v * r.H;
     const double distance = r.is_series ? std::log1p(b * r.Q + c * v * r.H) : r.log_scale + std::log(y);  // times c
     found.by.v_of_v = r.decay / y;

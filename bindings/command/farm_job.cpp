@@ -8,7 +8,6 @@
 #include "runtime/checked_json.h"
 #include "runtime/error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/whole_file.h"
 
 namespace rapid {
 namespace {

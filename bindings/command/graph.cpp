@@ -4,7 +4,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
-#include "runtime/files/whole_file.h"
+#include "runtime/files/input_file.h"
 #include "runtime/threads.h"
 
 namespace rapid {

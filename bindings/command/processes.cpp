@@ -21,7 +21,7 @@
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/signals.h"
 #include "runtime/files/file_error.h"
-#include "runtime/files/program_path.h"
+#include "runtime/files/start_program.h"
 
 namespace rapid {
 namespace {

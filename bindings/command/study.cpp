@@ -29,7 +29,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/host/graph_parameter.h"
 #include "bindings/run/study_scene.h"
-#include "runtime/files/whole_file.h"
+#include "runtime/files/input_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/progress.h"
 #include "runtime/threads.h"

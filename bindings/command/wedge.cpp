@@ -29,7 +29,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/temporary_folder.h"
-#include "runtime/files/whole_file.h"
+#include "runtime/files/input_file.h"
 #include "runtime/printable.h"
 #include "runtime/report/number_text.h"
 

@@ -10,7 +10,6 @@
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
 #include "runtime/at_node.h"
-#include "runtime/graph/make_node.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {

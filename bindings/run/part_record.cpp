@@ -9,7 +9,6 @@
 #include "runtime/error.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/whole_file.h"
 #include "runtime/setting_names.h"
 
 namespace rapid {

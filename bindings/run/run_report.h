@@ -2,6 +2,8 @@
 // statistics and its profile; and what a cache keeps of all that.
 #pragma once
 
+#include <chrono>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -10,14 +12,70 @@
 #include <vector>
 
 #include "bindings/run/frame_files.h"
-#include "bindings/run/profile_file.h"
 #include "bindings/run/run_cache.h"
-#include "bindings/run/statistics_file.h"
+#include "runtime/error.h"
+#include "runtime/files/output_file.h"
+#include "runtime/graph/evaluate.h"
+#include "runtime/io/frame_writer.h"
 #include "runtime/report/frame_warnings.h"
+#include "runtime/report/statistics.h"
 #include "runtime/report/totals.h"
 #include "runtime/stopwatch.h"
 
 namespace rapid {
+
+// The file of --stats, written while the run goes on: a run of many frames keeps none of them.
+
+// What fails is told at the end: the frames of the run are worth more.
+class StatisticsFile {
+public:
+    StatisticsFile(std::string path, const RunStatistics& run);
+
+    // A frame waits for the time of writing its files, which come later.
+    void add(const FrameStatistics& frame);
+    void add_writing(std::int64_t frame, double seconds);
+    // Writes the frames before this one, of whose files none is to come; all, where none is to come of any.
+    void write_before(std::optional<std::int64_t> frame);
+
+    // Writes all frames and the end, and names the file; a second call does nothing. Error: it could not be written.
+    void finish(const RunStatistics& run);
+
+private:
+    void append(const std::string& text);
+
+    const std::string path_;
+    std::optional<OutputFile> file_;
+    std::optional<Error> error_;
+    std::deque<FrameStatistics> waiting_;
+    bool is_first_ = true, is_finished_ = false;
+};
+
+// The file of --profile: what each pass, frame and file took, in the trace format of Chrome, which the browser
+// (chrome://tracing) and Perfetto open.
+
+// Written while the run goes on. What fails is told at the end: the frames of the run are worth more.
+class ProfileFile {
+public:
+    explicit ProfileFile(std::string path);
+
+    void add(const FrameResult& result);
+    void add(const FrameWriter::Written& file);
+
+    // Ends the list and names the file; a second call does nothing. Error: it could not be written.
+    void finish();
+
+private:
+    using Clock = std::chrono::steady_clock;
+    double microseconds(Clock::time_point moment) const;
+    void append(const std::string& event);
+
+    const std::string path_;
+    const Clock::time_point begin_ = Clock::now();
+    std::optional<OutputFile> file_;
+    std::optional<Error> error_;
+    bool is_first_ = true, is_finished_ = false;
+    std::vector<double> lanes_;  // µs, when the last file of each row of files was done: those of a row do not overlap
+};
 
 class RunReport {
 public:

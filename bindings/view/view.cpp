@@ -21,7 +21,7 @@
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
 #include "runtime/files/output_file.h"
-#include "runtime/files/program_path.h"
+#include "runtime/files/start_program.h"
 #include "runtime/memory_budget.h"
 #include "runtime/threads.h"
 

@@ -9,9 +9,22 @@
 #include <cerrno>
 
 #include "runtime/files/file_error.h"
+#include "runtime/files/output_file.h"
 #include "runtime/memory_budget.h"
 
 namespace rapid {
+
+void write_whole(const std::filesystem::path& path, std::string_view bytes)
+{
+    try {
+        OutputFile file(path);
+        file.append(bytes.data(), bytes.size());
+        file.finish();
+    } catch (Error& error) {
+        throw error.at({path.string(), 0});
+    }
+}
+
 namespace {
 
 struct OpenFile {

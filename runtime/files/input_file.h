@@ -9,6 +9,11 @@
 
 namespace rapid {
 
+// Files that a command writes in addition to frames, such as reports.
+
+// Writes a file completely or not at all. Throws Error, with the file's name, if the file system does.
+void write_whole(const std::filesystem::path& path, std::string_view bytes);
+
 class InputFile {
 public:
     // Throws Error if the file does not exist or is not a regular file (reading from a pipe might never end).

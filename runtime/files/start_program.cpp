@@ -7,11 +7,24 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
 
 #include "runtime/error.h"
 
 namespace rapid {
+
+std::string program_path(const std::string& name)
+{
+    const char* const path = std::getenv("PATH");
+    std::istringstream folders(path ? path : "/usr/bin");
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const std::string file = folder + "/" + name;
+        if (folder.starts_with('/') && ::access(file.c_str(), X_OK) == 0) return file;
+    }
+    return "";
+}
 
 pid_t start_program(const std::string& path, std::vector<std::string> words,
                     const std::vector<std::pair<int, int>>& descriptors)

@@ -1,6 +1,7 @@
 #include "runtime/graph/changing_node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -10,6 +11,158 @@
 #include "runtime/solver/placed_constraint.h"
 
 namespace rapid {
+namespace {
+
+constexpr int most_values = 5;  // at steps, of which four give the value and all five its error
+constexpr std::size_t most_used = 4;
+constexpr std::size_t most_coordinates = 3 * 4096;
+
+// Adds the numbers of a value, lists of lists too; false where it has anything else.
+bool add_numbers(const Value& value, std::vector<double>& numbers)
+{
+    if (const double* number = value.get<double>()) {
+        numbers.push_back(*number);
+    } else if (const Vec3d* v = value.get<Vec3d>()) {
+        numbers.insert(numbers.end(), v->data(), v->data() + 3);
+    } else if (const Table* table = value.table(); table && table->named.empty() && table->numbered.empty()) {
+        for (const Value& entry : table->list)
+            if (numbers.size() >= most_coordinates || !add_numbers(entry, numbers)) return false;
+    } else {
+        return false;
+    }
+    return true;
+}
+
+// The numbers of a value; empty where it has others, or none.
+std::vector<double> numbers_of(const Value& value)
+{
+    std::vector<double> numbers;
+    const auto is_finite = [](double x) { return std::isfinite(x); };
+    if (!add_numbers(value, numbers) || !std::all_of(numbers.begin(), numbers.end(), is_finite)) return {};
+    return numbers;
+}
+
+// Of values that are no numbers.
+bool same(const Value& a, const Value& b)
+{
+    const AttributeRef *attribute = a.get<AttributeRef>(), *other = b.get<AttributeRef>();
+    if (attribute && other) return attribute->name == other->name;
+    const ObjectPtr *object = a.get<ObjectPtr>(), *another = b.get<ObjectPtr>();
+    return object && another && *object == *another;
+}
+
+// Numbers in the form of another value, from `next` on.
+Value in_form_of(const Value& value, const std::vector<double>& numbers, std::size_t& next)
+{
+    if (value.get<double>()) return numbers[next++];
+    if (value.get<Vec3d>()) {
+        const Vec3d v(numbers[next], numbers[next + 1], numbers[next + 2]);
+        next += 3;
+        return v;
+    }
+    auto table = std::make_shared<Table>();
+    for (const Value& entry : value.table()->list) table->list.push_back(in_form_of(entry, numbers, next));
+    return std::shared_ptr<const Table>(std::move(table));
+}
+
+}  // namespace
+
+double interpolated(std::span<const double> values, int first, std::size_t used, double x)
+{
+    const auto count = static_cast<int>(values.size());
+    const int nodes = std::min(static_cast<int>(used), count);
+    const int from = std::clamp(-first + 1 - nodes / 2, 0, count - nodes);
+    double sum = 0;
+    for (int i = from; i < from + nodes; ++i) {
+        double weight = 1;
+        for (int k = from; k < from + nodes; ++k)
+            if (k != i) weight *= (x - (first + k)) / (i - k);
+        sum += weight * values[static_cast<std::size_t>(i)];
+    }
+    return sum;
+}
+
+bool jumps(std::span<const double> values)
+{
+    std::vector<double> differences(values.begin(), values.end());
+    double steepest = 0;
+    for (std::size_t order = 1; order < values.size(); ++order) {
+        for (std::size_t i = 0; i + order < values.size(); ++i) differences[i] = differences[i + 1] - differences[i];
+        for (std::size_t i = 0; order == 1 && i + 1 < values.size(); ++i)
+            steepest = std::max(steepest, std::abs(differences[i]));
+    }
+    return std::abs(differences[0]) > 0.5 * steepest;
+}
+
+void FrameCurve::move_to(std::int64_t step, const FrameClock& clock)
+{
+    const auto value_at = [&](std::int64_t at) -> const Value& {
+        const auto found = known_.find(at);
+        return found != known_.end() ? found->second
+                                     : known_.emplace(at, function_.call(clock.at_step(at))).first->second;
+    };
+    changes_ = false;
+    values_.clear();
+    begin_ = step > clock.start ? value_at(step - 1) : value_at(step);
+    end_ = value_at(step);
+    const std::size_t coordinates = numbers_of(end_).size();
+    const std::int64_t first = std::max(clock.start, step - most_values + 2);
+    known_.erase(known_.begin(), known_.lower_bound(first));
+    if (step <= clock.start) return;
+    if (coordinates == 0) {
+        changes_ = !same(begin_, end_);
+        known_.erase(known_.begin(), known_.lower_bound(step));
+        return;
+    }
+
+    // From the end of the step to where numbers end, and then on.
+    std::vector<std::vector<double>> before, after;
+    const auto add = [&](std::int64_t at, auto& list) {
+        std::vector<double> numbers;
+        try {
+            numbers = numbers_of(value_at(at));
+        } catch (const Error&) {  // where it is needed, it is called again
+            if (at < step) throw;
+        }
+        const bool fits = numbers.size() == coordinates;
+        if (fits) list.push_back(std::move(numbers));
+        return fits;
+    };
+    for (std::int64_t at = step; at >= first && add(at, before); --at) {
+    }
+    if (before.size() < 2) return;
+    const std::int64_t last = std::max(step + 1, first + most_values - 1);
+    for (std::int64_t at = step + 1; at <= last && add(at, after); ++at) {
+    }
+    first_ = 2 - static_cast<int>(before.size());
+    changes_ = before[0] != before[1];
+    std::reverse(before.begin(), before.end());
+    before.insert(before.end(), after.begin(), after.end());
+    values_.assign(coordinates, {});
+    for (const std::vector<double>& numbers : before) {
+        for (std::size_t k = 0; k < coordinates; ++k) values_[k].push_back(numbers[k]);
+        changes_ |= numbers != before.front();
+    }
+}
+
+Value FrameCurve::at(double part, bool finer) const
+{
+    if (!changes_) return end_;
+    if (values_.empty()) return finer && part < 0.5 ? begin_ : end_;
+    std::vector<double> numbers;
+    for (const std::vector<double>& values : values_) {
+        const double begin = values[static_cast<std::size_t>(-first_)],
+                     end = values[static_cast<std::size_t>(1 - first_)];
+        const double line = begin + part * (end - begin);
+        const bool is_curve = values.size() > 2 && !jumps(values);
+        const std::size_t used = finer ? values.size() : std::min(most_used, values.size() - 1);
+        const double curve = is_curve ? interpolated(values, first_, used, part) : finer ? end : line;
+        numbers.push_back(param_.range.contains(curve) ? curve : line);
+    }
+    std::size_t next = 0;
+    return in_form_of(end_, numbers, next);
+}
+
 namespace {
 
 template <class D>

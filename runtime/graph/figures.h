@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/collision/contact_audit.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/stiffness.h"

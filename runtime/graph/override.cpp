@@ -7,7 +7,6 @@
 
 #include "runtime/at_node.h"
 #include "runtime/graph/arguments.h"
-#include "runtime/graph/make_node.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/registry.h"
 

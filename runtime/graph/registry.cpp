@@ -4,8 +4,36 @@
 
 #include <algorithm>
 #include <mutex>
+#include <new>
+#include <vector>
 
 namespace rapid {
+namespace {
+
+// Those that the outermost end() of this thread has still to delete.
+thread_local std::vector<Node*>* waiting = nullptr;
+
+void end(Node* node)
+{
+    if (waiting) try {
+            return waiting->push_back(node);
+        } catch (const std::bad_alloc&) {  // then within its destructor
+        }
+    if (waiting) return delete node;
+    std::vector<Node*> nodes;
+    waiting = &nodes;
+    for (delete node; !nodes.empty();) {
+        Node* const next = nodes.back();
+        nodes.pop_back();
+        delete next;
+    }
+    waiting = nullptr;
+}
+
+}  // namespace
+
+std::shared_ptr<Node> make_node(const Node& node) { return {new Node(node), end}; }
+
 namespace {
 
 // Filled during static initialisation, in link order; a function-local static, so that it exists before the first

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "runtime/error.h"
-#include "runtime/files/program_path.h"
 #include "runtime/files/start_program.h"
 
 namespace rapid {

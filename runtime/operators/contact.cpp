@@ -1,7 +1,7 @@
 // contact: points collide as spheres, with friction and restitution (paper §5.1, §5.2).
 //
 // Pairs are found in sparse grids of cells, one per cluster of radii: `max_difference` and `max_grids` trade the time
-// of many grids against that of wide cells (Algorithm 1; solver/constraints/radius_grids.h).
+// of many grids against that of wide cells (Algorithm 1; solver/constraints/contact_search.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/solver/constraints/contact_forces.h"

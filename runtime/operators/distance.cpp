@@ -2,7 +2,7 @@
 //
 //   C = |P_i - P_j| - rest >= and <= 0        compliance in m/N: 0 for a rod, 1 / stiffness for a spring
 //
-// Chains and trees of pairs are solved directly at any length (solver/constraints/tree_solver.h).
+// Chains and trees of pairs are solved directly at any length (solver/constraints/tree_motion.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"

@@ -10,7 +10,6 @@
 
 #include "runtime/error.h"
 #include "runtime/files/file_error.h"
-#include "runtime/files/program_path.h"
 #include "runtime/files/start_program.h"
 
 namespace rapid {

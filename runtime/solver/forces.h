@@ -11,6 +11,10 @@
 
 namespace rapid {
 
+// The mass of points without the attribute.
+
+inline constexpr float unit_mass = 1;  // kg
+
 class Shape;
 
 // The points of a chunk in the middle of a step. Their state is in double precision within the frame and rounded to

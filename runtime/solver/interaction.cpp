@@ -12,7 +12,7 @@
 #include "runtime/points/members.h"
 #include "runtime/points/neighbours.h"
 #include "runtime/random.h"
-#include "runtime/solver/unit_mass.h"
+#include "runtime/solver/forces.h"
 
 namespace rapid {
 namespace {

@@ -12,9 +12,9 @@
 #include <string>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/collision/contact_audit.h"
 #include "runtime/solver/constraints/constraint.h"
-#include "runtime/solver/constraints/sleep_records.h"
+#include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/ledger.h"
 

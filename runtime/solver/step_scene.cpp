@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "runtime/points/members.h"
-#include "runtime/solver/unit_mass.h"
+#include "runtime/solver/forces.h"
 
 namespace rapid {
 namespace {

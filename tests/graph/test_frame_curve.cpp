@@ -1,4 +1,4 @@
-#include "runtime/graph/frame_curve.h"
+#include "runtime/graph/changing_node.h"
 
 #include <cmath>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "runtime/graph/adopted_ids.h"
+#include "runtime/graph/simulation.h"
 #include "tests/operators/graph_test.h"
 #include "tests/solver/motion/uniform_force.h"
 

@@ -1,5 +1,5 @@
 // Arrays in blocks of pages.
-#include "runtime/points/page_array.h"
+#include "runtime/points/cell_grid.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,3 @@
-#include "runtime/processor_levels/type_layout.h"
 
 #include <array>
 #include <cstdint>

@@ -1,18 +1,35 @@
 // The audit of contacts: counts them, records them for the points, and sums their effect on energy.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "runtime/solver/collision/collision_block.h"
-#include "runtime/solver/collision/contact_energy.h"
 #include "runtime/solver/collision/ejection.h"
 #include "runtime/solver/collision/free_motion.h"
 #include "runtime/solver/collision/stuck_points.h"
 #include "runtime/solver/collision/touched_points.h"
 
 namespace rapid {
+
+// The energy that contacts add to points and remove from them, for the audit of a method (numerics.md, Collision).
+
+// J, kinetic energy plus the potential energy of each substep's constant acceleration. A contact with a shape at rest
+// adds none: any gain is the work of moving shapes, or the error of a method.
+struct ContactEnergy {
+    double added = 0, lost = 0;  // each summed over points and substeps
+
+    void take(double change) { (change > 0 ? added : lost) += std::abs(change); }
+    ContactEnergy& operator+=(const ContactEnergy& other)
+    {
+        added += other.added;
+        lost += other.lost;
+        return *this;
+    }
+    bool operator==(const ContactEnergy&) const = default;
+};
 
 struct ContactCounts {
     std::uint64_t contacts = 0;  // faster than those of a resting point, which are due to rounding

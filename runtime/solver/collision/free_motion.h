@@ -9,7 +9,7 @@
 #include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/motion/damped_motion.h"
 #include "runtime/solver/motion/free_paths.h"
-#include "runtime/solver/surface_potential.h"
+#include "runtime/solver/surface_springs.h"
 
 namespace rapid {
 

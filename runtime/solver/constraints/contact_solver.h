@@ -6,8 +6,6 @@
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_pack.h"
 #include "runtime/solver/constraints/impact.h"
-#include "runtime/solver/constraints/point_pack.h"
-#include "runtime/solver/constraints/resting_speed.h"
 #include "runtime/solver/constraints/spin.h"
 
 namespace rapid {

@@ -5,9 +5,8 @@
 #include "runtime/solver/constraints/contact_material.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/pair_impulses.h"
-#include "runtime/solver/constraints/radius_grids.h"
 #include "runtime/solver/constraints/shape_contacts.h"
-#include "runtime/solver/constraints/sleep_records.h"
+#include "runtime/solver/constraints/sleep.h"
 
 namespace rapid {
 

@@ -14,7 +14,7 @@
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_solver.h"
 #include "runtime/solver/constraints/energy_bound.h"
-#include "runtime/solver/constraints/resting_speed.h"
+#include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/spin.h"
 #include "runtime/stopwatch.h"
 

@@ -28,11 +28,11 @@
 #include <span>
 #include <vector>
 
-#include "runtime/solver/collision/contact_energy.h"
+#include "runtime/solver/collision/contact_audit.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/disjoint_sets.h"
 #include "runtime/solver/constraints/rigid_fallback.h"
-#include "runtime/solver/surface_potential.h"
+#include "runtime/solver/surface_springs.h"
 
 namespace rapid {
 

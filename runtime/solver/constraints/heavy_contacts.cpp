@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "runtime/solver/constraints/resting_speed.h"
+#include "runtime/solver/constraints/impact.h"
 
 namespace rapid {
 namespace {

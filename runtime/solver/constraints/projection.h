@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "runtime/solver/constraints/carried_impulses.h"
+#include "runtime/solver/constraints/pair_impulses.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/holding.h"

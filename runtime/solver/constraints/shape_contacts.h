@@ -16,12 +16,71 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/collision/obstacle.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
-#include "runtime/solver/constraints/shape_clearance.h"
 
 namespace rapid {
+
+// A fingerprint of the shapes that points rest on. It changes when a shape is added, removed, moved or tilted, or
+// changes its friction, bounce or response.
+
+// Distance, in radii, below which a point touches a shape; a resting point may also be flush with it.
+constexpr double touch = 0.01;
+
+struct ShapeGrip {
+    std::uint64_t hash = 0;        // of the touched shapes' indices in the chain and their parameters
+    Vec3f normal = Vec3f::Zero();  // the sum of their normals
+
+    bool is_like(const ShapeGrip& other) const;
+};
+
+// Returns the grips of the points with these indices in P; time: s since the beginning of the frame.
+std::vector<ShapeGrip> shape_grips(std::span<const std::uint32_t> points, std::span<const Obstacle> obstacles,
+                                   std::span<const Vec3d> P, double time);
+
+// Finds points that may be near shapes from lower bounds of their distances, so that most points need no query in a
+// substep.
+
+// Query of a chunk's points for their distances from a shape. Reused to keep its memory.
+struct ShapeQuery {
+    std::span<const Vec3d> free;             // positions after the points' free motion
+    std::size_t begin = 0;                   // the chunk's first point
+    double since = 0;                        // s, from the beginning of the frame to the end of the sub-step
+    std::vector<std::uint32_t> open;         // points that may be near some shape
+    std::vector<double> moved, since_asked;  // m, in this substep, and since distances were first queried; by chunk
+
+    std::vector<std::uint32_t> asked;  // points queried for one shape
+    std::vector<Vec3d> P, gradient;    // of the queried points
+    std::vector<double> phi, time;     // m, s
+
+    // Returns the distance that a point may move in a substep, m. Contacts that are farther away are skipped.
+    double reach(const Obstacle& obstacle, std::size_t i) const;
+};
+
+class ShapeClearance {
+public:
+    ShapeClearance(std::span<const Obstacle> obstacles, std::size_t size);
+
+    // Lists the open points from `begin` to `end`.
+    void open(ShapeQuery& query, const Substep& step, std::size_t end);
+    // Queries one shape for the points that may be near it, and stores their distances.
+    void ask(ShapeQuery& query, std::size_t obstacle, const Substep& step);
+    // Closes the query after all shapes.
+    void close(const ShapeQuery& query, std::size_t obstacle);
+    void begin(std::span<const Vec3d> free);
+
+private:
+    void list(ShapeQuery& query, std::size_t obstacle, const Substep& step);
+
+    std::span<const Obstacle> obstacles_;
+    std::size_t size_;
+    bool any_moves_;
+    std::vector<float> clearance_;  // m, [obstacles, size]: lower bound of the distance at asked_at_
+    std::vector<Vec3d> asked_at_;
+    std::vector<float> room_;  // m: distance that a point may move or be pushed without coming near any of them
+};
 
 // The loads on shapes at the end of a frame: the warm start of the next one.
 struct ShapeLoads {

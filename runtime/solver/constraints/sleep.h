@@ -26,11 +26,54 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/constraints/islands.h"
-#include "runtime/solver/constraints/sleep_records.h"
+#include "runtime/solver/constraints/disjoint_sets.h"
+#include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/vec.h"
 
 namespace rapid {
+
+// The conditions under which sleeping points fell asleep, stored between frames.
+
+struct SleepRecords {
+    struct Record {
+        std::int64_t id;
+        Vec3f P;              // m
+        double inverse_mass;  // 1/kg
+        Vec3f acceleration;   // m/s²
+        ShapeGrip grip;       // of the shapes that it touches
+        float load;           // N, the total pressure of other points
+    };
+    std::vector<Record> records;
+};
+
+// Islands: points that fall asleep and wake together, because rows carry forces between them.
+
+class Islands {
+public:
+    // weight: inverse masses. A point of infinite mass separates the points linked to it, like a wall.
+    explicit Islands(std::span<const double> weight) : weight_(weight) {}
+
+    // Links points that a row acts between.
+    void link(std::span<const std::uint32_t> points);
+    // Makes a point kinematic: it belongs to an island, but no row moves it.
+    void make_kinematic(std::uint32_t i);
+    // Numbers the islands in the order of their first points.
+    void close();
+
+    std::size_t size() const { return begin_.size() - 1; }
+    std::span<const std::uint32_t> operator[](std::size_t island) const  // ascending
+    {
+        return std::span(points_).subspan(begin_[island], begin_[island + 1] - begin_[island]);
+    }
+    bool has(std::size_t i) const { return !linked_.empty() && linked_[i]; }
+    bool is_kinematic(std::size_t i) const { return !kinematic_.empty() && kinematic_[i]; }
+
+private:
+    std::span<const double> weight_;
+    std::optional<DisjointSets> sets_;              // set after points are linked
+    std::vector<std::uint8_t> linked_, kinematic_;  // empty if no point is
+    std::vector<std::uint32_t> begin_{0}, points_;
+};
 
 struct Obstacle;
 struct OwnTime;

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "runtime/parallel.h"
-#include "runtime/solver/constraints/resting_speed.h"
+#include "runtime/solver/constraints/impact.h"
 
 namespace rapid {
 namespace {

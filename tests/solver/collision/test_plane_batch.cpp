@@ -1,4 +1,4 @@
-#include "runtime/solver/collision/plane_batch.h"
+#include "runtime/solver/collision/plane_contacts.h"
 
 #include <cmath>
 

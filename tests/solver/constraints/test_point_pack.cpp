@@ -1,5 +1,5 @@
 // Packs of eight: gather and scatter by any indices, and arithmetic lane by lane.
-#include "runtime/solver/constraints/point_pack.h"
+#include "runtime/solver/constraints/contact_pack.h"
 
 #include <cmath>
 #include <vector>

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "runtime/solver/constraints/row_system.h"
+#include "runtime/solver/constraints/system_motion.h"
 #include "tests/test.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "runtime/solver/constraints/row_system.h"
+#include "runtime/solver/constraints/system_motion.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "runtime/processor_levels/type_layout.h"
+#include "runtime/processor_levels/shared_types.h"
 
 #include <fmt/format.h>
 

@@ -13,8 +13,8 @@ install(TARGETS rapid_deferred LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 # Of the runtime's headers those that are promised to plugins and to programs without Lua, and what they include; the
 # others are the library's own.
 set(promised
-  runtime/error.h runtime/files/input_file.h runtime/graph/node.h runtime/graph/plugin.h runtime/graph/registry.h
-  runtime/graph/stateful.h runtime/io/format.h runtime/parallel.h runtime/points/members.h runtime/points/point_set.h
+  runtime/base/error.h runtime/files/input_file.h runtime/graph/node.h runtime/graph/plugin.h runtime/graph/registry.h
+  runtime/graph/stateful.h runtime/io/format.h runtime/base/parallel.h runtime/points/members.h runtime/points/point_set.h
   runtime/shapes/analytic/shape_type.h runtime/shapes/first_contact.h runtime/shapes/level_set/level_set.h
   runtime/shapes/mesh/mesh.h runtime/solver/constraints/rows.h)
 set(installed "")

@@ -3,7 +3,7 @@
 # A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
 # that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
 # ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
-# time. They are the part of the library that is loaded when it is first needed (runtime/deferred.h). LIGHT: it goes over no
+# time. They are the part of the library that is loaded when it is first needed (runtime/base/deferred.h). LIGHT: it goes over no
 # points (RapidPrecompiled.cmake).
 #
 # rapid_in_batches(TARGET), called after the target's libraries are linked, compiles its sources sixteen at a time if
@@ -19,7 +19,7 @@ function(rapid_openvdb_headers result)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.h)
   set(found "")
   foreach(header ${headers})
-    file(STRINGS ${header} line REGEX "#include (<openvdb/|\"runtime/openvdb_grids.h\")" LIMIT_COUNT 1)
+    file(STRINGS ${header} line REGEX "#include (<openvdb/|\"runtime/base/openvdb_grids.h\")" LIMIT_COUNT 1)
     if(line)
       file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR} ${header})
       list(APPEND found ${name})

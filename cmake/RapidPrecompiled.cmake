@@ -21,7 +21,7 @@ rapid_precompile(rapid_precompiled ${rapid_common_headers})
 # That with OpenVDB takes 19 s and saves a file 2 s: three batches would not earn it.
 if(NOT RAPID_BATCHES)
   rapid_precompile(rapid_precompiled_openvdb ${rapid_common_headers}
-    ${PROJECT_SOURCE_DIR}/runtime/openvdb_grids.h)
+    ${PROJECT_SOURCE_DIR}/runtime/base/openvdb_grids.h)
   target_link_libraries(rapid_precompiled_openvdb PRIVATE OpenVDB::openvdb)
 endif()
 

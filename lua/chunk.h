@@ -1,9 +1,15 @@
 // The view of the points that a kernel's runner gets: compiled into the host, and passed as text to ffi.cdef
 // (lua/kernel.lua). Graph code cannot reach any of it.
 
-typedef struct rapid_float3 { float x, y, z; } rapid_float3;
-typedef struct rapid_float4 { float x, y, z, w; } rapid_float4;
-typedef struct rapid_double3 { double x, y, z; } rapid_double3;
+typedef struct rapid_float3 {
+    float x, y, z;
+} rapid_float3;
+typedef struct rapid_float4 {
+    float x, y, z, w;
+} rapid_float4;
+typedef struct rapid_double3 {
+    double x, y, z;
+} rapid_double3;
 
 // Each runner has one, at a fixed address for its lifetime: the host writes it before each call.
 typedef struct rapid_chunk {
@@ -42,6 +48,6 @@ typedef void (*rapid_vector_grid_sample)(const void* grid, double x, double y, d
 // The density of a fog.
 typedef double (*rapid_fog_sample)(const void* fog, double x, double y, double z);
 
-// runtime/noise.h; curl: shape [3].
+// runtime/math/noise.h; curl: shape [3].
 typedef double (*rapid_noise)(double x, double y, double z, double time, double octaves, double seed);
 typedef void (*rapid_curl_noise)(double x, double y, double z, double time, double octaves, double seed, double* curl);

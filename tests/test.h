@@ -14,8 +14,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/point_set.h"
-#include "runtime/vec.h"
 
 // How a failed check shows a vector: all digits, on one line.
 namespace Catch {

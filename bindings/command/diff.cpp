@@ -10,7 +10,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "include/rapid/scene.h"
-#include "runtime/threads.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

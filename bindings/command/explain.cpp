@@ -9,7 +9,7 @@
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/threads.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "runtime/checked_json.h"
-#include "runtime/error.h"
+#include "runtime/base/checked_json.h"
+#include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
 
 namespace rapid {

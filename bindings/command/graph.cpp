@@ -4,8 +4,8 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
+#include "runtime/base/threads.h"
 #include "runtime/files/input_file.h"
-#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -7,8 +7,8 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/printable.h"
-#include "runtime/threads.h"
+#include "runtime/base/printable.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

@@ -6,7 +6,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "include/rapid/merge.h"
-#include "runtime/threads.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

@@ -20,9 +20,9 @@
 #include "bindings/command_line/signals.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/threads.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/output_file.h"
-#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -29,10 +29,10 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/host/graph_parameter.h"
 #include "bindings/run/study_scene.h"
+#include "runtime/base/printable.h"
+#include "runtime/base/threads.h"
 #include "runtime/files/input_file.h"
-#include "runtime/printable.h"
 #include "runtime/report/progress.h"
-#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
-#include "runtime/threads.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

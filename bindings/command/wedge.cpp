@@ -25,12 +25,12 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/picture_sheet.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/checked_json.h"
+#include "runtime/base/checked_json.h"
+#include "runtime/base/printable.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
-#include "runtime/files/temporary_folder.h"
 #include "runtime/files/input_file.h"
-#include "runtime/printable.h"
+#include "runtime/files/temporary_folder.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {

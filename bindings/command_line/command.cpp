@@ -9,8 +9,8 @@
 #include <cstdio>
 
 #include "include/rapid/scene.h"
+#include "runtime/base/printable.h"
 #include "runtime/files/output_file.h"
-#include "runtime/printable.h"
 
 namespace rapid {
 namespace {

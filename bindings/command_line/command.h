@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bindings/command_line/options.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

@@ -4,7 +4,7 @@
 
 #include <charconv>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

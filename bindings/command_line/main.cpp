@@ -20,7 +20,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
 #include "runtime/files/output_file.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

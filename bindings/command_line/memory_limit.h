@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "runtime/cancellation.h"
-#include "runtime/memory_watch.h"
+#include "runtime/base/cancellation.h"
+#include "runtime/base/memory_watch.h"
 
 namespace rapid {
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "bindings/scene/installation.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/read_apart.h"
 
 namespace rapid {

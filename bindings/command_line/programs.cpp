@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "bindings/command_line/program_list.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "bindings/command_line/memory_limit.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 
 namespace rapid {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "bindings/scene/installation.h"
-#include "runtime/path_list.h"
+#include "runtime/base/path_list.h"
 
 namespace rapid {
 namespace {

@@ -9,7 +9,7 @@
 #include "bindings/host/objects.h"
 #include "bindings/host/script_place.h"
 #include "bindings/host/script_type.h"
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {

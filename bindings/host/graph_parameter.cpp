@@ -9,7 +9,7 @@
 
 #include "bindings/host/construct.h"
 #include "bindings/host/lua_text.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "runtime/object.h"
+#include "runtime/base/object.h"
 
 struct lua_State;
 

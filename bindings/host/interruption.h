@@ -15,7 +15,7 @@
 #include <string>
 #include <thread>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 struct lua_Debug;
 struct lua_State;

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/error.h"
-#include "runtime/object.h"
+#include "runtime/base/error.h"
+#include "runtime/base/object.h"
 
 struct lua_State;
 

@@ -5,7 +5,7 @@
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_pass.h"
 #include "bindings/host/script_host.h"
-#include "runtime/first_error.h"
+#include "runtime/base/first_error.h"
 #include "runtime/points/members.h"
 
 namespace rapid {

@@ -6,7 +6,7 @@
 #include "bindings/host/kernel_moment.h"
 #include "bindings/host/math_functions.h"
 #include "runtime/lanes/kernel_random.h"
-#include "runtime/noise.h"
+#include "runtime/math/noise.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 #include "runtime/shapes/motion/value_on_mesh.h"

@@ -10,7 +10,7 @@
 #include "bindings/host/chunk.h"
 #include "bindings/host/kernel_layout.h"
 #include "bindings/host/state.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/lanes/lane_program.h"
 
 namespace rapid {

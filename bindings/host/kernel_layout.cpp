@@ -8,7 +8,7 @@
 #include "bindings/host/chunk.h"
 #include "bindings/host/kernel_lanes.h"
 #include "bindings/host/lua_text.h"
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 
 namespace rapid {
 namespace {

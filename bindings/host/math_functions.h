@@ -4,10 +4,10 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/arc_functions.h"
-#include "runtime/hyperbolic.h"
 #include "runtime/lanes/lane_program.h"
-#include "runtime/power.h"
+#include "runtime/math/arc_functions.h"
+#include "runtime/math/hyperbolic.h"
+#include "runtime/math/power.h"
 
 namespace rapid {
 

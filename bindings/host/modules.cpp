@@ -12,9 +12,9 @@
 #include <memory>
 #include <new>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/path_list.h"
 #include "runtime/files/input_file.h"
-#include "runtime/path_list.h"
 
 namespace rapid {
 namespace {

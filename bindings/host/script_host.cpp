@@ -15,7 +15,7 @@
 #include "bindings/host/script_function.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/override.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 

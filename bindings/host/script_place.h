@@ -3,7 +3,7 @@
 // Chunk names of graph code begin with @ and are shown as they are; Rapid's own begin with =[rapid.
 #pragma once
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 struct lua_Debug;
 struct lua_State;

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "bindings/host/interruption.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 struct lua_State;
 struct rapid_chunk;  // lua/chunk.h

@@ -1,5 +1,5 @@
 #include "bindings/host/watchdog.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 #include <fmt/format.h>
 

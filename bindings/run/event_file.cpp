@@ -11,7 +11,7 @@
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
 #include "runtime/operators/spawn/parent_paths.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -8,7 +8,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/graph/abi.h"
 #include "runtime/graph/plugin.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -5,11 +5,11 @@
 #include <limits>
 #include <vector>
 
-#include "runtime/checked_json.h"
-#include "runtime/error.h"
+#include "runtime/base/checked_json.h"
+#include "runtime/base/error.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bindings/run/frame_record_archive.h"
 #include "runtime/io/state_file.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

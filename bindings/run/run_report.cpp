@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "runtime/json_text.h"
+#include "runtime/base/json_text.h"
 #include "runtime/report/frame_profile.h"
 #include "runtime/report/memory.h"
 

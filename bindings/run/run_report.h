@@ -13,14 +13,14 @@
 
 #include "bindings/run/frame_files.h"
 #include "bindings/run/run_cache.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/stopwatch.h"
 #include "runtime/files/output_file.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/io/frame_writer.h"
 #include "runtime/report/frame_warnings.h"
 #include "runtime/report/statistics.h"
 #include "runtime/report/totals.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 

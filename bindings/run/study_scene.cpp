@@ -6,13 +6,13 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/base/stopwatch.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {

@@ -9,7 +9,7 @@
 #include <charconv>
 #include <limits>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/input_file.h"

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "bindings/scene/host_parts.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/mesh/mesh.h"
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "include/rapid/offers.h"
+#include "runtime/base/object.h"
 #include "runtime/graph/node_type.h"
-#include "runtime/object.h"
 
 namespace rapid {
 

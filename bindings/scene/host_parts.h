@@ -2,7 +2,7 @@
 #pragma once
 
 #include "include/rapid/offers.h"
-#include "runtime/object.h"
+#include "runtime/base/object.h"
 
 namespace rapid {
 

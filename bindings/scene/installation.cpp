@@ -3,8 +3,8 @@
 
 #include "bindings/host/modules.h"
 #include "bindings/scene/scene_error.h"
-#include "runtime/deferred.h"
-#include "runtime/library_folder.h"
+#include "runtime/base/deferred.h"
+#include "runtime/base/library_folder.h"
 
 namespace rapid {
 

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "runtime/base/library_folder.h"
 #include "runtime/graph/abi.h"
 #include "runtime/graph/library_abi.h"
-#include "runtime/library_folder.h"
 
 namespace rapid {
 namespace {

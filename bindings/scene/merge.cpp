@@ -5,7 +5,7 @@
 
 #include "bindings/run/run_parts.h"
 #include "bindings/scene/scene_error.h"
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 
 namespace rapid {
 

@@ -7,7 +7,7 @@
 #include <type_traits>
 
 #include "include/rapid/scene.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

@@ -23,10 +23,10 @@
 #include "bindings/scene/scene_error.h"
 #include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/memory_watch.h"
 #include "runtime/graph/evaluate.h"
-#include "runtime/memory_budget.h"
-#include "runtime/memory_watch.h"
 
 namespace rapid {
 

@@ -15,7 +15,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/graph/coupling.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/printable.h"
+#include "runtime/base/printable.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {

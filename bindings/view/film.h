@@ -10,7 +10,7 @@
 
 #include "bindings/scene/scene_film.h"
 #include "bindings/view/frame_store.h"
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 #include "runtime/files/temporary_folder.h"
 
 namespace rapid {

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/picture/tone.h"
 
 namespace rapid {

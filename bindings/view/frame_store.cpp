@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
-#include "runtime/checked_json.h"
+#include "runtime/base/checked_json.h"
 
 namespace rapid {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bindings/view/frame_message.h"
 #include "include/rapid/scene.h"
-#include "runtime/checked_json.h"
+#include "runtime/base/checked_json.h"
 
 namespace rapid {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
-#include "runtime/stopwatch.h"
+#include "runtime/base/stopwatch.h"
 
 namespace rapid {
 namespace {

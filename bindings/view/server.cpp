@@ -22,8 +22,8 @@
 #include <random>
 #include <thread>
 
-#include "runtime/error.h"
-#include "runtime/printable.h"
+#include "runtime/base/error.h"
+#include "runtime/base/printable.h"
 
 namespace rapid {
 namespace {

@@ -22,7 +22,7 @@
 #include "bindings/scene/scene_inside.h"
 #include "bindings/view/frame_store.h"
 #include "include/rapid/scene.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

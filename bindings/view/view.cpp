@@ -20,10 +20,10 @@
 #include "bindings/view/requests.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/threads.h"
 #include "runtime/files/output_file.h"
 #include "runtime/files/start_program.h"
-#include "runtime/memory_budget.h"
-#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

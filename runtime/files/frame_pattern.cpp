@@ -7,7 +7,7 @@
 #include <climits>
 #include <system_error>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

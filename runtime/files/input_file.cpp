@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <cerrno>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/output_file.h"
-#include "runtime/memory_budget.h"
 
 namespace rapid {
 

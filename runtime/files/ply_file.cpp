@@ -10,7 +10,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

@@ -18,10 +18,10 @@
 #include <limits>
 #include <new>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/memory_budget.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <sstream>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/attribute_places.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"

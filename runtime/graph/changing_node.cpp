@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/solver/changing.h"
 #include "runtime/solver/placed_constraint.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 #include "runtime/graph/param.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/value.h"

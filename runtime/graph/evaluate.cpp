@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/at_node.h"
-#include "runtime/cancellation.h"
+#include "runtime/base/at_node.h"
+#include "runtime/base/cancellation.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/point_edit.h"

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/stopwatch.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/snapshot.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 

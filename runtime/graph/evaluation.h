@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
-#include "runtime/frame.h"
+#include "runtime/base/error.h"
+#include "runtime/base/frame.h"
 #include "runtime/graph/figures.h"
+#include "runtime/math/random.h"
 #include "runtime/points/point_set.h"
 #include "runtime/points/range.h"
-#include "runtime/random.h"
 
 namespace rapid {
 

@@ -7,7 +7,7 @@
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/point_function.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

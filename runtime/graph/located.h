@@ -1,7 +1,7 @@
 // What a value of a graph file is, too, that knows where it is written.
 #pragma once
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

@@ -1,8 +1,8 @@
 // A node as a value: as graph code holds it, and as an argument of a node that reads its points (spawn's `from`).
 #pragma once
 
+#include "runtime/base/object.h"
 #include "runtime/graph/node_type.h"
-#include "runtime/object.h"
 
 namespace rapid {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/registry.h"

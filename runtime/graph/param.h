@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/graph/value.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/range.h"

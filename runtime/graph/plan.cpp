@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/attribute_uses.h"
 #include "runtime/graph/node_handle.h"

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <string>
 
+#include "runtime/base/path_list.h"
 #include "runtime/files/input_file.h"
 #include "runtime/graph/registry.h"
-#include "runtime/path_list.h"
 
 namespace rapid {
 namespace {

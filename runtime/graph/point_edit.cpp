@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <functional>
 
-#include "runtime/at_node.h"
-#include "runtime/first_error.h"
+#include "runtime/base/at_node.h"
+#include "runtime/base/first_error.h"
+#include "runtime/base/stopwatch.h"
 #include "runtime/points/buffer.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 std::vector<std::uint8_t> Stretch::choose(Strided<std::uint8_t> members) const

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/base/parallel.h"
 #include "runtime/graph/node.h"
-#include "runtime/parallel.h"
 #include "runtime/points/column.h"
 
 namespace rapid {

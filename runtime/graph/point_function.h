@@ -4,9 +4,9 @@
 #include <memory>
 #include <span>
 
+#include "runtime/base/object.h"
+#include "runtime/base/parallel.h"
 #include "runtime/graph/node.h"
-#include "runtime/object.h"
-#include "runtime/parallel.h"
 
 namespace rapid {
 

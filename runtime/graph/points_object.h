@@ -1,7 +1,7 @@
 // A point set as a value in a graph: rapid.points.read, .grid, .from.
 #pragma once
 
-#include "runtime/object.h"
+#include "runtime/base/object.h"
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/motion/motion.h"
 

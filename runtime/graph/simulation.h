@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 #include "runtime/graph/step_record.h"
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/constraint.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/at_node.h"
+#include "runtime/base/at_node.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/simulation.h"
 #include "runtime/graph/stateful.h"

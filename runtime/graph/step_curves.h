@@ -2,7 +2,7 @@
 // the calling thread, when functions of the frame are called (step_shape.h).
 #pragma once
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 #include "runtime/shapes/motion/curves.h"
 
 namespace rapid {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/error.h"
-#include "runtime/frame.h"
+#include "runtime/base/error.h"
+#include "runtime/base/frame.h"
 #include "runtime/graph/step_curves.h"
 #include "runtime/graph/step_shape_user.h"
 #include "runtime/graph/value.h"

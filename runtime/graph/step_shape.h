@@ -2,7 +2,7 @@
 // takes shapes of all kinds. It is made ahead, on the calling thread, when functions of the frame are called.
 #pragma once
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 #include "runtime/graph/param.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/forces.h"

@@ -2,7 +2,7 @@
 // node is evaluated.
 #pragma once
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 
 namespace rapid {
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {

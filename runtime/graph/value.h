@@ -9,9 +9,9 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/frame.h"
-#include "runtime/object.h"
-#include "runtime/vec.h"
+#include "runtime/base/frame.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

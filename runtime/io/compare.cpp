@@ -10,11 +10,11 @@
 #include <set>
 #include <tuple>
 
+#include "runtime/base/json_text.h"
+#include "runtime/base/parallel.h"
+#include "runtime/base/printable.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/id_order.h"
-#include "runtime/json_text.h"
-#include "runtime/parallel.h"
-#include "runtime/printable.h"
 
 namespace rapid {
 namespace {

@@ -12,6 +12,8 @@
 #include <atomic>
 #include <charconv>
 
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/parallel.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
@@ -19,8 +21,6 @@
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/point_file.h"
 #include "runtime/io/text_table.h"
-#include "runtime/memory_budget.h"
-#include "runtime/parallel.h"
 
 namespace rapid {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "runtime/base/json_text.h"
+#include "runtime/base/printable.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/text_table.h"
-#include "runtime/json_text.h"
-#include "runtime/printable.h"
 
 namespace rapid {
 namespace {

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/start_program.h"
 
 namespace rapid {

@@ -3,9 +3,9 @@
 #include <system_error>
 #include <utility>
 
+#include "runtime/base/stopwatch.h"
 #include "runtime/io/selected_attributes.h"
 #include "runtime/picture/frame_picture.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 

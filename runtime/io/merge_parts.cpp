@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/column_files.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/subset.h"

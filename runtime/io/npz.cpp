@@ -14,6 +14,7 @@
 #include <charconv>
 #include <optional>
 
+#include "runtime/base/parallel.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/io/attribute_names.h"
@@ -21,7 +22,6 @@
 #include "runtime/io/records.h"
 #include "runtime/io/text_table.h"
 #include "runtime/io/zip_file.h"
-#include "runtime/parallel.h"
 
 namespace rapid {
 namespace {

@@ -11,10 +11,10 @@
 
 #include <charconv>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/input_file.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
-#include "runtime/memory_budget.h"
 #include "runtime/points/point_lines.h"
 
 namespace rapid {

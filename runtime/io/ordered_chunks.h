@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "runtime/base/parallel.h"
 #include "runtime/files/output_file.h"
-#include "runtime/parallel.h"
 
 namespace rapid {
 

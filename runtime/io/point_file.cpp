@@ -5,7 +5,7 @@
 #include <map>
 #include <variant>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 
 namespace rapid {
 namespace {

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <memory>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/deflate.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
@@ -24,7 +25,6 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/records.h"
-#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {

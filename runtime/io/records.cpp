@@ -9,8 +9,8 @@
 #include <memory>
 #include <numeric>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 namespace {

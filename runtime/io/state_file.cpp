@@ -13,11 +13,11 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/of_thread.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"
 #include "runtime/io/text_table.h"
-#include "runtime/of_thread.h"
 
 namespace rapid {
 namespace {

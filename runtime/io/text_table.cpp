@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 

@@ -24,7 +24,8 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/files/scalars.h"
@@ -32,7 +33,6 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/records.h"
-#include "runtime/memory_budget.h"
 #include "runtime/points/token.h"
 
 namespace rapid {

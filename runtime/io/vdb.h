@@ -13,7 +13,7 @@
 // Both functions are loaded with OpenVDB on first use.
 #pragma once
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/io/format.h"
 
 namespace rapid {

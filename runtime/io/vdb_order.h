@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

@@ -1,9 +1,9 @@
-// Declares OpenVDB's point grids as extern templates, like the value grids in runtime/openvdb_grids.h.
+// Declares OpenVDB's point grids as extern templates, like the value grids in runtime/base/openvdb_grids.h.
 #pragma once
 
 #include <openvdb/points/PointDataGrid.h>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 
 #ifdef RAPID_OPENVDB_IN_LIBRARY
 extern template class openvdb::tree::Tree<openvdb::points::PointDataTree::RootNodeType>;

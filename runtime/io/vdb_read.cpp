@@ -10,7 +10,7 @@
 #include <map>
 #include <numeric>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/files/message.h"

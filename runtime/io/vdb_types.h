@@ -3,9 +3,9 @@
 
 #include <type_traits>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/token.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -25,7 +25,8 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/deflate.h"
 #include "runtime/files/input_file.h"
@@ -35,7 +36,6 @@
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
 #include "runtime/io/text_table.h"
-#include "runtime/memory_budget.h"
 #include "runtime/points/token.h"
 
 namespace rapid {

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <utility>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/deflate.h"
-#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "runtime/items.h"
+#include "runtime/math/items.h"
 
 namespace rapid {
 

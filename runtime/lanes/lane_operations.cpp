@@ -8,11 +8,11 @@
 #include <type_traits>
 #include <utility>
 
-#include "runtime/elementary.h"
-#include "runtime/items.h"
 #include "runtime/lanes/kernel_random.h"
 #include "runtime/lanes/lane_tile.h"
-#include "runtime/power.h"
+#include "runtime/math/elementary.h"
+#include "runtime/math/items.h"
+#include "runtime/math/power.h"
 
 namespace rapid {
 namespace {

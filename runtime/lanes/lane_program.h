@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/random.h"
-#include "runtime/simd.h"
+#include "runtime/math/random.h"
+#include "runtime/math/simd.h"
 
 namespace rapid {
 

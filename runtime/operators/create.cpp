@@ -7,7 +7,6 @@
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
-#include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 
 #include <fmt/format.h>

@@ -15,16 +15,16 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/parallel.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/stateful.h"
-#include "runtime/memory_budget.h"
 #include "runtime/operators/births/newborn.h"
 #include "runtime/operators/emit/birth_source.h"
 #include "runtime/operators/emit/birth_times.h"
 #include "runtime/operators/emit/birth_velocity.h"
-#include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 
 namespace rapid {

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "runtime/base/parallel.h"
 #include "runtime/graph/node.h"
 #include "runtime/operators/goal/goal_target.h"
-#include "runtime/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/points/per_point.h"
 

@@ -11,10 +11,10 @@
 
 #include <algorithm>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/stateful.h"
-#include "runtime/memory_budget.h"
 #include "runtime/operators/spawn/offspring.h"
 #include "runtime/points/id_index.h"
 

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/base/parallel.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
-#include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/trail.h"
 

@@ -6,9 +6,9 @@
 
 #include <cmath>
 
+#include "runtime/base/parallel.h"
 #include "runtime/graph/node.h"
 #include "runtime/operators/emit/birth_source.h"
-#include "runtime/parallel.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/members.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"

@@ -2,7 +2,7 @@
 //
 //   a = amplitude curl_noise(P / size, speed time)        (noise.h; Bridson et al. 2007)
 #include "runtime/graph/node.h"
-#include "runtime/noise.h"
+#include "runtime/math/noise.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/picture/screen_mesh.h"
 
 namespace rapid {

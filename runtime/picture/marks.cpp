@@ -12,8 +12,8 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/members.h"
 #include "runtime/points/trail.h"
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "runtime/error.h"
-#include "runtime/memory_budget.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/picture/surfaces.h"
 
 namespace rapid {

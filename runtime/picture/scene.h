@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/shapes/mesh/mesh.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "runtime/of_thread.h"
+#include "runtime/base/of_thread.h"
 #include "runtime/picture/ground.h"
 #include "runtime/picture/screen_mesh.h"
 #include "runtime/picture/tone.h"

@@ -7,8 +7,8 @@
 #include <tuple>
 #include <vector>
 
-#include "runtime/error.h"
-#include "runtime/simd.h"
+#include "runtime/base/error.h"
+#include "runtime/math/simd.h"
 
 namespace rapid {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 namespace {

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/math/simd.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/buffer.h"
 #include "runtime/points/column.h"
-#include "runtime/simd.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -15,9 +15,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/buffer.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -16,7 +16,7 @@
 #include <thread>
 #include <utility>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "runtime/math/simd.h"
 #include "runtime/points/cell_grid.h"
-#include "runtime/simd.h"
 
 namespace rapid {
 

@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/cell_grid.h"
 #include "runtime/points/near_spheres.h"
 #include "runtime/points/sort_few.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "runtime/base/printable.h"
 #include "runtime/points/point_names.h"
-#include "runtime/printable.h"
 
 namespace rapid {
 namespace {

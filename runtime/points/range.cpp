@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <atomic>
 
-#include "runtime/error.h"
-#include "runtime/parallel.h"
+#include "runtime/base/error.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

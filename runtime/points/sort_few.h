@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "runtime/simd.h"
+#include "runtime/math/simd.h"
 
 namespace rapid {
 

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 
 namespace rapid {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "runtime/lanes/lane_program.h"
-#include "runtime/simd.h"
+#include "runtime/math/simd.h"
 #include "runtime/solver/constraints/contact_pack.h"
 #include "runtime/solver/constraints/projected_point.h"
 #include "runtime/solver/motion/ballistic_batch.h"

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "runtime/base/json_text.h"
 #include "runtime/graph/evaluation.h"
-#include "runtime/json_text.h"
 #include "runtime/report/biography.h"
 
 namespace rapid {

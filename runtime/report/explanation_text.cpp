@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "runtime/json_text.h"
-#include "runtime/printable.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/json_text.h"
+#include "runtime/base/printable.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "runtime/base/printable.h"
 #include "runtime/graph/explain.h"
 #include "runtime/graph/node_handle.h"
-#include "runtime/printable.h"
 
 namespace rapid {
 namespace {

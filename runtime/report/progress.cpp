@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/printable.h"
+#include "runtime/base/printable.h"
 #include "runtime/report/number_text.h"
 
 namespace rapid {

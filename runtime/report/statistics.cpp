@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "runtime/json_text.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
 

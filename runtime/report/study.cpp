@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/path_extent.h"
-#include "runtime/vec.h"
+#include "runtime/math/path_extent.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

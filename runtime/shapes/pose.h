@@ -1,7 +1,7 @@
 // The pose of a rigid body with uniform scale, and its velocity field.
 #pragma once
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

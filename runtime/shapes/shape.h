@@ -14,9 +14,9 @@
 #include <optional>
 #include <span>
 
-#include "runtime/object.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 #include "runtime/shapes/path.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

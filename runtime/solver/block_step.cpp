@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 #include "runtime/solver/timed_force.h"
 
 namespace rapid {

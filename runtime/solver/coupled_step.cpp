@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {

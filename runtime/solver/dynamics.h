@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/point_set.h"
 #include "runtime/points/range.h"

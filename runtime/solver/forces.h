@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/per_point.h"
 #include "runtime/points/point_set.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

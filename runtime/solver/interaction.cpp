@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "runtime/memory_budget.h"
-#include "runtime/parallel.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/parallel.h"
+#include "runtime/math/random.h"
 #include "runtime/points/members.h"
 #include "runtime/points/neighbours.h"
-#include "runtime/random.h"
 #include "runtime/solver/forces.h"
 
 namespace rapid {

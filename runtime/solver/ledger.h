@@ -3,8 +3,8 @@
 
 #include <optional>
 
+#include "runtime/math/vec.h"
 #include "runtime/solver/constraints/constraint.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

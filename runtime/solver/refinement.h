@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/coupled_step.h"
 #include "runtime/solver/point_errors.h"
 #include "runtime/solver/step_context.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/motion/ballistic_batch.h"
 #include "runtime/solver/point_errors.h"

@@ -12,8 +12,8 @@
 #include <random>
 #include <vector>
 
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/io/format.h"
-#include "runtime/openvdb_grids.h"
 #include "runtime/picture/picture.h"
 
 namespace {

@@ -18,7 +18,7 @@
 #include <random>
 
 #include "bindings/host/script_host.h"
-#include "runtime/threads.h"
+#include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
+#include "runtime/math/random.h"
 #include "runtime/points/neighbours.h"
 #include "runtime/points/point_set.h"
-#include "runtime/random.h"
 #include "runtime/solver/constraints/contact_search.h"
 
 namespace rapid {

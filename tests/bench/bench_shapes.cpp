@@ -18,7 +18,7 @@
 #include <random>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/scatter/scatter.h"
 

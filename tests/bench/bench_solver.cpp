@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/solver/solve.h"

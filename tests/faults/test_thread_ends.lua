@@ -1,5 +1,5 @@
 -- Memory for the destructor of a variable of a thread is taken by glibc, which ends the process where there is none: no
--- library of ours registers one (runtime/of_thread.h).
+-- library of ours registers one (runtime/base/of_thread.h).
 local command = require "testing.command"
 local library = require "tests.faults.library"
 

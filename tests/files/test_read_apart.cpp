@@ -9,7 +9,7 @@
 #include <csignal>
 #include <ctime>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

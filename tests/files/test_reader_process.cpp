@@ -7,8 +7,8 @@
 #include <fstream>
 #include <vector>
 
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/read_apart.h"
-#include "runtime/memory_budget.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

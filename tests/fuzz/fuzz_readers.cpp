@@ -19,7 +19,7 @@
 
 #include "bindings/command/farm_job.h"
 #include "bindings/run/part_record.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_archive.h"
 #include "runtime/io/format.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/checked_json.h"
+#include "runtime/base/checked_json.h"
 #include "tests/test.h"
 
 using namespace rapid;

@@ -3,7 +3,7 @@
 
 #include <numeric>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"

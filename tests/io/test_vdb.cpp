@@ -5,8 +5,8 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <tbb/global_control.h>
 
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/io/format.h"
-#include "runtime/openvdb_grids.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
 

@@ -12,10 +12,10 @@
 #include <fstream>
 #include <sstream>
 
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/io/format.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/io/vdb_voxel.h"
-#include "runtime/openvdb_grids.h"
 #include "runtime/points/column_files.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"

@@ -3,7 +3,7 @@
 #include <limits>
 #include <random>
 
-#include "runtime/elementary.h"
+#include "runtime/math/elementary.h"
 #include "tests/test.h"
 
 using namespace rapid;

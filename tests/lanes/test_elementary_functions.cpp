@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
-#include "runtime/arc_functions.h"
-#include "runtime/hyperbolic.h"
-#include "runtime/power.h"
+#include "runtime/math/arc_functions.h"
+#include "runtime/math/hyperbolic.h"
+#include "runtime/math/power.h"
 #include "tests/amount.h"
 #include "tests/test.h"
 

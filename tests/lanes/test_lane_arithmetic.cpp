@@ -4,9 +4,9 @@
 #include <limits>
 #include <random>
 
-#include "runtime/elementary.h"
 #include "runtime/lanes/lane_program.h"
-#include "runtime/power.h"
+#include "runtime/math/elementary.h"
+#include "runtime/math/power.h"
 #include "tests/amount.h"
 #include "tests/test.h"
 

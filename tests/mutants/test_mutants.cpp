@@ -17,8 +17,8 @@
 #include <cstdlib>
 #include <functional>
 
-#include "runtime/error.h"
-#include "runtime/memory_budget.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
 #include "tests/amount.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/mutants/filled_memory.h"

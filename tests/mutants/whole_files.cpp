@@ -9,10 +9,10 @@
 #include <cstring>
 #include <functional>
 
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
-#include "runtime/openvdb_grids.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/io/points_with_trails.h"

@@ -1,4 +1,4 @@
-#include "runtime/memory_watch.h"
+#include "runtime/base/memory_watch.h"
 
 #include <malloc.h>
 
@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 #include "tests/test.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "runtime/noise.h"
+#include "runtime/math/noise.h"
 
 #include <map>
 #include <random>

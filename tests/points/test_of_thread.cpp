@@ -1,5 +1,5 @@
 // Checks that each thread gets its own values, and the order of their destruction.
-#include "runtime/of_thread.h"
+#include "runtime/base/of_thread.h"
 
 #include <new>
 #include <string>

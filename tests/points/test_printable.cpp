@@ -1,4 +1,4 @@
-#include "runtime/printable.h"
+#include "runtime/base/printable.h"
 
 #include "tests/test.h"
 

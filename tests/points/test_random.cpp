@@ -1,6 +1,6 @@
-#include "runtime/random.h"
+#include "runtime/math/random.h"
 
-#include "runtime/items.h"
+#include "runtime/math/items.h"
 #include "tests/test.h"
 
 namespace rapid {

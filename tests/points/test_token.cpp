@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "runtime/memory_budget.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/points/point_set.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"

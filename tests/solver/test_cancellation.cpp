@@ -1,5 +1,5 @@
 // Cancellation within a frame, on both routes of a step that takes sub-steps.
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 
 #include <atomic>
 #include <thread>

@@ -4,11 +4,11 @@
 #include <algorithm>
 
 #include "bindings/host/makers/sequence_options.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/left_out.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
-#include "runtime/memory_budget.h"
 
 namespace rapid {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "bindings/host/maker.h"
+#include "runtime/base/frame_sequence.h"
 #include "runtime/files/frame_pattern.h"
-#include "runtime/frame_sequence.h"
 
 namespace rapid {
 

@@ -13,8 +13,8 @@
 #include "bindings/host/modules.h"
 #include "bindings/host/session.h"
 #include "bindings/host/testing/test_points.h"
+#include "runtime/base/threads.h"
 #include "runtime/graph/evaluate.h"
-#include "runtime/threads.h"
 
 namespace rapid {
 namespace {

@@ -12,7 +12,7 @@
 #include <unordered_map>
 
 #include "bindings/host/lua_text.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "runtime/graph/param.h"
-#include "runtime/items.h"
+#include "runtime/math/items.h"
 
 namespace rapid {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/elementary.h"
-#include "runtime/simd.h"
+#include "runtime/math/elementary.h"
+#include "runtime/math/simd.h"
 
 namespace rapid {
 namespace {

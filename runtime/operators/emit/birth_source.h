@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/object.h"
 #include "runtime/graph/points_object.h"
-#include "runtime/items.h"
-#include "runtime/object.h"
+#include "runtime/math/items.h"
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/motion/body_path.h"

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "runtime/graph/param.h"
-#include "runtime/items.h"
+#include "runtime/math/items.h"
 #include "runtime/operators/births/draws.h"
 #include "runtime/operators/births/newborn.h"
 #include "runtime/operators/emit/birth_source.h"

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "runtime/base/parallel.h"
 #include "runtime/operators/goal/free_places.h"
-#include "runtime/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/motion/mesh_surface.h"

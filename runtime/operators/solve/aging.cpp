@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/buffer.h"
 #include "runtime/points/members.h"
 

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "runtime/base/stopwatch.h"
 #include "runtime/points/members.h"
 #include "runtime/points/per_point.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
@@ -17,7 +18,6 @@
 #include "runtime/solver/collision_radii.h"
 #include "runtime/solver/placed_constraint.h"
 #include "runtime/solver/timed_force.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {

@@ -6,8 +6,8 @@
 #include <functional>
 #include <numeric>
 
+#include "runtime/base/parallel.h"
 #include "runtime/operators/births/draws.h"
-#include "runtime/parallel.h"
 
 namespace rapid {
 namespace {

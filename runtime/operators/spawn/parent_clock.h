@@ -15,10 +15,10 @@
 #include "runtime/graph/evaluation.h"
 #include "runtime/graph/param.h"
 #include "runtime/graph/point_function.h"
+#include "runtime/math/random.h"
 #include "runtime/operators/spawn/parent_paths.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/points/state_checks.h"
-#include "runtime/random.h"
 
 namespace rapid {
 

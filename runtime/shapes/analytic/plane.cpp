@@ -1,7 +1,7 @@
 // The half space below a plane. Contacts are the roots of a quadratic: exact for a bouncing ball.
 #include <fmt/format.h>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"

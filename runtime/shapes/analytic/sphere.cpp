@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"

@@ -18,7 +18,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <string>
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/level_set/baked_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
@@ -16,8 +16,8 @@
 namespace rapid {
 
 // The parts of a level set that need OpenVDB: its grid for files and tools, and its surface as a mesh. They are created
-// on demand. A scene that only collides with level sets of closed meshes never loads OpenVDB (runtime/deferred.h), as
-// long as no pieces overlap and no band is wider than five voxels.
+// on demand. A scene that only collides with level sets of closed meshes never loads OpenVDB (runtime/base/deferred.h),
+// as long as no pieces overlap and no band is wider than five voxels.
 
 class BakedLevelSet;
 struct LevelSetGrid;  // level_set_grid.h

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/error.h"
-#include "runtime/memory_budget.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
 #include "runtime/shapes/level_set/baked_grid.h"
 
 namespace rapid {

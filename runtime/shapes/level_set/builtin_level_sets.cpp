@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/voxel_blocks.h"

@@ -6,10 +6,10 @@
 #include <memory>
 #include <string>
 
-#include "runtime/deferred.h"
-#include "runtime/object.h"
+#include "runtime/base/deferred.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 #include "runtime/shapes/scatter/scatter.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

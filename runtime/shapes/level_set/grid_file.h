@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 
 namespace rapid {
 

@@ -7,9 +7,9 @@
 
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/files/read_apart.h"
-#include "runtime/openvdb_grids.h"
 
 namespace rapid {
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "runtime/error.h"
-#include "runtime/memory_budget.h"
-#include "runtime/parallel.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"
 

@@ -11,7 +11,7 @@
 
 #include <span>
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 

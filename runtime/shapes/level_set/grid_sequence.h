@@ -14,7 +14,7 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/frame_sequence.h"
+#include "runtime/base/frame_sequence.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 

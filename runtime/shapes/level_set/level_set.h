@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/shape.h"
 

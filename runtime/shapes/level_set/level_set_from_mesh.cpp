@@ -5,7 +5,7 @@
 #include <numeric>
 #include <optional>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/mesh_blocks.h"

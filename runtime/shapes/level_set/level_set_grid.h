@@ -5,7 +5,7 @@
 #include <functional>
 #include <memory>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/level_set/voxel_blocks.h"
 

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/pose.h"
 

@@ -7,10 +7,10 @@
 #include <limits>
 #include <tuple>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
+#include "runtime/math/simd.h"
 #include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
-#include "runtime/simd.h"
 
 namespace rapid {
 namespace {

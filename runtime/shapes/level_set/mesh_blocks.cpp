@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/level_set/mesh_band.h"
 
 namespace rapid {

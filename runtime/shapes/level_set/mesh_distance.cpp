@@ -14,7 +14,7 @@
 #include <span>
 #include <utility>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/mesh_blocks.h"
 #include "runtime/shapes/level_set/openvdb_meshes.h"

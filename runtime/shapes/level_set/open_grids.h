@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
 

@@ -3,7 +3,7 @@
 
 #include <openvdb/tools/MeshToVolume.h>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 
 #ifdef RAPID_OPENVDB_IN_LIBRARY
 extern template class openvdb::tree::Tree<

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
 
 namespace rapid {

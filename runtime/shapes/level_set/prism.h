@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

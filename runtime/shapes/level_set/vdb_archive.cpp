@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/output_stream.h"
 
 namespace rapid {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 
 namespace rapid {
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 
 namespace rapid {
 

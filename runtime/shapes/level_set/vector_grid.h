@@ -11,9 +11,9 @@
 #include <span>
 #include <string>
 
-#include "runtime/deferred.h"
-#include "runtime/object.h"
-#include "runtime/vec.h"
+#include "runtime/base/deferred.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

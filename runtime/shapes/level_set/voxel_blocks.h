@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/shapes/level_set/baked_grid.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

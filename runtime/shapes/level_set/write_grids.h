@@ -5,8 +5,8 @@
 #include <map>
 #include <string>
 
-#include "runtime/deferred.h"
-#include "runtime/object.h"
+#include "runtime/base/deferred.h"
+#include "runtime/base/object.h"
 
 namespace rapid {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <span>
 
-#include "runtime/checked_json.h"
-#include "runtime/error.h"
+#include "runtime/base/checked_json.h"
+#include "runtime/base/error.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"

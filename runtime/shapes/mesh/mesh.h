@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/object.h"
-#include "runtime/vec.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -22,7 +22,7 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/shapes/mesh/gltf_attributes.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 #include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {

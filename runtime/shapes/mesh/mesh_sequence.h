@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/frame_sequence.h"
+#include "runtime/base/frame_sequence.h"
 #include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <set>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/left_out.h"
 #include "runtime/files/ply_file.h"

@@ -7,7 +7,7 @@
 #include <cctype>
 #include <unordered_map>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/files/read_apart.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/mesh/mesh_file.h"

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/scatter/alias_table.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/motion/cubic_part.h"
 #include "runtime/shapes/motion/deforming_shape.h"
 

@@ -17,7 +17,7 @@
 #include <string>
 #include <utility>
 
-#include "runtime/frame.h"
+#include "runtime/base/frame.h"
 #include "runtime/shapes/level_set/grid_sequence.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/motion/moving_body.h"

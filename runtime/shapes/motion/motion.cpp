@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/elementary.h"
-#include "runtime/error.h"
+#include "runtime/base/error.h"
+#include "runtime/math/elementary.h"
 #include "runtime/shapes/motion/turns.h"
 
 namespace rapid {

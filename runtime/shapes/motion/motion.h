@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "runtime/frame.h"
-#include "runtime/object.h"
+#include "runtime/base/frame.h"
+#include "runtime/base/object.h"
+#include "runtime/math/vec.h"
 #include "runtime/shapes/pose.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

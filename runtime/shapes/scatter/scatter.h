@@ -8,7 +8,7 @@
 #include <memory>
 #include <span>
 
-#include "runtime/random.h"
+#include "runtime/math/random.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/shape.h"
 

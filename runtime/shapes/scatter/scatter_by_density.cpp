@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/scatter/alias_table.h"
 
 namespace rapid {

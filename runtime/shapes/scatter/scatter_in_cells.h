@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/scatter/scatter.h"
 
 namespace rapid {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/mesh/ray_crossings.h"
 #include "runtime/shapes/scatter/scatter_in_cells.h"
 

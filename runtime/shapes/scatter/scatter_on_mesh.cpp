@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/scatter/alias_table.h"
 #include "runtime/shapes/scatter/scatter.h"
 

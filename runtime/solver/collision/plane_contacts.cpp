@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/path_extent.h"
+#include "runtime/math/path_extent.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/plane_rest.h"
 #include "runtime/solver/collision/response.h"

@@ -1,7 +1,7 @@
 // The velocity after a contact: restitution and Coulomb friction.
 #pragma once
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

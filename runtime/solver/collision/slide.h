@@ -2,7 +2,7 @@
 // with Coulomb friction.
 #pragma once
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -13,8 +13,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/point_set.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

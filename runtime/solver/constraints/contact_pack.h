@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/simd.h"
+#include "runtime/math/simd.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/pair_impulses.h"
 

@@ -8,13 +8,13 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/error.h"
-#include "runtime/memory_budget.h"
-#include "runtime/parallel.h"
+#include "runtime/base/error.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/parallel.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/near_spheres.h"
 #include "runtime/points/sort_few.h"
 #include "runtime/solver/constraints/pair_estimate.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -7,8 +7,9 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
+#include "runtime/base/stopwatch.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/state_checks.h"
 #include "runtime/solver/constraints/contact_forces.h"
@@ -16,7 +17,6 @@
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/spin.h"
-#include "runtime/stopwatch.h"
 
 namespace rapid {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/constraints/spin.h"
 
 namespace rapid {

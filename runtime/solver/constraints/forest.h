@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

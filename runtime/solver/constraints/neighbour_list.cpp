@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/state_checks.h"
 
 namespace rapid {

@@ -3,8 +3,8 @@
 #include <array>
 #include <numeric>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/state_checks.h"
 
 namespace rapid {

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/neighbour_list.h"
 #include "runtime/solver/constraints/pair_impulses.h"

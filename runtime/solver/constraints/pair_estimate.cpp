@@ -3,7 +3,7 @@
 #include <numeric>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 
 namespace rapid {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/id_index.h"
 
 namespace rapid {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/sleep.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

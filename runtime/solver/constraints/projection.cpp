@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/sleep.h"
 

@@ -4,7 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/constraints/energy_bound.h"
 
 namespace rapid {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/constraints/forest.h"
 
 namespace rapid {

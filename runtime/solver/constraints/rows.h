@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/of_thread.h"
+#include "runtime/base/of_thread.h"
 #include "runtime/points/members.h"
 #include "runtime/points/point_set.h"
 #include "runtime/points/state_archive.h"

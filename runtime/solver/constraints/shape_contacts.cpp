@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/of_thread.h"
-#include "runtime/parallel.h"
+#include "runtime/base/of_thread.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/impact.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/solver/collision/collisions.h"
 #include "runtime/solver/constraints/constraint.h"

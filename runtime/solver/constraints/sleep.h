@@ -25,10 +25,10 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/disjoint_sets.h"
 #include "runtime/solver/constraints/shape_contacts.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

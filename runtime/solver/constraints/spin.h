@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/contact_material.h"
 #include "runtime/solver/constraints/contact_pack.h"
 #include "runtime/solver/motion/ballistic_batch.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

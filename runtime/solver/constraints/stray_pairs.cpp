@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/constraints/impact.h"
 
 namespace rapid {

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/solver/constraints/row.h"
 #include "runtime/solver/constraints/row_schedule.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

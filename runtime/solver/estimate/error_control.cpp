@@ -4,7 +4,7 @@
 #include <map>
 #include <numeric>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/solver/collision/stuck_columns.h"
 #include "runtime/solver/estimate/step_doubling.h"
 

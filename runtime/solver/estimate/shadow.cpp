@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
-#include "runtime/parallel.h"
+#include "runtime/base/parallel.h"
 #include "runtime/points/id_index.h"
 #include "runtime/shapes/path.h"
 #include "runtime/solver/estimate/resolution.h"

@@ -4,7 +4,7 @@
 #include <bit>
 #include <limits>
 
-#include "runtime/path_extent.h"
+#include "runtime/math/path_extent.h"
 #include "runtime/solver/motion/damped_motion.h"
 
 namespace rapid {

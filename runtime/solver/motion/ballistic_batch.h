@@ -11,10 +11,10 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/simd.h"
+#include "runtime/math/vec.h"
 #include "runtime/points/column.h"
-#include "runtime/simd.h"
 #include "runtime/solver/motion/packed_points.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/simd.h"
+#include "runtime/math/simd.h"
 #include "runtime/solver/motion/quadratic_drag.h"
 
 namespace rapid {

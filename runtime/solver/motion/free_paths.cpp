@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "runtime/path_extent.h"
+#include "runtime/math/path_extent.h"
 #include "runtime/solver/motion/packed_points.h"
 
 namespace rapid {

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/column.h"
-#include "runtime/vec.h"
 
 namespace rapid {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "runtime/simd.h"
-#include "runtime/vec.h"
+#include "runtime/math/simd.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -20,7 +20,7 @@
 #include <cmath>
 #include <optional>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

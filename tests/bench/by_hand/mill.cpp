@@ -87,7 +87,7 @@ inline float component(std::uint32_t bits, std::uint32_t axis)
     return (bits & 3) == axis ? 0 : sign;
 }
 
-// Adds the curl of noise of three octaves that change with time (runtime/noise.h) to the accelerations.
+// Adds the curl of noise of three octaves that change with time (runtime/math/noise.h) to the accelerations.
 void add_turbulence(int n, const float* px, const float* py, const float* pz, float time, float amplitude, float size,
                     float* ax, float* ay, float* az)
 {

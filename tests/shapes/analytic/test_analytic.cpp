@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "runtime/shapes/scatter/scatter.h"
 #include "tests/test.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "tests/test.h"
 

@@ -1,11 +1,11 @@
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/density_grid.h"
 
 #include <openvdb/io/File.h>
 
 #include <cmath>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

@@ -1,4 +1,4 @@
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
 
 #include <openvdb/io/File.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "runtime/error.h"
-#include "runtime/random.h"
+#include "runtime/base/error.h"
+#include "runtime/math/random.h"
 #include "runtime/shapes/level_set/open_grids.h"
 #include "runtime/shapes/level_set/write_grids.h"
 #include "tests/files/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/shapes/mesh/distance_to_all.h"
 #include "tests/test.h"

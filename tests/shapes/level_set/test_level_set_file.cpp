@@ -6,8 +6,8 @@
 #include <fstream>
 #include <random>
 
-#include "runtime/error.h"
-#include "runtime/openvdb_grids.h"
+#include "runtime/base/error.h"
+#include "runtime/base/openvdb_grids.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/files/other_circumstances.h"
 #include "tests/files/temporary_folder.h"

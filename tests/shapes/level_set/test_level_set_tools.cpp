@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/level_set/placed.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/mesh/mesh.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numbers>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/placed.h"

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "runtime/error.h"
-#include "runtime/parallel.h"
+#include "runtime/base/error.h"
+#include "runtime/base/parallel.h"
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/files/temporary_folder.h"

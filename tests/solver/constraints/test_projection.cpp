@@ -1,7 +1,7 @@
 // What the projection of all constraints of a sub-step does together.
 #include <string>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 #include "tests/solver/constraints/granular.h"
 
 namespace rapid {

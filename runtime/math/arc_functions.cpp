@@ -1,9 +1,9 @@
-#include "runtime/arc_functions.h"
+#include "runtime/math/arc_functions.h"
 
 #include <cmath>
 #include <limits>
 
-#include "runtime/elementary.h"
+#include "runtime/math/elementary.h"
 
 namespace rapid {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/random.h"
+#include "runtime/math/random.h"
 
 namespace rapid {
 

@@ -1,4 +1,4 @@
-#include "runtime/deferred.h"
+#include "runtime/base/deferred.h"
 
 #include <dlfcn.h>
 #include <execinfo.h>
@@ -10,8 +10,8 @@
 #include <new>
 #include <string>
 
-#include "runtime/error.h"
-#include "runtime/library_folder.h"
+#include "runtime/base/error.h"
+#include "runtime/base/library_folder.h"
 
 namespace rapid {
 namespace {

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <variant>
 
-#include "runtime/checked_json.h"
+#include "runtime/base/checked_json.h"
 
 namespace rapid {
 

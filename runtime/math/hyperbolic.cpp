@@ -1,8 +1,8 @@
-#include "runtime/hyperbolic.h"
+#include "runtime/math/hyperbolic.h"
 
 #include <cmath>
 
-#include "runtime/power.h"
+#include "runtime/math/power.h"
 
 namespace rapid {
 namespace {

@@ -1,4 +1,4 @@
-#include "runtime/of_thread.h"
+#include "runtime/base/of_thread.h"
 
 #include <pthread.h>
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 
 namespace rapid {
 

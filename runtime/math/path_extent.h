@@ -5,8 +5,8 @@
 // Works on one coordinate at a time, as a double or as a pack of eight.
 #pragma once
 
-#include "runtime/simd.h"
-#include "runtime/vec.h"
+#include "runtime/math/simd.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -1,5 +1,5 @@
-#include "runtime/memory_budget.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/setting_names.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "runtime/setting_names.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -1,4 +1,4 @@
-#include "runtime/cancellation.h"
+#include "runtime/base/cancellation.h"
 
 #include <utility>
 

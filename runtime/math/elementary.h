@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "runtime/simd.h"
+#include "runtime/math/simd.h"
 
 namespace rapid {
 

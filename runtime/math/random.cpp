@@ -1,11 +1,11 @@
-#include "runtime/random.h"
+#include "runtime/math/random.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
 
-#include "runtime/items.h"
-#include "runtime/simd.h"
+#include "runtime/math/items.h"
+#include "runtime/math/simd.h"
 
 #if defined(__SSE2__)
 #include <immintrin.h>

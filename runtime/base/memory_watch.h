@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "runtime/error.h"
+#include "runtime/base/error.h"
 
 namespace rapid {
 

@@ -14,7 +14,7 @@
 #include <cstring>
 #include <span>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 // The calling convention of wide vectors depends on the processor that a file is compiled for, and g++ warns about
 // that. Functions that take or return packs are inlined, or stay within one file.

@@ -5,7 +5,7 @@
 // (tests/lanes/test_elementary_functions.cpp). A power that fits into a double is exact: 2^10 is 1024.
 #pragma once
 
-#include "runtime/elementary.h"
+#include "runtime/math/elementary.h"
 
 namespace rapid {
 

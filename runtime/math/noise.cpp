@@ -1,4 +1,4 @@
-#include "runtime/noise.h"
+#include "runtime/math/noise.h"
 
 #pragma GCC diagnostic ignored "-Wpsabi"  // vectors are passed only within this file
 

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/vec.h"
+#include "runtime/math/vec.h"
 
 namespace rapid {
 

@@ -1,4 +1,4 @@
-#include "runtime/power.h"
+#include "runtime/math/power.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "runtime/library_folder.h"
+#include "runtime/base/library_folder.h"
 
 #include <dlfcn.h>
 

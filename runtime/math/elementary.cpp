@@ -1,4 +1,4 @@
-#include "runtime/elementary.h"
+#include "runtime/math/elementary.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "runtime/memory_watch.h"
+#include "runtime/base/memory_watch.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 #include <exception>
 #include <utility>
 
-#include "runtime/memory_budget.h"
-#include "runtime/setting_names.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "bindings/command/processes.h"
 #include "bindings/command_line/programs.h"
-#include "runtime/files/start_program.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/start_program.h"
 
 namespace rapid {
 namespace {

@@ -19,8 +19,8 @@
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/files/output_file.h"
 #include "runtime/base/setting_names.h"
+#include "runtime/files/output_file.h"
 
 namespace rapid {
 namespace {

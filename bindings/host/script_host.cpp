@@ -14,8 +14,8 @@
 #include "bindings/host/offers.h"
 #include "bindings/host/script_function.h"
 #include "bindings/host/values.h"
-#include "runtime/graph/override.h"
 #include "runtime/base/setting_names.h"
+#include "runtime/graph/override.h"
 
 namespace rapid {
 

@@ -8,10 +8,10 @@
 #include <tuple>
 #include <type_traits>
 
+#include "runtime/base/setting_names.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
 #include "runtime/operators/spawn/parent_paths.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "bindings/host/modules.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/graph/abi.h"
 #include "runtime/graph/plugin.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

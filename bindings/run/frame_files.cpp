@@ -7,12 +7,12 @@
 #include <limits>
 
 #include "runtime/base/at_node.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/io/format.h"
 #include "runtime/io/text_table.h"
 #include "runtime/operators/rasterize.h"
 #include "runtime/picture/picture_memory.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "runtime/base/checked_json.h"
 #include "runtime/base/error.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

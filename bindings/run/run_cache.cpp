@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "bindings/run/frame_record_archive.h"
-#include "runtime/io/state_file.h"
 #include "runtime/base/setting_names.h"
+#include "runtime/io/state_file.h"
 
 namespace rapid {
 namespace {

@@ -8,12 +8,12 @@
 
 #include "runtime/base/first_error.h"
 #include "runtime/base/frame.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/format.h"
 #include "runtime/io/merge_parts.h"
 #include "runtime/points/column_files.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

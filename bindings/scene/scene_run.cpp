@@ -12,10 +12,10 @@
 #include "bindings/run/written_names.h"
 #include "bindings/scene/run_outputs.h"
 #include "bindings/scene/scene_impl.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/graph/coupling.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

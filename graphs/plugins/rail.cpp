@@ -1,4 +1,5 @@
-// A plugin with a node of each sort: a constraint (rail), an action inside Solve (brake), one that edits points (paint).
+// A plugin with a node of each sort: a constraint (rail), an action inside Solve (brake), one that edits points
+// (paint).
 #include "runtime/graph/plugin.h"
 #include "runtime/solver/constraints/rows.h"
 
@@ -48,7 +49,9 @@ struct Brake {
     }
     auto dynamic(const Evaluation& now) const
     {
-        return act(now, [most = most](Vec3d&, Vec3d& v) { if (v.norm() > most) v *= most / v.norm(); });
+        return act(now, [most = most](Vec3d&, Vec3d& v) {
+            if (v.norm() > most) v *= most / v.norm();
+        });
     }
 };
 RAPID_NODE(Brake);

@@ -17,11 +17,11 @@
 #include <utility>
 
 #include "runtime/base/memory_budget.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/base/stopwatch.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/output_file.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

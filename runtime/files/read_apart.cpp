@@ -19,9 +19,9 @@
 #include <new>
 
 #include "runtime/base/memory_budget.h"
+#include "runtime/base/setting_names.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

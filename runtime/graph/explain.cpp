@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
+#include "runtime/base/setting_names.h"
 #include "runtime/graph/changing_node.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/point_function.h"
-#include "runtime/base/setting_names.h"
 
 namespace rapid {
 namespace {

@@ -14,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The folders that a folder's files may include besides their own. The files in runtime itself (errors, vectors, random
-// numbers) are the bottom.
+// The folders that a folder's files may include besides their own. runtime/base (errors, memory,
+// threads) and runtime/math (vectors, random numbers) are the bottom.
 const std::map<std::string, std::set<std::string>> below = {
     {"runtime/base", {}},
     {"runtime/math", {}},

@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include "runtime/solver/constraints/pair_impulses.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/holding.h"
+#include "runtime/solver/constraints/pair_impulses.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/ledger.h"
 #include "runtime/solver/point_errors.h"

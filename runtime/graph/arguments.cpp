@@ -22,7 +22,7 @@ bool varies(const Value& value)
            std::any_of(table->named.begin(), table->named.end(), entry_varies);
 }
 
-// What a node says of a parameter that it has not; of an attribute, how its newborn points get it.
+// Returns the message for an unknown parameter; for an attribute, it explains how newborn points get it.
 std::string unknown(const NodeType& type, const std::string& name)
 {
     const Param* values = type.find("attributes");
@@ -38,7 +38,7 @@ std::string unknown(const NodeType& type, const std::string& name)
             "unknown parameter \"{}\"; rapid nodes {} lists them, and an attribute of points goes into "
             "attributes = {{ {} }}",
             name, type.name, made);
-    constexpr std::size_t most = 12;  // in a message
+    constexpr std::size_t most = 12;  // names in a message
     if (names.size() > most) return fmt::format("unknown parameter \"{}\"; rapid nodes {} lists them", name, type.name);
     return fmt::format("unknown parameter \"{}\"; {} has {}", name, type.name, fmt::join(names, ", "));
 }

@@ -1,4 +1,4 @@
-// An argument of a node that names attributes in its text, as the body of a function of a point does.
+// An argument of a node whose text names attributes, such as the body of a function of a point.
 #pragma once
 
 #include <string>
@@ -11,10 +11,11 @@ class AttributePlaces {
 public:
     virtual ~AttributePlaces() = default;
 
-    // Where it names an attribute first; line 0 where it does not.
+    // Returns the first location that names the attribute; line 0 if there is none.
     virtual Location place_of(const std::string& attribute) const = 0;
 
-    // The number of components of what it assigns to the attribute: 3 for a vec3, 4 for a quaternion, 0 if unknown.
+    // Returns the number of components of the value that it assigns to the attribute: 3 for a vec3, 4 for a
+    // quaternion, 0 if unknown.
     virtual int numbers_of(const std::string& attribute) const = 0;
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t word_bits = 64;
 
-// Whether this adds anything.
+// Adds all names. Returns true if any is new.
 bool add_all(std::vector<std::uint64_t>& names, const std::vector<std::uint64_t>& others)
 {
     bool grows = false;
@@ -39,7 +39,8 @@ AttributeFlow::AttributeFlow(const std::vector<PlannedNode>& nodes)
 
     at_.assign(nodes.size(), none);
     std::map<std::size_t, Names> fed_back;  // by simulation
-    // Points that a merge brings into a loop come back with what they have, so the names go round until they settle.
+    // Points that a merge brings into a loop are fed back with their attributes, so names are propagated until they
+    // settle.
     for (bool grows = true; grows;) {
         grows = false;
         for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -69,7 +70,7 @@ std::vector<std::string> AttributeFlow::names_at(std::size_t node) const
 
 namespace {
 
-// Where a function of the node's names the attribute first; line 0 where none does.
+// Returns the first location at which a function of the node names the attribute; line 0 if none does.
 Location place_of(const Node& node, const std::string& attribute)
 {
     for (const auto& [param, value] : node.arguments) {
@@ -81,7 +82,7 @@ Location place_of(const Node& node, const std::string& attribute)
     return {};
 }
 
-// The number of components of the attribute that the node takes or assigns; 1 if unknown.
+// Returns the number of components of the attribute that the node reads or assigns; 1 if unknown.
 int numbers_in(const Node& node, const std::string& attribute)
 {
     for (const auto& [name, value] : node.arguments) {
@@ -95,7 +96,7 @@ int numbers_in(const Node& node, const std::string& attribute)
     return 1;
 }
 
-// Errors of check() are at the line, inside of a function of the node's, that names the attribute.
+// Runs check() and locates its Errors at the line inside a function of the node that names the attribute.
 template <class F>
 void at_mention(const Node& node, const std::string& attribute, const F& check)
 {
@@ -107,7 +108,7 @@ void at_mention(const Node& node, const std::string& attribute, const F& check)
     }
 }
 
-// What the nodes of one simulation make.
+// The names that the nodes of one simulation make.
 struct MadeNames {
     struct Maker {
         AttributeSpec spec;
@@ -116,7 +117,7 @@ struct MadeNames {
     std::map<std::string, Maker> attributes;
     std::set<std::string> groups;
 
-    // Error: the node makes an attribute with another type than a node before it.
+    // Throws Error if an earlier node makes the attribute with another type.
     void add(const Uses& uses, const Node& node)
     {
         groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
@@ -158,8 +159,8 @@ void sort_unique(std::vector<std::size_t>& nodes)
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
 }
 
-// Collects the users of each name. A node that makes a name makes it for the points of its simulation, which keep it
-// where they are merged into another; a node reads it of all simulations whose points reach it.
+// Collects the users of each name. A node makes a name for the points of its simulation, which keep it when they are
+// merged into another. A node reads it from all simulations whose points reach it.
 class UseCollector {
 public:
     UseCollector(const std::vector<PlannedNode>& nodes, std::size_t simulation) : nodes_(nodes), simulation_(simulation)
@@ -258,7 +259,7 @@ private:
         for (const std::string& name : uses.reads_groups_of_source) add_once(takers_[group_prefix + name], node);
     }
 
-    // What is written where something reads it, and read where something else makes it.
+    // Resolves attributes that are written if something reads them, and read if something else makes them.
     void resolve_conditional_uses()
     {
         for (auto& [name, attribute] : found_) {
@@ -272,7 +273,7 @@ private:
         }
     }
 
-    // Solve compares age with life, where points are mortal.
+    // Solve compares age with life if points are mortal.
     void add_readers_of_age()
     {
         const PlannedAttribute& life = found_.at("life");
@@ -282,7 +283,7 @@ private:
 
     const std::vector<PlannedNode>& nodes_;
     const std::size_t simulation_;
-    std::set<std::size_t> sources_;  // simulations whose points come into this one
+    std::set<std::size_t> sources_;  // simulations whose points are merged into this one
     std::map<std::string, PlannedAttribute> found_;
     std::map<std::string, std::vector<std::size_t>> takers_, givers_;  // nodes of Uses::takes and Uses::gives
     std::vector<std::size_t> readers_of_all_;
@@ -292,7 +293,7 @@ private:
 
 namespace {
 
-// What nodes read of the points of this simulation as their source.
+// Checks the names that nodes read from the points of this simulation as their source.
 void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t simulation, const MadeNames& made)
 {
     for (const PlannedNode& planned : nodes)
@@ -312,11 +313,11 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
 
 namespace {
 
-// Error: no node makes the attribute, or only nodes after this one do.
+// Throws Error if no node makes the attribute, or only nodes after this one do.
 void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std::vector<PlannedNode>& nodes,
                      std::size_t node, const std::string& name)
 {
-    // Points of other simulations, which come through a merge, bring names of their own.
+    // Points of other simulations, which come through a merge, may have other names.
     const int numbers = numbers_in(*nodes[node].node, name);
     if (nodes[node].carries.size() == 1) made.check_attribute(name, numbers);
     if (flow.has(node, name) || is_own_column(name) || known_attribute(name)) return;
@@ -354,7 +355,7 @@ void check_names(const std::vector<PlannedNode>& nodes, const AttributeFlow& flo
 
 namespace {
 
-// Whether the node fails without this attribute.
+// Returns true if the node fails without this attribute.
 bool requires_attribute(const Uses& uses, const std::string& name)
 {
     const auto names = [&](const std::vector<std::string>& list) {
@@ -363,7 +364,7 @@ bool requires_attribute(const Uses& uses, const std::string& name)
     return names(uses.reads) || names(uses.writes);
 }
 
-// Whether a node fails unless the points have this attribute, a known one, before the nodes that make it.
+// Returns true if a node fails unless the points have this known attribute before the nodes that make it.
 bool is_used_before_made(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow,
                          const PlannedAttribute& attribute)
 {
@@ -396,7 +397,7 @@ std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& no
 
 void keep_for_merges(const std::vector<PlannedNode>& nodes, std::vector<PlannedSimulation>& simulations)
 {
-    std::vector<std::set<std::size_t>> sources(simulations.size());  // the others whose points come into each
+    std::vector<std::set<std::size_t>> sources(simulations.size());  // other simulations merged into each
     for (const PlannedNode& planned : nodes)
         for (std::size_t i = 1; i < planned.inputs.size(); ++i) {
             const std::set<std::size_t>& carries = nodes[planned.inputs[i]].carries;

@@ -13,11 +13,11 @@
 namespace rapid {
 namespace {
 
-constexpr int most_values = 5;  // at steps, of which four give the value and all five its error
+constexpr int most_values = 5;  // values at steps: four give the value and all five its error
 constexpr std::size_t most_used = 4;
 constexpr std::size_t most_coordinates = 3 * 4096;
 
-// Adds the numbers of a value, lists of lists too; false where it has anything else.
+// Adds the numbers of a value, including nested lists. Returns false if it contains anything else.
 bool add_numbers(const Value& value, std::vector<double>& numbers)
 {
     if (const double* number = value.get<double>()) {
@@ -33,7 +33,7 @@ bool add_numbers(const Value& value, std::vector<double>& numbers)
     return true;
 }
 
-// The numbers of a value; empty where it has others, or none.
+// Returns the numbers of a value; empty if it contains anything else, or none.
 std::vector<double> numbers_of(const Value& value)
 {
     std::vector<double> numbers;
@@ -42,7 +42,7 @@ std::vector<double> numbers_of(const Value& value)
     return numbers;
 }
 
-// Of values that are no numbers.
+// Compares values that are not numbers.
 bool same(const Value& a, const Value& b)
 {
     const AttributeRef *attribute = a.get<AttributeRef>(), *other = b.get<AttributeRef>();
@@ -51,7 +51,7 @@ bool same(const Value& a, const Value& b)
     return object && another && *object == *another;
 }
 
-// Numbers in the form of another value, from `next` on.
+// Returns numbers, from `next` on, in the form of another value.
 Value in_form_of(const Value& value, const std::vector<double>& numbers, std::size_t& next)
 {
     if (value.get<double>()) return numbers[next++];
@@ -115,13 +115,13 @@ void FrameCurve::move_to(std::int64_t step, const FrameClock& clock)
         return;
     }
 
-    // From the end of the step to where numbers end, and then on.
+    // Collects numbers backward from the end of the step as far as they exist, then forward.
     std::vector<std::vector<double>> before, after;
     const auto add = [&](std::int64_t at, auto& list) {
         std::vector<double> numbers;
         try {
             numbers = numbers_of(value_at(at));
-        } catch (const Error&) {  // where it is needed, it is called again
+        } catch (const Error&) {  // called again if it is needed
             if (at < step) throw;
         }
         const bool fits = numbers.size() == coordinates;
@@ -187,8 +187,8 @@ bool is_followed(const Node& node, const Param& param)
 
 }  // namespace
 
-// Of forces all parameters are followed, of constraints and colliders numbers, and the places of constraints. Actions
-// are the script's.
+// For forces, all parameters are interpolated; for constraints and colliders, numbers are held, and the positions of
+// constraints interpolated. Actions are left to the script.
 ChangingNode::Between ChangingNode::between_calls(const Node& node, const Param& param)
 {
     const auto has = [&](Stage stage) {
@@ -240,7 +240,7 @@ void ChangingNode::follow(Dynamics& dynamics, std::size_t before, const Evaluati
     dynamics = std::move(followed);
 }
 
-// Solve asks before the node is evaluated again.
+// Solve queries this before the node is evaluated again.
 template <class D>
 AtPart<D> ChangingNode::at_part(const Evaluation& now)
 {

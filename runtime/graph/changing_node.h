@@ -1,4 +1,4 @@
-// A dynamic node with parameters that are functions of the frame: what it adds to the chain at any time of a step.
+// A dynamic node with parameters that are functions of the frame: provides its effect at any time of a step.
 #pragma once
 
 #include <cstddef>
@@ -17,63 +17,63 @@
 
 namespace rapid {
 
-// What a function of the frame gives between frames: it is called at the ends of steps alone, and its numbers are
-// interpolated (numerics.md, Functions of the frame).
+// Interpolates a function of the frame between frames: it is called only at the ends of steps (numerics.md, Functions
+// of the frame).
 
-// A polynomial through values at whole places from `first` on, at the place x. `used`: so many of them, those nearest
-// to the interval from 0 to 1.
+// Returns a polynomial through values at consecutive integers, starting at `first`, evaluated at x. `used`: number of
+// values, those nearest to the interval from 0 to 1.
 double interpolated(std::span<const double> values, int first, std::size_t used, double x);
 
-// Whether values follow no curve: their highest difference, which falls by the order where they do, is more than half
-// of the largest first one.
+// Returns true if the values follow no curve: their highest difference, which decreases with the order for a smooth
+// curve, is more than half of the largest first difference.
 bool jumps(std::span<const double> values);
 
 class FrameCurve {
 public:
-    // function: of a parameter whose values may be numbers, which both outlive this.
+    // function: of a parameter whose values may be numbers. Both arguments must outlive this.
     FrameCurve(const Param& param, const FrameFunction& function) : param_(param), function_(function) {}
 
     const Param& param() const { return param_; }
 
-    // Calls the function at the steps around the one that ends at `step`, as far as they are not known.
+    // Calls the function at the steps around the one that ends at `step`, unless their values are known.
     void move_to(std::int64_t step, const FrameClock& clock);
 
-    // Whether the values in the step differ.
+    // Returns true if the values change within the step.
     bool changes() const { return changes_; }
 
-    // The value at a part of the step, from 0 to 1. finer: by one more value, so that the difference tells the error;
-    // of a jump, the value at its end throughout. What is no number is as at the end of the step; finer, in the first
-    // half of it as at the beginning.
+    // Returns the value at a part of the step, from 0 to 1. finer: uses one more value, so that the difference
+    // estimates the error; for values that jump, uses the one at the end of the step. Other values than numbers are
+    // those at the end of the step; with finer, those at the beginning in the first half.
     Value at(double part, bool finer) const;
 
 private:
     const Param& param_;
     const FrameFunction& function_;
     std::map<std::int64_t, Value> known_;      // by step
-    std::vector<std::vector<double>> values_;  // of each coordinate, at consecutive steps
-    int first_ = 0;                            // of the values: 0 is the beginning of the step
+    std::vector<std::vector<double>> values_;  // by coordinate, at consecutive steps
+    int first_ = 0;                            // step of the first value: 0 is the beginning of the step
     bool changes_ = false;
     Value begin_, end_;
 };
 
 class ChangingNode {
 public:
-    // What becomes of the numbers of a parameter between the calls of its function.
+    // Treatment of a parameter's numbers between the calls of its function.
     enum class Between {
         Interpolated,  // functions of time
-        Held,          // as at the end of the step; what that is off by is in the error
-        Unfollowed,    // as at the end of the step, or the node's own affair; in no error
+        Held,          // as at the end of the step; the error estimate includes the deviation
+        Unfollowed,    // as at the end of the step, or handled by the node; not in the error estimate
     };
     static Between between_calls(const Node& node, const Param& param);
 
-    // Both outlive this.
+    // Both must outlive this.
     ChangingNode(const PlannedNode& planned, std::shared_ptr<Simulation> simulation);
 
-    // After its evaluation: what it has added to the chain last can then be had at all times of the step, where numbers
-    // change in it. before: the size of the chain without it.
+    // Is called after the node's evaluation. Makes the entry that the node added last to the chain available at all
+    // times of the step, if its numbers change. before: size of the chain without it.
     void follow(Dynamics& dynamics, std::size_t before, const Evaluation& now);
 
-    // The parameters whose changes within a step are in none of the results of `follow`.
+    // Returns the parameters whose changes within a step `follow` ignores.
     static std::vector<std::string> not_followed(const Node& node);
 
 private:

@@ -28,7 +28,7 @@ const CouplingRule* rule_of(const std::string& type)
     return found == rules().end() ? nullptr : &*found;
 }
 
-// A parameter for a function of all points at once; null where there is none.
+// Returns a parameter for a function of all points at once; null if there is none.
 const Param* whole_set_function_of(const NodeType& type)
 {
     const auto found = std::find_if(type.params.begin(), type.params.end(),
@@ -36,7 +36,7 @@ const Param* whole_set_function_of(const NodeType& type)
     return found == type.params.end() ? nullptr : &*found;
 }
 
-// One that only makes detail values of the frame, and of those that there were, does not.
+// Returns false if the function only computes detail values from the frame and earlier detail values.
 bool reads_whole_set(const PlannedNode& planned, const Param& param)
 {
     const auto argument = planned.node->arguments.find(param.name);
@@ -115,7 +115,7 @@ std::optional<float> value_of_all(const Plan& plan, std::size_t simulation, cons
     for (const PlannedNode& node : plan.nodes) {
         if (node.simulation != simulation) continue;
         for (const auto& [name, argument] : node.node->arguments)
-            if (name == attribute && argument.function()) return std::nullopt;  // a default that changes
+            if (name == attribute && argument.function()) return std::nullopt;  // a changing default
         const CouplingRule* rule = rule_of(node.node->type->name);
         if (!rule || !rule->values) continue;
         const std::optional<std::vector<float>> values = rule->values(node, attribute, fallback);

@@ -1,15 +1,15 @@
-// What couples points: makes what becomes of one depend on which others there are. Of points that nothing couples a
-// subset can be simulated alone (points/subset.h), to the same bits.
+// Coupling: a node couples points if the result of one depends on which others exist. If nothing couples the points, a
+// subset can be simulated alone (points/subset.h), with bit-identical results.
 //
-// Known for each type of node. What edits points one by one, and a force, an action or a collider, acts on each point
-// alone; constraints and functions of the whole set never do. Any other native node that changes points says what it
-// couples, in its own file:
+// This is known for each type of node. Point-by-point edits, forces, actions and colliders act on each point alone.
+// Constraints and functions of the whole set never do. Any other native node that changes points declares its coupling
+// in its own file:
 //
 //   std::string couples(const Plan& plan, const PlannedNode& node) const;    empty: nothing
 //   RAPID_COUPLING("emit", Emit);
 //
-// One that brings points also has take(const Subset&), and leaves the others out, whose ids and random numbers stay
-// theirs.
+// A node that adds points also has take(const Subset&), and skips the other points, whose ids and random numbers stay
+// reserved.
 #pragma once
 
 #include <optional>
@@ -27,26 +27,26 @@ struct PointCoupling {
     std::string what;  // "acts between neighbours"
 };
 
-// Of the nodes that are reached, in the order of the plan.
+// Returns the couplings of reached nodes, in the order of the plan.
 std::vector<PointCoupling> couplings_of(const Plan& plan);
-// Error: points are coupled; of the first node that does it, with its place.
+// Throws Error if points are coupled, with the location of the first node that couples them.
 void refuse_coupled(const Plan& plan);
-// From now on the nodes that bring points bring those of the subset alone; before the plan is evaluated. Error: as
-// refuse_coupled().
+// Makes nodes add only the points of the subset. Must be called before the plan is evaluated. Throws Error as
+// refuse_coupled() does.
 void take_subset(const Plan& plan, const Subset& subset);
 
-// The value of a float attribute that all points of a simulation have from their birth to their end; nothing where they
+// Returns the value of a float attribute that all points of a simulation have throughout their lives; nothing if they
 // may differ.
 std::optional<float> value_of_all(const Plan& plan, std::size_t simulation, const std::string& attribute);
 
-// What a type of node says of itself.
+// Declaration of a node type.
 struct CouplingRule {
     std::string_view type;
     std::string (*couples)(const Plan& plan, const PlannedNode& node);
-    // Of nodes that bring points: the values of this attribute that these get, none where there are no points; nothing
-    // where they are many. The fallback is that of points without one of their own. Null: brings none.
+    // For nodes that add points: the values of this attribute for these points. Empty if there are no points, nothing
+    // if the values are many. fallback: the value of points without one of their own. Null if the node adds no points.
     std::optional<std::vector<float>> (*values)(const PlannedNode& node, const std::string& attribute, float fallback);
-    // Of these: takes a subset. Null: brings none.
+    // For the same nodes: selects a subset. Null if the node adds no points.
     void (*take)(const PlannedNode& node, const Subset& subset);
 };
 
@@ -77,7 +77,7 @@ CouplingRule coupling_rule(std::string_view type)
     return rule;
 }
 
-// A type whose struct has no couples() couples nothing.
+// Registers the coupling of a type. A struct without couples() couples nothing.
 #define RAPID_COUPLING(type, Type) \
     static const ::rapid::CouplingRegistration coupling_of_##Type(::rapid::coupling_rule<Type>(type))
 

@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// How many points each run of equal values of the attribute has.
+// Returns the number of points in each run of equal values of the attribute.
 std::vector<std::size_t> runs_of(const PointSet& points)
 {
     const auto* curve = points.find<std::int32_t>(curve_attribute);
@@ -35,7 +35,7 @@ PointSet trails_as_curves(const PointSet& points)
     return ordered;
 }
 
-// The points of a value that is no function.
+// Returns the points of a value that is not a function.
 PointSet points_in(const Param& param, const Value& value)
 {
     if (const auto points = value.object<PointsObject>()) return points->points;
@@ -82,7 +82,7 @@ public:
 
 private:
     using Key = std::tuple<double, std::int64_t, std::int64_t>;
-    static constexpr std::size_t most_kept = 8;  // as of the files of a mesh
+    static constexpr std::size_t most_kept = 8;  // as for the files of a mesh
 
     CurvesPtr call(const Frame& frame) const
     {
@@ -111,10 +111,10 @@ CurvesPtr curves_of(const PointSet& points, bool closed, const std::string& name
     std::vector<std::size_t> counts;
     if (Trails(points).places() > 0) return curves_of(trails_as_curves(points), closed, name);
     const auto* curve = points.find<std::int32_t>(curve_attribute);
-    std::vector<std::size_t> kept;  // without the last point of a closed curve that is where the first one is
+    std::vector<std::size_t> kept;  // without the last point of a closed curve if it equals the first one
     std::size_t first = 0;
     for (const std::size_t count : runs_of(points)) {
-        if (curve && (*curve)[first] < 0) {  // of no line
+        if (curve && (*curve)[first] < 0) {  // belongs to no line
             first += count;
             continue;
         }

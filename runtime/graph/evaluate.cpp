@@ -111,9 +111,9 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     for (std::size_t first = 0, last = 0; first < plan_.nodes.size(); first = last + 1) {
         last = first;
         if (!takes_part(plan_.nodes[first])) continue;
-        // Asked for since the last node: of no node, but of the scene's file.
+        // A cancellation since the last node belongs to no node, only to the scene's file.
         name_errors({}, {plan_.nodes[first].node->location.file, 0}, [] { Cancellation::check_current(); });
-        // The hooks and checked declarations take one node after the other.
+        // The hooks and checked declarations process one node after the other.
         if (!result_ && !input_ && !checks_declarations_) last = plan_.last_together(first);
         results[last] = evaluate(first, last, left, results, readers, frame);
         remove_condemned(results, frame.figures);
@@ -145,7 +145,7 @@ void Evaluator::take_columns()
     }
 }
 
-// From the state, and from the results that nobody has taken yet.
+// Removes points from the state, and from results that have not been taken yet.
 void Evaluator::remove_condemned(std::vector<Flow>& results, FrameFigures& figures)
 {
     for (const std::shared_ptr<Simulation>& simulation : simulations_) {
@@ -202,7 +202,7 @@ public:
                 for (const std::string& name : evaluator.plan_.unasked_columns(node)) written.remove(name);
                 evaluator.write_(pattern, written, now_, simulation_.fps);
             };
-        // A simulation that begins at the end of this frame, or later, is counted once.
+        // A simulation that begins at the end of this frame, or later, counts its figures once.
         const bool at_start = step_ <= simulation_.start;
         evaluation.emplace(Evaluation{
             now_, at_start, planned.node->name, planned.node->location, RandomKey(simulation_.seed, planned.node->name),
@@ -218,7 +218,7 @@ private:
     const Simulation& simulation_;
     const std::int64_t step_;
     const Frame now_;
-    FrameFigures repeated_;  // of a start that is evaluated more than once
+    FrameFigures repeated_;  // for a start that is evaluated more than once
     std::function<void(const std::string&, const PointSet&)> write_;
 };
 
@@ -265,7 +265,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
         add_work(first, last, begin, scripts_before, result.points, frame);
         if (planned.once) kept_[first] = result;
         if (result_) result_(node, next_, result.points);
-        Cancellation::check_current();  // of memory that this node has taken
+        Cancellation::check_current();  // checks the memory that this node has taken
         return result;
     });
 }
@@ -291,10 +291,9 @@ std::vector<Uses> Evaluator::declared_for(std::size_t node) const
 {
     std::vector<Uses> declared = {uses_of(plan_.nodes[node])};
     if (plan_.nodes[node].node->type->kind != NodeKind::Solve) return declared;
-    // The plan lets Solve read ages where a life may end; how long a point has been still, and what holds it, are
-    // Solve's own.
+    // The plan lets Solve read ages if a life may end. `still` and the `stuck` columns belong to Solve itself.
     declared.emplace_back().takes = {"age", "still", "stuckP", "stuckat", "stuckface", "stuckto"};
-    // Its record of the step holds what emitters read of its points.
+    // Its record of the step contains the attributes that emitters read from its points.
     for (const PlannedNode& planned : plan_.nodes)
         for (const std::size_t source : planned.sources) {
             if (plan_.nodes[source].simulation != plan_.nodes[node].simulation) continue;

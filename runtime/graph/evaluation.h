@@ -1,4 +1,3 @@
-// The context in which a node is evaluated.
 #pragma once
 
 #include <functional>
@@ -17,7 +16,7 @@
 
 namespace rapid {
 
-// The prefix of a group's name where attributes and groups are listed together, as in the header of a .csv file.
+// The prefix of a group's name in lists of both attributes and groups, such as the header of a .csv file.
 inline const std::string group_prefix = "group:";
 
 // The context of a node's evaluation.
@@ -28,23 +27,23 @@ struct Evaluation {
     const Location& location;
     RandomKey random;       // of (seed, name)
     FrameFigures& figures;  // statistics of this frame
-    // Each text is reported once a run: it has no frame and no counts, which belong in the figures.
+    // Each string is reported once per run: it contains no frame and no counts, which belong in the figures.
     std::vector<std::string>& warnings;
-    // Writes a set to a file; empty where nothing may be written (check, explain, test).
+    // Writes a set to a file; empty if nothing may be written (check, explain, test).
     const std::function<void(const std::string& pattern, const PointSet& points)>& write;
-    // Attributes and groups that the plan leaves out of this simulation (PlannedAttribute); null: none.
+    // Attributes and groups that the plan prunes from this simulation (PlannedAttribute); null: none.
     const std::set<std::string>* left_out = nullptr;
-    // Of the attributes that a node reads for Solve: those of its parameters, and known ones.
+    // Ranges of the attributes that a node reads for Solve: those of its parameters, and known ones.
     std::vector<AttributeRange> ranges = {};
-    // The node is between a Create and its Solve: the next frame begins with the points as that Solve leaves them.
+    // The node is between a Create and its Solve: the next frame starts with the points that this Solve leaves.
     bool is_fed_back = true;
 
-    // Whether a node that makes this attribute or group is to make it.
+    // Returns true if a node that makes this attribute or group should make it.
     bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }
     bool keeps_group(const std::string& name) const { return keeps(group_prefix + name); }
 };
 
-// A force, action, collider, constraint or interaction D of the node that is evaluated.
+// Returns a force, action, collider, constraint or interaction D of the evaluated node.
 template <class D, class... Arguments>
 std::shared_ptr<D> dynamic_of(const Evaluation& now, const std::string& group, Arguments&&... arguments)
 {

@@ -15,7 +15,7 @@ namespace {
 struct StageWords {
     Stage stage;
     const char* name;
-    const char* absent;  // the reason where a plan lacks it
+    const char* absent;  // the reason if a plan lacks it
 };
 
 constexpr StageWords stage_words[] = {
@@ -81,7 +81,7 @@ std::string what_brings_in(const PlannedAttribute& attribute)
     return usual_way_in(attribute.name);
 }
 
-// Whether functions are called for each step: those of Solves and of what is before them.
+// Returns the calls per frame: functions of Solves and of nodes upstream of them are called for each subframe.
 int calls_a_frame(const Plan& plan, const PlannedNode& planned)
 {
     return planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
@@ -89,7 +89,7 @@ int calls_a_frame(const Plan& plan, const PlannedNode& planned)
 
 std::string times_a_frame(int times) { return times > 1 ? fmt::format("{} times a frame", times) : "once a frame"; }
 
-// What holds between the calls of a function of the frame.
+// Returns the treatment of a function of the frame between its calls.
 std::string between_calls(const PlannedNode& planned, const Param& param)
 {
     if (planned.node->type->kind != NodeKind::Dynamic || !planned.in_loop) return "its value holds for the frame";

@@ -1,5 +1,4 @@
-// A plan in words: each node, attribute and stage, whether it is kept, and why. The reasons are those that the plan has
-// recorded.
+// Explains a plan: each node, attribute and stage, with the plan's recorded reason to keep or prune it.
 #pragma once
 
 #include <cstddef>
@@ -15,21 +14,21 @@ struct Explanation {
         std::string name, type;
         bool kept;
         std::string evaluated;  // "once", "every frame", "4 times a frame", "never"
-        std::string why;        // why it is kept or left out
+        std::string why;        // why it is kept or pruned
         std::string changes;    // why it is evaluated every frame; empty otherwise
     };
     struct ExplainedAttribute {
         std::string name;        // a group's is group:NAME
         std::string simulation;  // its create's name
         bool kept;
-        std::size_t bytes_per_point;  // 0 where left out; a uniform column needs none
+        std::size_t bytes_per_point;  // 0 if pruned; a uniform column needs none
         std::string why;
-        std::string brought_in_by;  // what would keep it; empty where it is kept
+        std::string brought_in_by;  // what would keep it; empty if it is kept
     };
     struct ExplainedFunction {
-        std::string name;     // of the node and the parameter: "pin1.target"
+        std::string name;     // node and parameter: "pin1.target"
         std::string called;   // how often: "once a frame", "4 times a frame", "as its path needs"
-        std::string between;  // what holds between the calls, and whether the estimated error has it
+        std::string between;  // its value between the calls, and its part in the estimated error
     };
     struct ExplainedStage {
         std::string name;
@@ -49,17 +48,17 @@ struct Explanation {
     std::vector<ExplainedFunction> functions;  // parameters of kept nodes, in the order of these
     std::vector<ExplainedStage> stages;
     std::vector<std::vector<std::string>> passes;  // names of nodes
-    // Why no subset of the points can be simulated alone; none where one can.
+    // Reasons that no subset of the points can be simulated alone; empty if one can.
     std::vector<ExplainedCoupling> couplings;
 
     // The sum over all simulations.
     std::size_t bytes_per_point() const;
 };
 
-// What makes most attributes live that are left out.
+// Returns the usual way to make a pruned attribute live.
 std::string usual_way_in(const std::string& attribute);
 
-// outputs: the files that the run writes besides those of `:write` nodes, as the user named them.
+// outputs: files that the run writes in addition to those of `:write` nodes, as named by the user.
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Frames by their numbers: {12, 48}.
+// Frames by number: {12, 48}.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct FrameSet {
     std::set<std::int64_t> frames;
 };
 
-// Error: a frame that is not whole.
+// Throws Error if a frame is not an integer.
 void read_value(const Param& param, const Value& value, FrameSet& field);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// What a value of a graph file is, too, that knows where it is written.
+// An interface of values in a graph file that know their location.
 #pragma once
 
 #include "runtime/base/error.h"

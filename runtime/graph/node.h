@@ -24,13 +24,12 @@
 //
 //   bool add_potential(const Chunk&, std::span<double>) const    the potential energy of a conservative force
 //   Flow start(std::span<Flow>, const Evaluation&)           the first frame, in which nodes between Create and Solve
-//   do
-//                                                            not run; by default it passes on the first input
+//                                                            do not run; by default it passes on the first input
 //   void uses(Uses&) const                                   attributes and groups that depend on the arguments
-//   void check() const                                       arguments that are legal one by one but not together
+//   void check() const                                       arguments that are legal separately but not together
 //
-// Fields are set from the arguments before each evaluation, and hold those of the first frame in uses() and check();
-// other members are state that lasts for a run.
+// Fields are set from the arguments before each evaluation. In uses() and check(), they hold those of the first frame.
+// Other members are state that lasts for a run.
 #pragma once
 
 #include <map>
@@ -44,8 +43,8 @@
 
 namespace rapid {
 
-// Builds a declaration. T::make() makes the operator, where the node needs one of its own. A struct with a member
-// `group` has the parameter of that name.
+// Builds a declaration. T::make() creates the operator if the node needs a special one. A struct with a member `group`
+// has the parameter of that name.
 template <class T>
 class Declaration {
 public:
@@ -63,9 +62,8 @@ public:
             param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
     }
 
-    // A parameter in `field`, which needs no initialiser. fallback: the default, in the unit that users give; nil where
-    // the field can be empty. Degrees ("deg") are stored as radians.
-    // The field may be one of a base that nodes share.
+    // Declares a parameter stored in `field`, which needs no initialiser and may belong to a shared base. fallback:
+    // the default, in the user's unit; nil if the field can be empty. Degrees ("deg") are stored as radians.
     template <class F, class Base>
     Declaration& param(F Base::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)
     {
@@ -88,9 +86,9 @@ public:
         return *this;
     }
 
-    // Of the parameter declared last.
+    // Modify the parameter declared last.
     Declaration& required() { return last().required = true, *this; }
-    Declaration& constant() { return last().of_the_frame = false, *this; }  // no function of the frame
+    Declaration& constant() { return last().of_the_frame = false, *this; }  // not a function of the frame
     Declaration& or_nothing() { return last().may_be_nil = true, *this; }   // a function may return nil
     Declaration& choices(std::vector<std::string> names) { return last().choices = std::move(names), *this; }
     Declaration& of_type(std::string words) { return last().type = std::move(words), *this; }

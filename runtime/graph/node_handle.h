@@ -1,4 +1,4 @@
-// A node as a value: as graph code holds it, and as an argument of a node that reads its points (spawn's `from`).
+// A node as a value: in graph code, and as an argument of a node that reads its points (spawn's `from`).
 #pragma once
 
 #include "runtime/base/object.h"

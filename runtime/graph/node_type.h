@@ -21,20 +21,21 @@ namespace rapid {
 // The attributes and groups that a node reads, writes or makes.
 struct Uses {
     std::vector<std::string> reads, writes;
-    std::vector<std::string> may;  // names that may be attributes; known ones among them are read
+    std::vector<std::string> may;  // names that may be attributes; the known ones are read
     std::vector<AttributeSpec> makes;
-    std::vector<AttributeSpec> defaults;  // values of points without one of their own, whoever makes the attribute
-    std::vector<std::string> takes;       // optional inputs: read where another node makes them
-    std::vector<std::string> gives;       // optional outputs: written where another node reads them
+    std::vector<AttributeSpec> defaults;  // fallback values, whichever node makes the attribute
+    std::vector<std::string> takes;       // optional inputs: read if another node makes them
+    std::vector<std::string> gives;       // optional outputs: written if another node reads them
     std::vector<std::string> reads_groups, takes_groups, makes_groups;
-    std::vector<std::string> joins_groups;  // those of makes_groups that the node writes point by point
+    std::vector<std::string> joins_groups;  // the part of makes_groups that the node writes point by point
     bool reads_all = false;                 // may read every attribute that is made
 
-    // Of the points of the nodes among its arguments (node_handle.h): what is read, and what is read if it is made.
+    // For points of the nodes among its arguments (node_handle.h): attributes read, and attributes read if they are
+    // made.
     std::vector<std::string> reads_of_source, takes_of_source, reads_groups_of_source;
 
-    // Input of Operator::uses: the parameters that are functions of the frame, whose values will change; and what the
-    // nodes up to those among its arguments make.
+    // Input of Operator::uses: the parameters that are functions of the frame, whose values will change; and the
+    // attributes made by the nodes up to those among its arguments.
     std::set<std::string> functions;
     std::vector<AttributeSpec> source_makes;
 };
@@ -51,11 +52,11 @@ public:
     virtual void uses(Uses& uses) const = 0;
     virtual void check() const = 0;
 
-    // This, where it edits points one by one (point_edit.h), and so can go together with its neighbours.
+    // Returns this if it edits points one by one (point_edit.h), and can thus be fused with its neighbours.
     virtual const PointEdit* as_point_edit() const { return nullptr; }
 };
 
-// Parts of a frame's work, which a scene may have or lack.
+// Parts of a frame's work that a scene may need.
 enum class Stage {
     Emission,
     Script,  // implied by a Lua function among the arguments
@@ -78,24 +79,24 @@ enum class NodeKind {
 
 struct NodeType {
     std::string name, doc;
-    std::string counted_as;  // nodes without a name of their own are numbered as those of this type; empty: its own
+    std::string counted_as;  // nodes without a name of their own are numbered together with this type; empty: its own
     std::string defined_in;  // the file of a type written in Lua; empty for native types
     NodeKind kind = NodeKind::Points;
     std::vector<Param> params;
     std::optional<Param> rest;  // for arguments of any other name; its `name` is then that name
-    Uses uses;                  // of every node of this type; Operator::uses adds those of a node
-    std::vector<Stage> stages;  // that nodes of this type need
+    Uses uses;                  // of every node of this type; Operator::uses adds those of a single node
+    std::vector<Stage> stages;  // needed by nodes of this type
     bool varies = false;        // the result may change from frame to frame with the same inputs and arguments
     std::function<std::unique_ptr<Operator>()> make;
 
     bool has(Stage stage) const { return std::find(stages.begin(), stages.end(), stage) != stages.end(); }
-    // Null where there is no parameter of that name. (`name` is a parameter only where it is declared, as of :group;
-    // elsewhere it names the node.)
+    // Returns null if there is no parameter of that name. (`name` is a parameter only if it is declared, as for
+    // :group; otherwise it names the node.)
     const Param* find(std::string_view param) const;
     std::vector<std::string> param_names() const;  // without internal ones
 };
 
-// A node as the graph file wrote it. Immutable; its inputs were made before it.
+// A node as written in the graph file. Immutable; its inputs were created before it.
 struct Node {
     const NodeType* type;
     std::string name;

@@ -1,4 +1,4 @@
-// How a node's struct becomes an Operator: by the member functions that it has (node.h lists them).
+// Turns a node's struct into an Operator, using its member functions (listed in node.h).
 #pragma once
 
 #include <optional>

@@ -32,7 +32,7 @@ const Node& find_node(const Graph& graph, const std::string& path, const std::st
     throw Error(fmt::format("{}: the graph has no node \"{}\"{}", path, wanted, did_you_mean(wanted, names)));
 }
 
-// The graph with copies of its nodes, which are the inputs and sources of one another. change(copy, node).
+// Returns the graph with copies of its nodes, connected to each other. Calls change(copy, node) for each.
 template <class F>
 Graph copied(const Graph& graph, const F& change)
 {

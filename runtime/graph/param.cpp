@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// "a number", "an integer"; plurals ("points") have no article.
+// Returns "a number", "an integer"; plurals ("points") have no article.
 std::string with_article(std::string_view type)
 {
     for (const std::string_view plain : {"points", "attributes", "numbers by frame", "names"})
@@ -63,7 +63,7 @@ Int to_int(const Param& param, double value)
                                   static_cast<double>(std::numeric_limits<Int>::max())));
 }
 
-// The N numbers of a list; nothing for any other value.
+// Returns the N numbers of a list; nothing for any other value.
 template <std::size_t N>
 std::optional<std::array<double, N>> numbers(const Value& value)
 {
@@ -101,7 +101,7 @@ const Table& names_only(const Param& param, const Value& value, Map& field)
     return *table;
 }
 
-// Error: a name that every point has, that of groups, or one that files and scripts can't spell.
+// Throws Error if every point has the name, if it is that of groups, or if files and scripts cannot spell it.
 void check_attribute_name(std::string_view name)
 {
     if (name == "group" || find_point_name(name))
@@ -228,7 +228,7 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
     const AttributeSpec* known = known_attribute(param.name);
     if (!known) known = conventional_attribute(param.name);
 
-    // Lua has one type of number: that of an unknown name is a float, so that 1 and 1.5 give the same column.
+    // Lua has one number type: an unknown name becomes a float, so that 1 and 1.5 give the same column.
     const bool is_scalar =
         !known || (!std::holds_alternative<Vec3f>(known->fallback) && !std::holds_alternative<Quatf>(known->fallback) &&
                    !std::holds_alternative<Token>(known->fallback));

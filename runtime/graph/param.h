@@ -1,5 +1,5 @@
-// Parameters of nodes. Each is declared once, with its type, range, default, unit and documentation, from which come
-// validation, `rapid nodes` and the annotations for editors.
+// Parameters of nodes. Each is declared once, with its type, range, default, unit and documentation, for validation,
+// `rapid nodes` and the annotations for editors.
 #pragma once
 
 #include <functional>
@@ -27,43 +27,45 @@ struct Param {
     bool required = false;
     bool per_point = false;       // accepts rapid.attr
     bool of_the_frame = true;     // accepts a function of the frame
-    bool may_be_nil = false;      // such a function may return nil
-    bool keeps_function = false;  // the function itself is the value: a motion is called between frames too
-    bool internal = false;        // given by the host of the scripting language, and not shown to users
+    bool may_be_nil = false;      // its function of the frame may return nil
+    bool keeps_function = false;  // the function itself is the value: a motion is also called between frames
+    bool internal = false;        // set by the host of the scripting language, and not shown to users
 
-    // Stores a value, which is not a function, in the node's field. Error: wrong type, out of range; with the value.
+    // Stores a value, which is not a function, in the node's field. Throws Error, with the value, if it has the wrong
+    // type or is out of range.
     std::function<void(const Param& self, void* fields, const Value& value)> assign;
-    // The attribute from which the field is read; empty where it is a constant. Null where the type takes no numbers
-    // of points.
+    // Returns the attribute from which the field is read; empty if it is a constant. Null if the type takes no
+    // per-point numbers.
     std::function<std::string(const void* fields)> attribute;
 };
 
-// Reads a value into a field, or throws an Error with the name of the parameter, the value and what would be right. A
-// node may add an overload for a type of its own, in namespace rapid, before its declaration.
+// Reads a value into a field. Throws Error with the name of the parameter, the value and the expected values. A node
+// may add an overload for a type of its own, in namespace rapid, before its declaration.
 void read_value(const Param& param, const Value& value, double& field);
 void read_value(const Param& param, const Value& value, float& field);
 void read_value(const Param& param, const Value& value, int& field);
 void read_value(const Param& param, const Value& value, bool& field);
-void read_value(const Param& param, const Value& value, std::string& field);  // one of `choices` where there are any
+void read_value(const Param& param, const Value& value, std::string& field);  // one of `choices` if there are any
 void read_value(const Param& param, const Value& value, Vec3d& field);
 void read_value(const Param& param, const Value& value, Vec3f& field);
 void read_value(const Param& param, const Value& value, PerPoint<float>& field);
 void read_value(const Param& param, const Value& value, PerPoint<Vec3f>& field);
 void read_value(const Param& param, const Value& value, ObjectPtr& field);
-// A motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2} of constant motions.
+// Reads a motion: an object, a function of the frame that returns one, or keys {[1] = m1, [24] = m2} of constant
+// motions.
 void read_value(const Param& param, const Value& value, MotionPtr& field);
-// The value of an attribute, which has the name of the parameter. A known attribute has its type, any other that of the
-// value: a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion, a text a string. Error: a reserved name (P,
-// v, id, dt, ...).
+// Reads the value of an attribute, which has the name of the parameter. A known attribute has its own type, any other
+// the type of the value: a number is a float, {x, y, z} a vec3, {x, y, z, w} a quaternion, a string a string. Throws
+// Error if the name is reserved (P, v, id, dt, ...).
 void read_value(const Param& param, const Value& value, AttributeValue& field);
-// Attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
+// Reads attribute values by name: {heat = 1, Cd = {1, .5, 0}}.
 void read_value(const Param& param, const Value& value, std::map<std::string, AttributeValue>& field);
-// Numbers by frame: {[1] = 100, [24] = 50}. A list {100, 50} is frames 1 and 2.
+// Reads numbers by frame: {[1] = 100, [24] = 50}. A list {100, 50} means frames 1 and 2.
 void read_value(const Param& param, const Value& value, std::map<std::int64_t, double>& field);
-// Names: {"heat", "Cd"}, or one name.
+// Reads names: {"heat", "Cd"}, or one name.
 void read_value(const Param& param, const Value& value, std::vector<std::string>& field);
 
-// A table with names only; values of any type.
+// Reads a table with only named entries, of any type.
 void read_value(const Param& param, const Value& value, std::map<std::string, Value>& field);
 
 template <class T>
@@ -86,7 +88,7 @@ void read_value(const Param& param, const Value& value, std::shared_ptr<const T>
     if (!field) wrong_type(param, value);
 }
 
-// The name of a field's type for users.
+// Returns the name of a field's type for users.
 template <class T>
 constexpr std::string_view param_type()
 {
@@ -120,7 +122,7 @@ constexpr std::string_view param_type()
         return T::element_type::param_type;  // a pointer to an object
 }
 
-// A list, read value by value.
+// Reads a list, value by value.
 template <class T>
 void read_value(const Param& param, const Value& value, std::vector<T>& field)
 {
@@ -132,11 +134,11 @@ void read_value(const Param& param, const Value& value, std::vector<T>& field)
     for (std::size_t i = 0; i < field.size(); ++i) read_value(param, table->list[i], field[i]);
 }
 
-// Sets all fields from arguments by name, or from their defaults. Error: an unknown or missing name, and those of
-// read_value.
+// Sets all fields from arguments by name, or from their defaults. Throws Error if a name is unknown or missing, or as
+// read_value does.
 void assign_arguments(const std::vector<Param>& params, const std::map<std::string, Value>& arguments, void* fields);
 
-// A parameter in a field of T. fallback: the default, in the unit that users give; degrees ("deg") are stored as
+// Returns a parameter stored in a field of T. fallback: the default, in the user's unit; degrees ("deg") are stored as
 // radians.
 template <class T, class F>
 Param param_of(F T::*field, std::string name, Value fallback, Range range, std::string unit, std::string doc)

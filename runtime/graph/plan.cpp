@@ -19,7 +19,7 @@
 namespace rapid {
 namespace {
 
-// Warnings of graphs that are legal and probably not what was meant.
+// Warnings about graphs that are legal but probably not intended.
 
 std::string warning_of(const Node& node, const std::string& text)
 {
@@ -43,8 +43,8 @@ bool comes_to(const Plan& plan, const PlannedNode& reader, std::string_view name
                        [&](std::size_t simulation) { return comes(plan.simulations[simulation], name); });
 }
 
-// Nodes whose result nobody takes. Of a chain that is left out as a whole, and of one that ends in a Solve, the author
-// may know.
+// Warns of nodes whose result is unused. Chains that are unused as a whole, or end in a Solve, are assumed to be
+// intended.
 void warn_of_dropped_nodes(const Graph& graph, const Plan& plan, std::vector<std::string>& warnings)
 {
     std::set<const Node*> taken, reached;
@@ -65,7 +65,7 @@ void warn_of_dropped_nodes(const Graph& graph, const Plan& plan, std::vector<std
     }
 }
 
-// A script that looks at the age as a part of the life.
+// Warns of scripts that relate age to life in chains without lives.
 void warn_of_missing_lives(const Plan& plan, std::vector<std::string>& warnings)
 {
     for (const PlannedNode& planned : plan.nodes) {
@@ -79,7 +79,7 @@ void warn_of_missing_lives(const Plan& plan, std::vector<std::string>& warnings)
     }
 }
 
-// Angular velocities that turn nothing.
+// Warns of angular velocities that have no effect.
 void warn_of_idle_spins(const Plan& plan, std::vector<std::string>& warnings)
 {
     for (const PlannedSimulation& simulation : plan.simulations) {
@@ -135,7 +135,7 @@ bool may_give_velocity(const PlannedNode& planned)
     }
 }
 
-// Kernels that assign P in chains in which nothing gives points a velocity.
+// Warns of kernels that assign P in chains in which nothing gives points a velocity.
 void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& warnings)
 {
     for (std::size_t s = 0; s < plan.simulations.size(); ++s) {
@@ -156,8 +156,8 @@ void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& 
     }
 }
 
-// Nodes whose result is dropped, that wait for what never comes, or make what nothing uses, each with what to do. plan:
-// that of the graph, whose attributes are found.
+// Returns warnings, with advice, about nodes whose result is dropped, that wait for something that never comes, or
+// that make something unused. plan: the plan of the graph, after its attributes are found.
 std::vector<std::string> doubts_about(const Graph& graph, const Plan& plan)
 {
     std::vector<std::string> warnings;
@@ -198,7 +198,7 @@ const PlannedAttribute* PlannedSimulation::find(std::string_view name) const
 
 namespace {
 
-// The node that is the argument `from`. As another argument a node has the wrong type.
+// Returns the node in the argument `from`. A node in another argument has the wrong type.
 std::vector<NodePtr> sources_of(const Node& node)
 {
     const Param* from = node.type->find("from");
@@ -208,7 +208,7 @@ std::vector<NodePtr> sources_of(const Node& node)
     return handle ? std::vector{handle->node} : std::vector<NodePtr>();
 }
 
-// A node that reads hit attributes of points of which no collider writes any.
+// Returns warnings about nodes that read hit attributes of points for which no collider writes them.
 std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
                                        const std::vector<PlannedSimulation>& simulations)
 {
@@ -267,7 +267,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     for (const std::string& warning : doubts_about(graph, *this)) warnings.push_back(warning);
 }
 
-// The nodes that are reached from the outputs, in the order in which they were made: inputs come first.
+// Collects the nodes reached from the outputs, in order of creation: inputs come first.
 void Plan::collect_nodes(const Graph& graph)
 {
     std::map<std::uint64_t, NodePtr> reached;
@@ -324,8 +324,8 @@ void Plan::collect_nodes(const Graph& graph)
     }
 }
 
-// Forces, colliders and constraints act in a Solve alone, and points are carried from frame to frame by one alone. One
-// warning a simulation, of the first such node.
+// Forces, colliders and constraints act only in a Solve, and only a Solve carries points from frame to frame. Adds one
+// warning per simulation, about the first such node.
 void Plan::warn_of_idle_nodes()
 {
     std::set<std::size_t> told;
@@ -364,7 +364,7 @@ void Plan::find_simulations()
     }
 }
 
-// What a node in a loop reads as its source is evaluated as often as that loop.
+// A source that a node in a loop reads is evaluated as often as that loop.
 void Plan::find_steps()
 {
     for (std::size_t i = nodes.size(); i-- > 0;) {
@@ -381,7 +381,7 @@ void Plan::find_steps()
         });
 }
 
-// Error: points that have no path through a frame.
+// Throws Error if the points have no path through a frame.
 void Plan::check_source(const PlannedNode& planned, std::size_t s)
 {
     const PlannedNode& source = nodes[s];
@@ -437,7 +437,7 @@ void Plan::feed_back(const PlannedNode& solve)
     }
 }
 
-// Gives every operator its arguments, as they are at the first frame, and checks them.
+// Binds every operator's arguments for the first frame, and checks them.
 void Plan::bind_all()
 {
     for (PlannedNode& planned : nodes)
@@ -450,7 +450,7 @@ void Plan::bind_all()
         });
 }
 
-// What the nodes of its sources' simulations make; they come before it.
+// Collects the attributes made by nodes of its sources' simulations, which come before it.
 void Plan::find_made_by_sources(PlannedNode& planned) const
 {
     for (const std::size_t source : planned.sources)
@@ -540,7 +540,7 @@ std::vector<std::vector<std::size_t>> Plan::passes() const
 std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
 {
     std::vector<AttributeSpec> columns;
-    std::map<std::string, AttributeValue> defaults;  // that of the first node that gives one
+    std::map<std::string, AttributeValue> defaults;  // of the first node that gives one
     std::set<std::string> taken;
     for (const PlannedNode& planned : nodes) {
         if (planned.simulation != simulation) continue;

@@ -1,8 +1,8 @@
-// The plan of a run: what the requested outputs need, found before the first frame.
+// The plan of a run: everything that the requested outputs need, found before the first frame.
 //
-// Backward from the outputs it finds the nodes that are reached, in an order in which inputs come first; the simulation
-// of each (a Create and the one Solve that feeds it back); the attributes and groups that are live (attribute_uses.h);
-// and the nodes whose result never changes. Every error that does not need a frame to be run is found here.
+// Backward from the outputs it finds the reached nodes, ordered so that inputs come first; the simulation of each (a
+// Create and the single Solve that feeds it back); the live attributes and groups (attribute_uses.h); and the nodes
+// whose result never changes. Every error that can be found without running a frame is found here.
 #pragma once
 
 #include <cstdint>
@@ -22,20 +22,20 @@ namespace rapid {
 struct Graph {
     std::string file;
     std::map<std::string, NodePtr> outputs;  // a single one is called "main"
-    std::vector<NodePtr> nodes;              // all that were made, reached or not
+    std::vector<NodePtr> nodes;              // all that were created, reached or not
 };
 
 struct PlanOptions {
     std::optional<std::uint64_t> seed;    // replaces each create's seed
-    std::vector<std::string> attributes;  // attributes and groups that outputs ask for by name
-    bool all_made = true;                 // an output asks for all that the scene makes
-    bool keep_steps = false;              // keeps what happens to the points in each step, for FrameResult::steps
-    bool keep_all = false;                // leaves nothing out and evaluates nothing once, to the same bits
+    std::vector<std::string> attributes;  // attributes and groups that outputs request by name
+    bool all_made = true;                 // an output requests all attributes that the scene makes
+    bool keep_steps = false;              // stores the events of each step, for FrameResult::steps
+    bool keep_all = false;                // prunes nothing and evaluates nothing once; results are bit-identical
 };
 
 // An attribute or a group of a simulation's points, and its users, as indices into Plan::nodes.
 struct PlannedAttribute {
-    std::string name;  // a group's with group_prefix
+    std::string name;  // a group's has group_prefix
     AttributeSpec spec;
     bool group = false;
     bool always = false;  // P, v, id
@@ -43,12 +43,12 @@ struct PlannedAttribute {
     bool asked_by_name = false;  // by an output
     bool asked_as_made = false;  // by an output that takes all that the scene makes
     bool kept = false;
-    bool kept_for_merge = false;    // for the set alone into which the points of this simulation are merged
-    bool used_before_made = false;  // a known one: by a node before those that make it
+    bool kept_for_merge = false;    // only for the set into which the points of this simulation are merged
+    bool used_before_made = false;  // known attribute: used by a node before the nodes that make it
 
-    // Whether an output that names no attributes has it.
+    // Returns true if an output that names no attributes has it.
     bool is_of_scene() const { return always || !made_by.empty() || !written_by.empty() || !read_by.empty(); }
-    std::size_t bytes_per_point() const;  // where the column is not uniform
+    std::size_t bytes_per_point() const;  // if the column is not uniform
 };
 
 struct PlannedSimulation {
@@ -57,9 +57,9 @@ struct PlannedSimulation {
     std::int64_t start = 1;
     int subframes = 1;
     std::uint64_t seed = 0;
-    bool recorded = false;                     // whether Solve keeps what happens in a step, for emitters
+    bool recorded = false;                     // Solve stores the events of a step, for emitters
     std::vector<PlannedAttribute> attributes;  // all that are known or made, in order of name
-    std::set<std::string> left_out;            // names of those that are not kept
+    std::set<std::string> left_out;            // names of pruned attributes
 
     const PlannedAttribute* find(std::string_view name) const;
 };
@@ -68,23 +68,23 @@ struct PlannedNode {
     NodePtr node;
     std::shared_ptr<Operator> op;
     std::vector<std::size_t> inputs;          // indices into Plan::nodes
-    std::vector<std::size_t> sources;         // likewise, of the nodes among its arguments: their points it only reads
-    std::vector<AttributeSpec> source_makes;  // what the nodes up to these make
-    std::size_t consumers = 0;                // of its result, outputs and readers included
+    std::vector<std::size_t> sources;         // likewise, for the nodes among its arguments, whose points it only reads
+    std::vector<AttributeSpec> source_makes;  // attributes made by the nodes up to its sources
+    std::size_t consumers = 0;                // of its result, including outputs and readers
     std::size_t simulation = 0;               // index into Plan::simulations
     std::set<std::size_t> carries;            // the simulations whose points pass through it
-    bool in_loop = false;                     // from its Create to its Solve, both included
-    bool in_steps = false;                    // evaluated in each sub-frame: in_loop, or upstream of a source in a loop
+    bool in_loop = false;                     // from its Create to its Solve, inclusive
+    bool in_steps = false;                    // evaluated in each subframe: in_loop, or upstream of a source in a loop
     bool once = false;                        // evaluated once: its result never changes
-    std::string changes;                      // why its result changes; empty where it does not
+    std::string changes;                      // why its result changes; empty if it does not
     std::set<std::string> reached_from;       // names of outputs
 };
 
 class Plan {
 public:
-    // Error: no output; a parameter that is unknown, missing, of the wrong type or out of range; a second Solve after
-    // one Create (naming both); an attribute or group that nothing makes (with the nearest name); two types for one
-    // name.
+    // Throws Error if there is no output; if a parameter is unknown, missing, of the wrong type or out of range; if a
+    // second Solve follows one Create (naming both); if nothing makes an attribute or group (with the nearest name);
+    // or if one name has two types.
     Plan(const Graph& graph, const PlanOptions& options);
 
     std::vector<PlannedNode> nodes;
@@ -93,29 +93,30 @@ public:
     std::vector<NodePtr> left_out;               // nodes that no output depends on
     bool keeps_all = false;
     bool keeps_steps = false;
-    std::vector<std::string> warnings;  // of doubtful graphs: a write node that is not reached
+    std::vector<std::string> warnings;  // about doubtful graphs, e.g. a write node that is not reached
 
-    // The columns and groups that the points of a simulation have from its first frame on. The fallbacks follow from
-    // the current arguments of the nodes.
+    // Return the columns and groups that the points of a simulation have from its first frame on. The fallbacks depend
+    // on the current arguments of the nodes.
     std::vector<AttributeSpec> columns_of(std::size_t simulation) const;
     std::vector<std::string> groups_of(std::size_t simulation) const;
 
-    // The last node of the fused edits that begin with node `first`: neighbours that edit points one by one, whose
-    // results have no other consumer. A node that reads point indices does not follow one that removes points.
+    // Returns the last node of the fused edits that begin with node `first`: neighbours that edit points one by one,
+    // and whose results have no other consumer. A node that reads point indices does not follow one that removes
+    // points.
     std::size_t last_together(std::size_t first) const;
 
-    // The nodes of each pass over the points, in order: a Solve with the dynamics upstream of it, fused edits, or a
-    // single node.
+    // Returns the nodes of each pass over the points, in order: a Solve with the dynamics upstream of it, fused edits,
+    // or a single node.
     std::vector<std::vector<std::size_t>> passes() const;
 
-    // The names of all points of the scene, whether they are kept or not; groups without the prefix.
+    // Returns the names of all attributes and groups of the scene, kept or not; groups without the prefix.
     std::set<std::string> names_of_scene() const;
 
-    // The columns of a node's result that are there for another reason than its points: another output asks for them by
-    // name, other points have them, or nothing is left out.
+    // Returns the columns of a node's result that its output did not request: another output requests them by name,
+    // other points have them, or nothing is pruned.
     std::set<std::string> unasked_columns(std::size_t node) const;
 
-    // The earliest first frame of the simulations.
+    // Returns the earliest first frame of the simulations.
     std::int64_t first_frame() const;
 
 private:
@@ -131,7 +132,7 @@ private:
     void warn_of_idle_nodes();
 };
 
-// The uses of a node: those of its type, its own, and those of its arguments.
+// Returns the uses of a node: those of its type, its own, and those of its arguments.
 Uses uses_of(const PlannedNode& planned);
 
 }  // namespace rapid

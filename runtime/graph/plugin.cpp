@@ -26,7 +26,7 @@ std::string text_of(const std::string& file)
     }
 }
 
-// The mark of RAPID_PLUGIN in a file; empty where there is none.
+// Returns the mark of RAPID_PLUGIN in a file; empty if there is none.
 std::string mark_of(const std::string& file)
 {
     const std::string bytes = text_of(file);
@@ -57,7 +57,7 @@ void load_plugin(const std::string& file)
     if (built != RAPID_ABI)
         throw Error(fmt::format("{}: the plugin was built for Rapid {}; this is Rapid {}: build it again", file, built,
                                 RAPID_ABI));
-    // As an absolute path, or the loader would search the library folders.
+    // An absolute path, because the loader would otherwise search the library folders.
     if (!dlopen(fs::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL)) {
         const char* why = dlerror();
         throw Error(fmt::format("{}: the plugin can't be loaded: {}", file, why ? why : "no reason given"));

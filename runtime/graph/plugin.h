@@ -1,12 +1,12 @@
 // Plugins: shared libraries, built against the installed package, whose nodes register themselves when the library is
-// loaded (`--plugin FILE`, RAPID_PLUGIN_PATH), and are then like native ones.
+// loaded (`--plugin FILE`, RAPID_PLUGIN_PATH) and then act like native ones.
 //
 //   #include "runtime/graph/plugin.h"
 //   RAPID_PLUGIN;          once, in one of its sources
 //   RAPID_NODE(MyNode);
 //
 // C++ has no stable binary layout across versions: a library built with other headers would crash in its first call.
-// RAPID_PLUGIN embeds a mark with a hash of the headers in the file, which is checked before the file is loaded.
+// RAPID_PLUGIN embeds a mark with a hash of the headers, which is checked before the file is loaded.
 #pragma once
 
 #include <memory>
@@ -25,18 +25,18 @@
 
 namespace rapid {
 
-// To be called before the first Registry is made. Error: the file can't be read or loaded, is no plugin, was built with
-// other headers, or has a node of a name that is taken.
+// Must be called before the first Registry is created. Throws Error if the file cannot be read or loaded, is not a
+// plugin, was built with other headers, or has a node whose name is taken.
 void load_plugin(const std::string& file);
 
-// path: a list separated by colons, of plugins and of folders, from which all *.so are loaded in order of name.
+// path: a colon-separated list of plugins and folders; all *.so of a folder are loaded in order of name.
 void load_plugins(const std::string& path);
 
-// The files of those that were loaded, in order.
+// Returns the files of the loaded plugins, in order.
 const std::vector<std::string>& loaded_plugins();
 
-// A constraint from a function of the points that returns its rows (solver/constraints/rows.h), called before each
-// frame.
+// Returns a constraint from a function of the points that returns its rows (solver/constraints/rows.h), called before
+// each frame.
 template <class F>
 std::shared_ptr<const Constraint> constrain(const Evaluation& now, const std::string& group, F rows_of)
 {
@@ -53,7 +53,7 @@ std::shared_ptr<const Constraint> constrain(const Evaluation& now, const std::st
     return dynamic_of<Made>(now, group, std::move(rows_of));
 }
 
-// An action from a function of a point's P (m) and v (m/s), called in every sub-step from any thread.
+// Returns an action from a function of a point's P (m) and v (m/s), called in every substep from any thread.
 template <class F>
 std::shared_ptr<const Action> act(const Evaluation& now, F edit)
 {

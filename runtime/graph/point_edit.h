@@ -1,5 +1,5 @@
-// Edits of points one by one, independently of other points. Neighbouring edits in a chain are fused into one pass over
-// the points: each chunk goes through all of them while it is in cache, with the result of one pass after the other.
+// Edits of points one by one, independently of other points. Neighbouring edits in a chain are fused into one pass:
+// each chunk goes through all of them while it is in cache. The result equals that of separate passes.
 #pragma once
 
 #include <memory>
@@ -15,40 +15,40 @@ namespace rapid {
 // A contiguous range of the points.
 struct Stretch {
     std::size_t begin, end;
-    // Shape [end - begin]: 0 for points that an edit of the pass has removed, which later edits do not see. Null where
+    // Shape [end - begin]: 0 for points removed by an earlier edit of the pass, which later edits do not see. Null if
     // no edit removes points.
     std::uint8_t* alive;
 
     std::size_t size() const { return end - begin; }
-    // 1 for points that are alive and in the group, else 0; shape [size]. members: of the whole set.
+    // Returns 1 for points that are alive and in the group, else 0; shape [size]. members: of the whole set.
     std::vector<std::uint8_t> choose(Strided<std::uint8_t> members) const;
-    // Removes the points marked by 1; shape [size].
+    // Removes the points marked with 1; shape [size].
     void remove(std::span<const std::uint8_t> marks) const;
 };
 
-// One edit of one set. The set and `now` outlive it.
+// One edit of one set. The set and `now` must outlive it.
 class EditPass {
 public:
     explicit EditPass(const Evaluation& evaluation) : now(evaluation) {}
     virtual ~EditPass() = default;
 
-    // Called when all fused edits are prepared: the columns keep their addresses from here on.
+    // Is called after all fused edits are prepared: from here on the columns keep their addresses.
     virtual void begin() = 0;
-    // Points per chunk: the whole set where a script must see the points in order.
+    // Points per chunk; the whole set if a script must see the points in order.
     virtual std::size_t chunk() const { return chunk_size; }
-    // Whether its time counts as that of scripts.
+    // Returns true if its time counts as script time.
     virtual bool is_script() const { return false; }
-    // Called once for each chunk, from any thread. Error: of the script.
+    // Is called once for each chunk, from any thread. Throws the script's Error.
     virtual void visit(const Stretch& stretch) = 0;
 
     const Evaluation& now;
 };
 
-// Applies the passes to the points, in parallel, and removes marked points. Error: of the first pass that fails, at the
-// first point at which it does, with its node.
+// Applies the passes to the points, in parallel, and removes marked points. Throws the Error of the first failing
+// pass, at its first failing point, with its node.
 void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove);
 
-// The edits before one, among those fused with it.
+// The earlier edits among those fused with an edit.
 struct Before {
     bool edits = false;     // there are some
     bool removals = false;  // some of them remove points
@@ -56,12 +56,13 @@ struct Before {
 
 class PointEdit : public Operator {
 public:
-    // Creates the columns that it writes and makes them writable. Null where there is nothing more to do. The edits
-    // before it are prepared but not applied: the columns are final, their values are not.
+    // Creates the columns that it writes and makes them writable. Returns null if there is nothing more to do. Earlier
+    // edits are prepared but not applied: the columns are final, their values are not.
     virtual std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const = 0;
 
     virtual bool removes_points() const = 0;
-    // Whether it may read indices in the set (p.index). It is not fused with an edit before it that removes points.
+    // Returns true if it may read indices in the set (p.index). It is then not fused with an earlier edit that removes
+    // points.
     virtual bool asks_places() const = 0;
 
     const PointEdit* as_point_edit() const override { return this; }
@@ -69,7 +70,8 @@ public:
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
 };
 
-// The operator of a node whose struct has prepare(), and removes_points() and asks_places() where they may be true.
+// The operator of a node whose struct has prepare(); removes_points() and asks_places() are needed only if they may be
+// true.
 template <class T>
 class PointEditOf : public PointEdit {
 public:
@@ -105,8 +107,8 @@ private:
     T fields_;
 };
 
-// Applies fused edits in their order; now: the context of each. The same bits as one edit after the other. Error: as
-// go_over().
+// Applies fused edits in order; now: the context of each. The result is bit-identical to applying one edit after the
+// other. Throws Error as go_over() does.
 void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
 
 }  // namespace rapid

@@ -9,8 +9,8 @@ class PointEditor {
 public:
     virtual ~PointEditor() = default;
 
-    // Calls it for the points from `first` on, in parallel; those that it kills are removed. Error: of the script, with
-    // the point.
+    // Calls the function for the points from `first` on, in parallel, and removes those that it kills. Throws the
+    // script's Error, with the point.
     virtual void edit(PointSet& points, std::size_t first, const Evaluation& now) const = 0;
 };
 

@@ -10,17 +10,17 @@
 
 namespace rapid {
 
-// Such a function, evaluated on the points of one set.
+// A function of a point, evaluated on the points of one set.
 class PointTest {
 public:
     virtual ~PointTest() = default;
 
-    // Called when columns keep their addresses. of_all: it will be evaluated for all points.
+    // Is called when columns keep their addresses. of_all: it will be evaluated for all points.
     virtual void begin(bool of_all) = 0;
-    // Points per chunk, see EditPass.
+    // Points per chunk; see EditPass.
     virtual std::size_t chunk() const { return chunk_size; }
-    // Clears `selected` (0 or 1, for the points from `begin` on) where the function is false. For any chunk, from any
-    // thread. Error: of the script, with the point.
+    // Clears `selected` (0 or 1, for the points from `begin` on) if the function is false. May be called for any
+    // chunk, from any thread. Throws the script's Error, with the point.
     virtual void test(std::size_t begin, std::span<std::uint8_t> selected) const = 0;
 };
 
@@ -29,12 +29,13 @@ public:
     static constexpr std::string_view param_type = "function of a point";
     std::string_view kind() const override { return "function"; }
 
-    // The attributes that it reads, by its code.
+    // Adds the attributes that its code reads.
     virtual void uses(Uses& uses) const = 0;
-    // Whether it may read a point's index in the set; a function of all points at once, whether it may read any.
+    // Returns true if it may read a point's index in the set; for a function of all points at once, if it may read any
+    // point.
     virtual bool asks_places() const = 0;
 
-    // The set and `now` outlive the result.
+    // Creates the test. The set and `now` must outlive it.
     virtual std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const = 0;
 };
 

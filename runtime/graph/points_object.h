@@ -27,7 +27,7 @@ public:
 
     const PointSet& rest() const { return rest_->points; }
     const MotionPtr& motion() const { return motion_; }
-    // With another motion after its own.
+    // Returns a copy with another motion applied after its own.
     std::shared_ptr<const AnimatedPoints> transformed(const MotionPtr& motion) const
     {
         return std::make_shared<AnimatedPoints>(rest_, product(motion, motion_));
@@ -38,7 +38,7 @@ private:
     MotionPtr motion_;
 };
 
-// P by the map; v and N turn with it, v grows with its scale.
+// Transforms P; v and N rotate with it, and v is scaled.
 std::shared_ptr<const PointsObject> transformed(const PointsObject& points, const Pose& pose);
 
 }  // namespace rapid

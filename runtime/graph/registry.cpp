@@ -10,14 +10,14 @@
 namespace rapid {
 namespace {
 
-// Those that the outermost end() of this thread has still to delete.
+// Nodes that the outermost end() of this thread has yet to delete.
 thread_local std::vector<Node*>* waiting = nullptr;
 
 void end(Node* node)
 {
     if (waiting) try {
             return waiting->push_back(node);
-        } catch (const std::bad_alloc&) {  // then within its destructor
+        } catch (const std::bad_alloc&) {  // then delete it recursively
         }
     if (waiting) return delete node;
     std::vector<Node*> nodes;
@@ -36,7 +36,7 @@ std::shared_ptr<Node> make_node(const Node& node) { return {new Node(node), end}
 
 namespace {
 
-// Filled during static initialisation, in link order; a function-local static, so that it exists before the first
+// Filled during static initialisation, in link order. A function-local static, so that it exists before the first
 // registration.
 std::vector<NodeType (*)()>& declarations()
 {

@@ -1,4 +1,4 @@
-// The node types of a session: the native ones, and those that Lua files add.
+// The node types of a session: native types, and those added by Lua files.
 #pragma once
 
 #include <deque>
@@ -12,30 +12,30 @@
 
 namespace rapid {
 
-// Nodes that may be in a chain of any length.
+// Creates nodes for chains of any length.
 
-// A node that lets go of its inputs, and of the nodes in its arguments, one after the other: the destructor of each
-// would call that of the one before it, and fill the stack.
+// Returns a node that releases its inputs, and the nodes in its arguments, iteratively. Nested destructor calls would
+// overflow the stack.
 std::shared_ptr<Node> make_node(const Node& node = {});
 
 class Registry {
 public:
-    // All native types.
+    // Contains all native types.
     Registry();
 
-    // Error: a name that is taken.
+    // Throws Error if the name is taken.
     const NodeType& add(NodeType type);
 
-    // Null where there is none.
+    // Returns null if there is no such type.
     const NodeType* find(std::string_view name) const;
-    // Error: no such type, with the nearest name.
+    // Throws Error if there is no such type, with the nearest name.
     const NodeType& at(std::string_view name) const;
 
-    // In order of name, so that link order changes nothing a user can see.
+    // Returns the types in order of name, so that the link order has no visible effect.
     std::vector<const NodeType*> types() const;
 
 private:
-    std::deque<NodeType> types_;  // a node keeps a pointer to its type
+    std::deque<NodeType> types_;  // a deque, because nodes point to their type
 };
 
 }  // namespace rapid

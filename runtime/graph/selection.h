@@ -14,17 +14,17 @@ namespace rapid {
 
 class Selection {
 public:
-    // The points of `group` (all when empty) for which `where` is true (all when null), which is evaluated only for
-    // points of the group. The set and `now` outlive it.
+    // Selects the points of `group` (all if empty) for which `where` is true (all if null). `where` is evaluated only
+    // for points of the group. The set and `now` must outlive it.
     Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
               const Before& before);
 
-    // As those of EditPass.
+    // The same as in EditPass.
     void begin();
     std::size_t chunk() const { return test_ ? test_->chunk() : chunk_size; }
     bool is_script() const { return test_ != nullptr; }
 
-    // 1 for selected points that are alive, else 0; shape [size].
+    // Returns 1 for selected points that are alive, else 0; shape [size].
     std::vector<std::uint8_t> of(const Stretch& stretch) const;
 
 private:

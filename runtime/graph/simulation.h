@@ -16,14 +16,15 @@
 
 namespace rapid {
 
-// The ids of points of one simulation in another, which has adopted them by a merge.
+// The ids of points of one simulation in another one that has adopted them by a merge.
 //
 // A point keeps its adopted id in every later frame and through every merge. Points are born in runs of consecutive
-// ids, so the table holds runs: a few words per frame, not eight bytes per point.
+// ids, so the table stores runs: a few words per frame, not eight bytes per point.
 
 class AdoptedIds {
 public:
-    // The adopted id of the point `id` of the other simulation. A new point takes `next`, the next free id here.
+    // Returns the adopted id of the point `id` of the other simulation. A new point takes `next`, the next free id
+    // here.
     std::int64_t of(std::int64_t id, std::int64_t& next)
     {
         if (last_ < runs_.size() && runs_[last_].holds(id)) return runs_[last_].of(id);
@@ -47,35 +48,35 @@ public:
 private:
     struct Run {
         std::int64_t first, size;  // in the other simulation
-        std::int64_t adopted;      // id here of the first
+        std::int64_t adopted;      // id of the first here
 
         bool holds(std::int64_t id) const { return id >= first && id < first + size; }
         std::int64_t of(std::int64_t id) const { return adopted + (id - first); }
     };
 
     std::vector<Run> runs_;  // in order of `first`
-    std::size_t last_ = 0;   // run of the last query, which mostly holds the next one too
+    std::size_t last_ = 0;   // run of the last query, which usually holds the next one too
 };
 
-// One simulation: started by a Create, fed back by its Solve, shared by all flows that come from it.
+// One simulation: started by a Create, fed back by its Solve, shared by all flows from it.
 struct Simulation {
     double fps = 24;
     std::int64_t start = 1;
     int subframes = 1;
     std::uint64_t seed = 0;
     std::int64_t next_id = 0;                         // ids count all births from 0
-    std::vector<AttributeSpec> columns;               // that exist from the first frame on, by the plan
+    std::vector<AttributeSpec> columns;               // existing from the first frame on, by the plan
     std::vector<std::string> groups;                  // likewise
     PointSet state;                                   // after the previous frame's Solve
     std::map<const Simulation*, AdoptedIds> adopted;  // ids of points of other simulations
-    std::shared_ptr<StepRecord> record;               // of the last step; null where nothing reads it
+    std::shared_ptr<StepRecord> record;               // of the last step; null if nothing reads it
     std::int64_t first_new = 0;                       // points with this id and above are born in the next step
-    std::vector<std::int64_t> condemned;              // ids of points that emitters of other chains take away
+    std::vector<std::int64_t> condemned;              // ids of points that emitters of other chains remove
     // Only kernels and stiffness are examined: emitters emit a sample, and Solve does not move points.
     bool trial = false;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
-    bool estimates_errors = true;                             // where false, Solve tells none
-    bool tells_points = false;  // Solve tells of each point, as attributes of its result (solve/point_figures.h)
+    bool estimates_errors = true;                             // if false, Solve estimates none
+    bool tells_points = false;  // Solve stores per-point figures as attributes (solve/point_figures.h)
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }

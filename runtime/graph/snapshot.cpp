@@ -14,17 +14,17 @@
 namespace rapid {
 namespace {
 
-// The state of a simulation (points/state_archive.h): its points, the ids given, and what happened in the last step.
+// Serialization of a simulation (points/state_archive.h): its points, the ids given, and the events of the last step.
 
 constexpr std::int64_t most_ids = std::int64_t{1} << 53;
 
-// Whether the points have ids of their own, of those that were given so far.
+// Returns true if the points have unique ids below next_id.
 inline bool have_ids_below(const PointSet& points, std::int64_t next_id)
 {
     const auto* column = points.find<std::int64_t>("id");
     if (!column || (column->is_uniform() && column->size() > 1)) return false;
     std::span<const std::int64_t> ids(column->read().data, column->size());
-    std::vector<std::int64_t> sorted;  // where a script or a merge has put them into another order
+    std::vector<std::int64_t> sorted;  // used if a script or a merge has reordered the points
     if (!ascend(ids)) {
         sorted.assign(ids.begin(), ids.end());
         std::sort(sorted.begin(), sorted.end());
@@ -54,7 +54,7 @@ void serialize(Archive& keep, StepRecord& step)
     }
 }
 
-// The ids of adopted points are kept by the merges that have adopted them.
+// The ids of adopted points are stored by the merges that adopted them.
 template <StateArchive Archive>
 void serialize(Archive& keep, Simulation& simulation)
 {
@@ -108,7 +108,7 @@ void Evaluator::load(const Snapshot& snapshot)
     StateReader::expect(plan_.first_frame() <= snapshot.frame && snapshot.frame <= INT32_MAX);
     evaluate_constants(snapshot);
     next_ = snapshot.frame + 1;
-    // What functions of the frame gave last: nodes and caches compare it with what they give next.
+    // Restores the last values of functions of the frame, which nodes and caches compare with the next ones.
     call_functions(snapshot.frame, 0);
 
     for (std::size_t s = 0; s < simulations_.size(); ++s) {
@@ -129,13 +129,14 @@ void Evaluator::load(const Snapshot& snapshot)
     }
 }
 
-// The results that never change are those of the first frame.
+// Results that never change are those of the first frame.
 void Evaluator::evaluate_constants(const Snapshot& snapshot)
 {
     next_ = plan_.first_frame();
     take_columns();
     std::vector<Flow> results(plan_.nodes.size());
-    std::vector<std::size_t> readers(plan_.nodes.size(), plan_.nodes.size() + 1);  // nobody takes them away
+    std::vector<std::size_t> readers(plan_.nodes.size(),
+                                     plan_.nodes.size() + 1);  // never exhausted, so results are not moved
     FrameResult frame;
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) {
         if (!plan_.nodes[i].once) continue;
@@ -148,7 +149,7 @@ void Evaluator::evaluate_constants(const Snapshot& snapshot)
     }
 }
 
-// Whether the result never changes but has ids that others have been given before.
+// Returns true if the result never changes but contains ids that other points were given before.
 bool Evaluator::adopts_once(std::size_t node) const
 {
     return kept_[node] && plan_.nodes[node].node->type->kind == NodeKind::Merge;

@@ -1,4 +1,5 @@
-// What a run is, between two frames: from it another evaluator of the same graph comes to the same bits.
+// The state of a run between two frames: another evaluator of the same graph continues from it with bit-identical
+// results.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +11,9 @@
 namespace rapid {
 
 struct Snapshot {
-    std::int64_t frame = 0;                         // the last that was computed
+    std::int64_t frame = 0;                         // the last computed frame
     std::map<std::string, SavedState> simulations;  // by the name of the Create
-    std::map<std::string, SavedState> nodes;        // of those that keep something, by name
+    std::map<std::string, SavedState> nodes;        // of stateful nodes, by name
     std::map<std::string, SavedState> constants;    // points of merges whose result never changes, by name
 
     std::size_t size() const;  // bytes

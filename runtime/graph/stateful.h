@@ -1,5 +1,5 @@
-// Operators of nodes that keep something from frame to frame. A node's struct names all that later frames depend on in
-// serialize() (points/state_archive.h), and makes its operator by stateful():
+// Operators of nodes with state between frames. A node's struct lists all state that later frames depend on in
+// serialize() (points/state_archive.h), and creates its operator with stateful():
 //
 //   static std::unique_ptr<Operator> make() { return stateful<Emit>(); }
 //
@@ -28,12 +28,12 @@ class Stateful {
 public:
     virtual ~Stateful() = default;
 
-    // Between two frames. Error of load(): it is the state of another graph.
+    // Are called between two frames. load() throws Error if the state is of another graph.
     virtual void save(StateWriter& to) const = 0;
     virtual void load(StateReader& from, const NodeSimulations& simulations) = 0;
 };
 
-// A struct with resume(const NodeSimulations&) is told of them once it is loaded.
+// Calls resume(const NodeSimulations&) of a struct that has it, after loading.
 template <class T>
 class StatefulOperatorOf final : public detail::OperatorOf<T>, public Stateful {
 public:

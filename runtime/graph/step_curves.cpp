@@ -27,7 +27,7 @@ std::shared_ptr<const StepCurves> step_curves(const ObjectPtr& object, const Fra
     if (!moving->has(is_start ? end.number : begin.number, end.number))
         return std::make_shared<StepCurves>(nullptr, std::vector<Cubic<Vec3d>>(), begin.time, 0);
 
-    // What deforms is known at whole frames alone.
+    // Deforming objects are known only at whole frames.
     FrameClock known = clock;
     if (moving->deforms()) known.subframes = 1;
     const int parts = clock.subframes / known.subframes;

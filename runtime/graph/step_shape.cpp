@@ -20,10 +20,10 @@
 namespace rapid {
 namespace {
 
-// A grid that changes with time as it goes through one step. It is made ahead, on the calling thread, when functions of
-// the frame are called (step_shape.h).
+// A time-dependent grid during one step. It is created in advance on the calling thread, when functions of the frame
+// are called (step_shape.h).
 
-// Births of two fogs, a part of them in the second: in proportion to the density between both.
+// Births in two fogs, a fraction of them in the second, in proportion to the density of both.
 class ScatterInBoth final : public Scatter {
 public:
     ScatterInBoth(ScatterPtr a, ScatterPtr b, double part_of_b) : a_(std::move(a)), b_(std::move(b)), part_(part_of_b)
@@ -45,14 +45,14 @@ private:
     double part_;
 };
 
-// The grid of a sequence in one step: values on a straight line from a to b; null is 0 everywhere.
+// The grid of a sequence in one step: values interpolated linearly from a to b; null is 0 everywhere.
 template <class G>
 class StepGrid : public G {
 public:
     using Value = typename G::Value;
     using Interval = typename GridSequence<G>::Interval;
 
-    // Of a step from `begin`, s since the start, that lasts so long.
+    // For a step from `begin`, s since the start, with this duration.
     StepGrid(Interval interval, double begin, double duration)
         : interval_(std::move(interval)), begin_(begin), duration_(duration)
     {
@@ -123,11 +123,11 @@ public:
     double total() const override { return a_ + b_; }
 
 private:
-    double a_, b_;  // what each gives to the total at the end
+    double a_, b_;  // contribution of each to the total at the end
     ScatterPtr scatter_;
 };
 
-// The part of the sequence from one whole frame to the next that a step is.
+// Returns the part of the sequence's interval between whole frames that a step covers.
 template <class G>
 typename GridSequence<G>::Interval interval_of(const GridSequence<G>& sequence, double from, double to)
 {
@@ -139,15 +139,15 @@ typename GridSequence<G>::Interval interval_of(const GridSequence<G>& sequence, 
     return interval;
 }
 
-// Whether an object is a sequence of grids.
+// Returns true if an object is a sequence of grids.
 bool is_grid_sequence(const Object& object)
 {
     return dynamic_cast<const GridSequence<VectorGrid>*>(&object) ||
            dynamic_cast<const GridSequence<DensityGrid>*>(&object);
 }
 
-// A sequence of grids in the step that ends at `frame`: a vector grid, or a fog; null for any other object. Error: of a
-// file.
+// Returns a sequence of grids in the step that ends at `frame`, as a vector grid or a fog; null for any other object.
+// Throws Error if a file cannot be read.
 ObjectPtr step_grid(const ObjectPtr& object, const FrameClock& clock, const Frame& frame)
 {
     const std::int64_t step = clock.step_at(frame);
@@ -195,7 +195,7 @@ ShapePtr sequence_in_step(const LevelSetSequence& sequence, const Step& step)
     return step.is_start() ? sequence.over(frames, start, start) : sequence.over(frames, step.from(), step.to());
 }
 
-// Where a sequence has nothing: far away.
+// A shape far away, for intervals in which a sequence has no data.
 class Nowhere final : public Shape {
 public:
     Box3d bounds() const override { return Box3d(); }

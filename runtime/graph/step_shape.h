@@ -1,5 +1,5 @@
-// A shape that moves or deforms, or the surface of a mesh, as it goes through one step: what a parameter holds that
-// takes shapes of all kinds. It is made ahead, on the calling thread, when functions of the frame are called.
+// A shape that moves or deforms during one step, or the surface of a mesh: the value of a parameter that accepts all
+// kinds of shapes. It is created in advance on the calling thread, when functions of the frame are called.
 #pragma once
 
 #include "runtime/base/frame.h"
@@ -11,11 +11,11 @@ namespace rapid {
 
 class StepShape final : public Shape {
 public:
-    // The type of a parameter that takes one ends with this.
+    // The type of a parameter that accepts one ends with this.
     static constexpr std::string_view param_type = "shape at rest or moving";
 
-    // shape: with times in seconds since the step began. begin: of the step, s since the start of the simulation.
-    // at_rest: of a mesh that moves as a rigid body, its surface, else null.
+    // shape: with times in seconds since the beginning of the step. begin: of the step, s since the start of the
+    // simulation. at_rest: the surface of a mesh that moves as a rigid body, else null.
     StepShape(ShapePtr shape, double begin, double duration, ShapePtr at_rest = nullptr)
         : shape_(std::move(shape)), at_rest_(std::move(at_rest)), begin_(begin), duration_(duration)
     {
@@ -24,7 +24,7 @@ public:
     const Shape& shape() const { return *shape_; }
     const Shape* at_rest() const { return at_rest_.get(); }
     double begin() const { return begin_; }
-    double duration() const { return duration_; }  // s; 0 at the start, where nothing moves
+    double duration() const { return duration_; }  // s; 0 at the start, at which nothing moves
 
     std::string_view kind() const override { return shape_->kind(); }
     Box3d bounds() const override { return shape_->bounds(); }
@@ -34,7 +34,7 @@ public:
     bool moves() const override { return true; }
     std::shared_ptr<const Mesh> surface() const override { return shape_->surface(); }
 
-    // At the end of the step.
+    // Returns the distance at the end of the step.
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
     {
         shape_->distance(P, phi, gradient);
@@ -55,30 +55,31 @@ private:
     double begin_, duration_;
 };
 
-// Whether an object is a shape that moves or deforms, or a mesh that does.
+// Returns true if an object is a moving or deforming shape or mesh.
 bool is_moving_shape(const Object& object);
 
-// A shape that moves, or a mesh, in the step that ends at `frame`; null for any other object. At the start, where no
-// step has been made, nothing moves. On one thread, as motions may be scripts. Error: of a motion, or of a file of a
-// sequence.
+// Returns a moving shape, or a mesh, in the step that ends at `frame`; null for any other object. At the start, before
+// any step, nothing moves. Must be called on one thread, because motions may be scripts. Throws the Error of a motion,
+// or of a file of a sequence.
 std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame);
 
-// An argument as a parameter gets it in that step: a step_shape() or step_curves() where it takes one; a step_grid() of
-// a sequence of grids; of one of level sets the shape, for others the file of the frame, or nil; else the value itself.
+// Returns an argument as a parameter gets it in that step: a step_shape() or step_curves() if the parameter accepts
+// one; a step_grid() for a sequence of grids; for a sequence of level sets, the level set in the step if the parameter
+// takes a shape, else the file of the frame, and nil if there is none; otherwise the value itself.
 Value in_step(const Param& param, const Value& value, const FrameClock& clock, const Frame& frame);
 
-// Whether that differs from step to step.
+// Returns true if that differs between steps.
 bool differs_by_step(const Param& param, const Value& value);
 
-// A parameter of a force that takes shapes of all kinds.
+// A parameter of a force that accepts all kinds of shapes.
 struct AnyShape {
     static constexpr std::string_view param_type = StepShape::param_type;
 
-    ShapePtr shape;                         // null where none is given
-    std::shared_ptr<const StepShape> step;  // the same, where it moves or is the surface of a mesh
+    ShapePtr shape;                         // null if not given
+    std::shared_ptr<const StepShape> step;  // the same shape if it moves or is the surface of a mesh
 
     explicit operator bool() const { return shape != nullptr; }
-    // Of the points of a chunk, each at its own time.
+    // Finds distances of a chunk's points, each at its own time.
     void distance(const Chunk& chunk, std::span<double> phi, std::span<Vec3d> gradient) const;
 };
 void read_value(const Param& param, const Value& value, AnyShape& field);

@@ -1,5 +1,5 @@
-// An argument of a node that asks shapes which move, such as a function of a point: it is told of each step before the
-// node is evaluated.
+// An argument of a node that queries moving shapes, such as a function of a point. It is notified of each step before
+// the node is evaluated.
 #pragma once
 
 #include "runtime/base/frame.h"
@@ -11,7 +11,8 @@ public:
     virtual ~StepShapeUser() = default;
 
     virtual bool asks_moving_shapes() const = 0;
-    // The step that ends at `frame`. On one thread. Error: of a motion, or of a file of a sequence.
+    // Begins the step that ends at `frame`. Must be called on one thread. Throws the Error of a motion, or of a file
+    // of a sequence.
     virtual void begin_step(const FrameClock& clock, const Frame& frame) const = 0;
 };
 

@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// A quiet NaN whose payload arithmetic passes on, so that it is known again where it comes out.
+// A quiet NaN whose payload survives arithmetic, so that it can be recognized in results.
 constexpr std::uint32_t poison_bits = 0x7fedbeefu;
 const float poison_float = std::bit_cast<float>(poison_bits);
 
@@ -54,7 +54,7 @@ void poison(Column<T>& column)
     column = Column<T>(column.size(), poison<T>(), column.fallback());
 }
 
-// Attributes and, with group_prefix, groups.
+// Adds attributes and, with group_prefix, groups.
 void add_names(const Uses& uses, std::set<std::string>& names)
 {
     for (const auto* list : {&uses.reads, &uses.writes, &uses.may, &uses.takes, &uses.gives})
@@ -65,7 +65,7 @@ void add_names(const Uses& uses, std::set<std::string>& names)
         for (const std::string& name : *list) names.insert(group_prefix + name);
 }
 
-// Of the points before, those that are still there, as a mask; and how many there are.
+// A mask of the original points that still exist, and their number.
 struct Survivors {
     std::vector<std::uint8_t> mask;
     std::size_t count = 0;

@@ -1,6 +1,6 @@
 // The checked mode of the evaluator: a node finds poison in every column and group that it has not declared, and must
-// leave them as they are. A declaration that is too short shows at once, and not only in a scene that leaves out what
-// the node needs. Gaffer checks the hashes of its nodes in the same way.
+// leave them unchanged. An incomplete declaration then shows immediately, not only in a scene that prunes a column
+// that the node needs. Gaffer checks the hashes of its nodes in the same way.
 #pragma once
 
 #include <map>
@@ -14,12 +14,12 @@ namespace rapid {
 
 class UndeclaredColumns {
 public:
-    // Takes away what none of `declared` names: NaN in columns of floats, an unlikely number in others. P, v, id and dt
-    // stay, and all columns stay where the node may read everything.
+    // Replaces everything that `declared` does not name: with NaN in float columns, with an unlikely number in others.
+    // P, v, id and dt stay, and all columns stay if the node may read everything.
     UndeclaredColumns(PointSet& points, std::span<const Uses> declared);
 
-    // Puts the values back, by id; newborn points keep what they were given. `points`: what the node has made of them,
-    // in the same order. Error: a column that was written, or poison that has found its way into a declared one.
+    // Restores the values by id; newborn points keep the values that they were given. `points`: the node's result, in
+    // the same order. Throws Error if a column was written, or if poison reached a declared one.
     void restore(PointSet& points) const;
 
 private:

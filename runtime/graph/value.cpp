@@ -5,7 +5,7 @@
 namespace rapid {
 namespace {
 
-// Messages are one line: longer tables end in "...".
+// Messages have one line, so longer tables end in "...".
 constexpr std::size_t entries_shown = 6;
 
 std::string describe_object(const ObjectPtr& object)

@@ -29,11 +29,11 @@ struct Table {
     std::map<std::string, Value> named;
 };
 
-// A parameter given as a function of the frame. Called on one thread, before the frame is computed.
+// A parameter given as a function of the frame. It is called on one thread, before the frame is computed.
 class FrameFunction {
 public:
     virtual ~FrameFunction() = default;
-    // Error: of the script, with its location.
+    // Throws the script's Error, with its location.
     virtual Value call(const Frame& frame) const = 0;
 };
 
@@ -52,7 +52,7 @@ struct Value : std::variant<std::monostate, bool, double, std::string, Vec3d, At
         const auto* pointer = get<std::shared_ptr<const Table>>();
         return pointer ? pointer->get() : nullptr;
     }
-    // The object, if it is a T.
+    // Returns the object if it is a T.
     template <class T>
     std::shared_ptr<const T> object() const
     {
@@ -66,7 +66,7 @@ struct Value : std::variant<std::monostate, bool, double, std::string, Vec3d, At
     }
 };
 
-// For messages: 1.4, "up", {0, 1, 0}, a mesh, a function, nil.
+// Returns a description for messages: 1.4, "up", {0, 1, 0}, a mesh, a function, nil.
 std::string describe(const Value& value);
 
 }  // namespace rapid

@@ -47,9 +47,8 @@ struct Bond {
 // The bonds of a node, over a run. New ones are searched for once per frame, at its beginning.
 class Bonds : public Rows<Bond> {
 public:
-    double strength = 0;  // N, in this frame
-    std::set<std::array<std::int64_t, 2>>
-        parted;  // broken bonds of points that are not yet apart: by id, the smaller first
+    double strength = 0;                           // N, in this frame
+    std::set<std::array<std::int64_t, 2>> parted;  // broken, not yet apart: by id, the smaller first
 
     // Input of the last search: if all points sleep, it is unchanged and finds nothing new.
     struct Searched {

@@ -26,10 +26,9 @@ namespace {
 struct AnyCurves {
     static constexpr std::string_view param_type = StepCurves::param_type;
 
-    std::vector<Vec3d> P;  // positions if at rest
-    std::shared_ptr<const CurveLines> open,
-        closed;                              // identical for curve objects, which define whether they are closed
-    std::shared_ptr<const StepCurves> step;  // if it moves
+    std::vector<Vec3d> P;                            // positions if at rest
+    std::shared_ptr<const CurveLines> open, closed;  // equal for curve objects, which say if they are closed
+    std::shared_ptr<const StepCurves> step;          // if it moves
     bool is_list = false;
 };
 

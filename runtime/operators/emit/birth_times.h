@@ -76,8 +76,7 @@ public:
     }
 
 private:
-    static constexpr std::int64_t most_births = std::int64_t{1}
-                                                << 53;  // also the limit of frames: the exact integers of a double
+    static constexpr std::int64_t most_births = std::int64_t{1} << 53;  // also the limit of frames
 
     double due_by(std::int64_t frame, double fps) const;
 

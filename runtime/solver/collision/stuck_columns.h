@@ -2,9 +2,9 @@
 // outputs.
 //
 //   stuckto      the obstacle's key; negative if the point was torn off and still touches it; 0: none
-//   stuckface    face of the surface point that it is stuck to (MaterialPoint); `sliding` if it slides along the
-//   surface stuckat      position of that surface point: in the body's frame or over the face, without the point's
-//   radius stuckP       position after the last step: a point found elsewhere was moved by a script
+//   stuckface    face of the surface point that holds it (MaterialPoint); `sliding` if it slides along the surface
+//   stuckat      position of that surface point: in the body's frame or over the face, without the point's radius
+//   stuckP       position after the last step: a point found elsewhere was moved by a script
 #pragma once
 
 #include <cstdint>

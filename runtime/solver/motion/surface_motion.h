@@ -34,8 +34,9 @@ struct SurfaceMotion {
 
     Vec3d P, v;  // at the end
 
-    // In this order, each with the distance and its gradient where the call before it said; the first ones at P0. The
-    // gradient is zero where the shape gives no direction: the spring then does not act. V: the shape's velocity there.
+    // Call in this order, each with the distance and its gradient at the position that the previous call returned;
+    // begin() with those at P0. The gradient is zero if the shape gives no direction; the spring then does not act. V:
+    // velocity of the shape at that position.
     Vec3d begin(double phi, const Vec3d& gradient, const Vec3d& V);
     Vec3d go(const Vec3d& gradient, const Vec3d& V);
     void end(double phi, const Vec3d& gradient);

@@ -8,7 +8,7 @@
 --   rotation(axis, degrees)      a quat: the rotation about an axis of any nonzero length
 --   rotation_between(from, to)   a quat: the shortest rotation of one direction into another
 --
--- The noises are those of runtime/noise.h: cells of 1 m and 1 s. All but P are optional (0 s, 1 octave, seed 0).
+-- The noises are those of runtime/math/noise.h: cells of 1 m and 1 s. All but P are optional (0 s, 1 octave, seed 0).
 -- The functions are vararg for the reason given in vec3.lua.
 local ffi = require "ffi"
 local describe = require "describe"

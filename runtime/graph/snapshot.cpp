@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t most_ids = std::int64_t{1} << 53;
 
 // Returns true if the points have unique ids below next_id.
-inline bool have_ids_below(const PointSet& points, std::int64_t next_id)
+bool have_ids_below(const PointSet& points, std::int64_t next_id)
 {
     const auto* column = points.find<std::int64_t>("id");
     if (!column || (column->is_uniform() && column->size() > 1)) return false;
@@ -33,6 +33,9 @@ inline bool have_ids_below(const PointSet& points, std::int64_t next_id)
     return ids.empty() || (ids.front() >= 0 && ids.back() < next_id && ascend(ids));
 }
 
+}  // namespace
+
+// Archives find these in the namespace of their argument.
 template <StateArchive Archive>
 void serialize(Archive& keep, LoggedHit& hit)
 {
@@ -68,8 +71,6 @@ void serialize(Archive& keep, Simulation& simulation)
             StateReader::expect(have_ids_below(*set, simulation.next_id));
     }
 }
-
-}  // namespace
 
 std::size_t Snapshot::size() const
 {

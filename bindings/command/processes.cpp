@@ -28,7 +28,7 @@ namespace {
 
 using nlohmann::json;
 
-void end_with_parent(int parent, int signal)
+void signal_at_end_of(int parent, int signal)
 {
     prctl(PR_SET_PDEATHSIG, signal);
     if (getppid() != parent) _exit(status_failed);  // it ended before the line above
@@ -151,7 +151,7 @@ int run_processes(std::size_t count, int jobs, const std::function<std::vector<s
             Capture errors;
             const pid_t child = checked_fork();
             if (child == 0) {
-                end_with_parent(parent, SIGTERM);
+                signal_at_end_of(parent, SIGTERM);
                 sigprocmask(SIG_SETMASK, &before, nullptr);
                 become(program, arguments, -1, errors.descriptor());
             }
@@ -197,7 +197,7 @@ std::string run_in_child(const std::function<void(const TellParent& tell)>& work
     return ending_of(wait_for(child));
 }
 
-void end_with_parent(int parent) { end_with_parent(parent, SIGKILL); }
+void end_with_parent(int parent) { signal_at_end_of(parent, SIGKILL); }
 
 ProgramOutput output_of(const std::vector<std::string>& words)
 {

@@ -265,7 +265,7 @@ std::string table_of(const std::vector<SweptSetting>& varied, const std::vector<
     return table_text(table) + "error: since birth, estimated; 95 % of the points are within it in every frame\n";
 }
 
-ordered_json json_of(const WedgeRow& row)
+ordered_json row_json(const WedgeRow& row)
 {
     const WedgeResult& result = row.result;
     ordered_json json = {{"settings", ordered_json::object()},
@@ -442,7 +442,7 @@ private:
         ordered_json wedge = {
             {"graph", graph_.file()}, {"varied", ordered_json::object()}, {"rows", ordered_json::array()}};
         for (const SweptSetting& setting : settings_) wedge["varied"][setting.name] = setting.values;
-        for (const WedgeRow& row : rows_) wedge["rows"].push_back(json_of(row));
+        for (const WedgeRow& row : rows_) wedge["rows"].push_back(row_json(row));
         write_whole(folder_ / "wedge.json", wedge.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
         if (!quiet_) {
             print('\n' + table_of(settings_, rows_));

@@ -18,13 +18,13 @@ namespace fs = std::filesystem;
 const std::string content = "content of ", code = "code of ";
 
 // To the bit, unlike describe().
-std::string text_of(const Value& value);
+std::string fingerprint_text(const Value& value);
 
-std::string text_of(const Table& table)
+std::string fingerprint_text(const Table& table)
 {
     std::string text;
     const auto add = [&](const std::string& key, const Value& value) {
-        text += fmt::format("{}{}{}", text.empty() ? "" : ", ", key, text_of(value));
+        text += fmt::format("{}{}{}", text.empty() ? "" : ", ", key, fingerprint_text(value));
     };
     for (const Value& value : table.list) add("", value);
     for (const auto& [key, value] : table.numbered) add(fmt::format("[{}] = ", key), value);
@@ -32,7 +32,7 @@ std::string text_of(const Table& table)
     return "{" + text + "}";
 }
 
-std::string text_of(const Value& value)
+std::string fingerprint_text(const Value& value)
 {
     constexpr std::size_t most = 100;  // bytes; what is longer is known by its hash
     std::string text = "nothing";
@@ -41,7 +41,7 @@ std::string text_of(const Value& value)
     if (const std::string* word = value.get<std::string>()) text = fmt::format("\"{}\"", *word);
     if (const Vec3d* v = value.get<Vec3d>()) text = fmt::format("{{{}, {}, {}}}", v->x(), v->y(), v->z());
     if (const auto* attribute = value.get<AttributeRef>()) text = fmt::format("rapid.attr \"{}\"", attribute->name);
-    if (const Table* table = value.table()) text = text_of(*table);
+    if (const Table* table = value.table()) text = fingerprint_text(*table);
     if (const auto* object = value.get<ObjectPtr>()) text = fmt::format("a {}", (*object)->kind());
     if (value.function()) text = "a function";
     if (text.size() <= most) return text;
@@ -56,7 +56,7 @@ std::string name_of(const fs::path& file, const fs::path& folder)
 }
 
 // "12:89ab... 20:cdef...": the line and the hash of each function.
-std::string text_of(const std::vector<Session::FunctionCode>& functions)
+std::string fingerprint_text(const std::vector<Session::FunctionCode>& functions)
 {
     std::string text;
     for (const auto& [line, hash] : functions)
@@ -71,7 +71,7 @@ void add_node(Fingerprint& fingerprint, const PlannedNode& planned, const Plan& 
     for (const std::size_t input : planned.inputs)
         inputs += fmt::format("{}{}", inputs.empty() ? " behind " : ", ", plan.nodes[input].node->name);
     fingerprint[node.name] = node.type->name + inputs;
-    for (const auto& [name, value] : node.arguments) fingerprint[node.name + "." + name] = text_of(value);
+    for (const auto& [name, value] : node.arguments) fingerprint[node.name + "." + name] = fingerprint_text(value);
 }
 
 void add_simulation(Fingerprint& fingerprint, const PlannedSimulation& simulation)
@@ -123,12 +123,12 @@ Fingerprint fingerprint_of(const Session& session, const Plan& plan, const fs::p
     }
     for (const auto& [file, functions] : session.code()) {
         const bool own = fs::path(file).string().starts_with(lua_folder().string());
-        fingerprint[code + name_of(file, own ? lua_folder() : graph.parent_path())] = text_of(functions);
+        fingerprint[code + name_of(file, own ? lua_folder() : graph.parent_path())] = fingerprint_text(functions);
     }
     for (const PlannedNode& planned : plan.nodes) add_node(fingerprint, planned, plan);
     for (const PlannedSimulation& simulation : plan.simulations) add_simulation(fingerprint, simulation);
     for (const Session::Parameter& parameter : session.parameters())
-        fingerprint[parameter.name] = text_of(parameter.value);
+        fingerprint[parameter.name] = fingerprint_text(parameter.value);
     return fingerprint;
 }
 

@@ -36,7 +36,7 @@ std::optional<int> number(std::int64_t frame)
 }
 
 // The frame whose file has this name.
-std::optional<int> frame_of(const std::string& name, const FramePattern& pattern)
+std::optional<int> frame_named(const std::string& name, const FramePattern& pattern)
 {
     constexpr const char* digits = "0123456789";
     for (std::size_t begin = 0, end; (begin = name.find_first_of(digits, begin)) != std::string::npos; begin = end) {
@@ -78,7 +78,7 @@ std::optional<std::string> WrittenNames::name_of_file(const Writer& writer, cons
     if (file.parent_path() != writer.folder) return std::nullopt;
     const std::string name = file.filename();
     if (!writer.pattern) return name == writer.name ? std::optional(name) : std::nullopt;
-    const std::optional<int> frame = frame_of(name, *writer.pattern);
+    const std::optional<int> frame = frame_named(name, *writer.pattern);
     return frame && writer.frames.contains(*frame) ? std::optional(name) : std::nullopt;
 }
 

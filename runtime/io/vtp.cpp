@@ -489,7 +489,7 @@ void write_vtp(OutputFile& file, const PointSet& points, const FrameInfo& frame)
     VtpWriter(points).write(file, frame);
 }
 
-RecordAttribute attribute_of(const std::string& name, const VtkArray& array)
+RecordAttribute attribute_of_array(const std::string& name, const VtkArray& array)
 {
     RecordAttribute attribute;
     attribute.type = array.type;
@@ -523,7 +523,7 @@ PointSet read_vtp(const std::filesystem::path& path)
     PointSet points;
     bool has_id = false;
     const auto read = [&](const std::string& name, const VtkArray& array) {
-        const RecordAttribute attribute = attribute_of(name, array);
+        const RecordAttribute attribute = attribute_of_array(name, array);
         const std::size_t stride = array.numbers * scalar_bytes(array.type);
         read_attribute(points, {array.bytes, *n, stride, array.order}, attribute);
         has_id |= attribute.name == "id" && !attribute.group && array.numbers == 1;

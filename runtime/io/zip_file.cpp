@@ -140,7 +140,7 @@ struct ZipReader::Archive {
 
 namespace {
 
-Error damaged() { return Error("not a whole zip file: its directory is missing or damaged"); }
+Error damaged_zip() { return Error("not a whole zip file: its directory is missing or damaged"); }
 
 // Returns true if the file has the complete end record, "PK\5\6", and the comment after it. Minizip does not read the
 // record's last bytes if there is a 64-bit one.
@@ -168,13 +168,13 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
     functions.zerror_file = [](void*, void*) { return 0; };
     functions.opaque = archive_.get();
     archive_->zip = ::unzOpen2_64("", &functions);
-    if (!archive_->zip || !has_whole_end(bytes)) throw damaged();
+    if (!archive_->zip || !has_whole_end(bytes)) throw damaged_zip();
 
     // The claimed sizes of all members together must be possible for this file: members do not share bytes.
     std::uint64_t held = 0;
     std::vector<char> name(longest_name + 1);
     unz_global_info64 all = {};
-    if (::unzGetGlobalInfo64(archive_->zip, &all) != UNZ_OK) throw damaged();
+    if (::unzGetGlobalInfo64(archive_->zip, &all) != UNZ_OK) throw damaged_zip();
     int result = all.number_entry == 0 ? UNZ_END_OF_LIST_OF_FILE : ::unzGoToFirstFile(archive_->zip);
     for (; result == UNZ_OK; result = ::unzGoToNextFile(archive_->zip)) {
         unz_file_info64 info = {};
@@ -182,7 +182,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
         if (::unzGetCurrentFileInfo64(archive_->zip, &info, name.data(), name.size(), nullptr, 0, nullptr, 0) !=
                 UNZ_OK ||
             ::unzGetFilePos64(archive_->zip, &place) != UNZ_OK)
-            throw damaged();
+            throw damaged_zip();
         const std::string text(name.data(), std::min<std::size_t>(info.size_filename, std::strlen(name.data())));
         if (info.flag & 1) throw Error(fmt::format("\"{}\" is encrypted", text));
         if (info.compression_method != 0 && info.compression_method != Z_DEFLATED)
@@ -194,7 +194,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
             throw Error(fmt::format("\"{}\" holds less than its directory promises; the file is damaged", text));
         members_.push_back({text, place.pos_in_zip_directory, place.num_of_file, info.uncompressed_size});
     }
-    if (result != UNZ_END_OF_LIST_OF_FILE) throw damaged();
+    if (result != UNZ_END_OF_LIST_OF_FILE) throw damaged_zip();
 }
 
 ZipReader::~ZipReader() = default;

@@ -21,7 +21,7 @@ constexpr std::uint32_t width = sizeof(Register) / sizeof(double);
 
 // Returns the low 32 bits of each lane times m. By itself g++ multiplies 64 by 64 bits, which takes three times as
 // long.
-[[gnu::always_inline]] inline Wide product(const Wide& a, std::uint32_t m)
+[[gnu::always_inline]] inline Wide wide_product(const Wide& a, std::uint32_t m)
 {
 #if defined(__AVX512F__)
     return std::bit_cast<Wide>(_mm512_mul_epu32(std::bit_cast<__m512i>(a), _mm512_set1_epi64(m)));
@@ -59,7 +59,7 @@ struct Draw {
         auto k0 = static_cast<std::uint32_t>(key.value), k1 = static_cast<std::uint32_t>(key.value >> 32);
         for (int round = 0; round < 10; ++round) {
             for (std::size_t p = 0; p < packs; ++p) {
-                const Wide a = product(c0[p], PHILOX_M4x32_0), b = product(c2[p], PHILOX_M4x32_1);
+                const Wide a = wide_product(c0[p], PHILOX_M4x32_0), b = wide_product(c2[p], PHILOX_M4x32_1);
                 c0[p] = (b >> 32) ^ c1[p] ^ k0;
                 c2[p] = (a >> 32) ^ c3[p] ^ k1;
                 c1[p] = b;

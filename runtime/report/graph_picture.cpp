@@ -71,7 +71,7 @@ GraphPicture::Node node_of(const Node& node)
     return made;
 }
 
-void add_attributes(const Plan& plan, GraphPicture& picture)
+void draw_attributes(const Plan& plan, GraphPicture& picture)
 {
     for (const PlannedSimulation& simulation : plan.simulations)
         for (const PlannedAttribute& attribute : simulation.attributes) {
@@ -182,7 +182,7 @@ GraphPicture picture_of(const Plan& plan)
         picture.nodes[i].why = node.why;
         picture.nodes[i].changes = node.changes;
     }
-    add_attributes(plan, picture);
+    draw_attributes(plan, picture);
     add_edges(plan, places, picture);
     picture.outputs = plan.outputs;
     return picture;

@@ -105,7 +105,7 @@ std::vector<float> parts_of_length(const Mesh& mesh, const CurveLines& lines)
     return parts;
 }
 
-void check(std::span<const Vec3f> points, const CurveLines& lines)
+void check_curves(std::span<const Vec3f> points, const CurveLines& lines)
 {
     for (std::size_t i = 0; i < points.size(); ++i)
         if (!points[i].allFinite()) throw Error(fmt::format("point {} of the curve is not finite", i + 1));
@@ -142,7 +142,7 @@ Curves::Curves(std::vector<Vec3f> points, const std::vector<std::size_t>& counts
                                     counts[k], counts[k] == 1 ? "point" : "points"));
     auto lines = std::make_shared<CurveLines>(counts, closed);
     auto mesh = std::make_shared<DetailedMesh>();
-    check(points, *lines);
+    check_curves(points, *lines);
     mesh->positions = std::move(points);
     for (const CurveLines::Line& line : lines->lines) mesh->triangles.push_back({line.a, line.b, line.b});
     mesh->values = std::move(values);
@@ -155,7 +155,7 @@ Curves::Curves(std::vector<Vec3f> points, const std::vector<std::size_t>& counts
 Curves::Curves(const Curves& other, std::vector<Vec3f> points) : lines_(other.lines_)
 {
     auto mesh = std::make_shared<DetailedMesh>(*detailed(other.mesh_));
-    check(points, *lines_);
+    check_curves(points, *lines_);
     mesh->positions = std::move(points);
     mesh_ = std::move(mesh);
 }

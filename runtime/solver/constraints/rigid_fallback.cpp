@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 // Returns ω for an angular momentum; its component is 0 along axes without inertia.
-Vec3d angular_velocity(const Eigen::Matrix3d& inertia, const Vec3d& momentum)
+Vec3d rotation_rate(const Eigen::Matrix3d& inertia, const Vec3d& momentum)
 {
     constexpr double least = 1e-12;  // relative to the largest
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(inertia);
@@ -92,7 +92,7 @@ void RigidFallback::move(Substep& step, std::span<const std::uint32_t> points) c
         inertia += m * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
         momentum += m * arm.cross(v_[i] - velocity);
     }
-    const Vec3d omega = angular_velocity(inertia, momentum);
+    const Vec3d omega = rotation_rate(inertia, momentum);
     for (const std::uint32_t i : points)
         place(step, i, start_[i] + displacement, velocity + omega.cross(start_[i] - middle));
 }

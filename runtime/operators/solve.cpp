@@ -1,8 +1,8 @@
-// solve: advances the points by one frame under all that is upstream, lets them age and die, and hands them to Create
-// for the next frame (paper §2.1).
+// solve: advances the points by one frame under everything upstream, lets them age and die, and feeds them back to
+// Create for the next frame (paper §2.1).
 //
-//   solve/step_observers   a step, and what finds something out about it
-//   solve/step_dynamics    what acts on its points
+//   solve/step_observers   a step, and its observers
+//   solve/step_dynamics    the dynamics of a step
 //   solve/aging            ages and deaths
 #include <fmt/format.h>
 
@@ -21,7 +21,7 @@
 namespace rapid {
 namespace {
 
-// Far above any scene's need: a run with more would not end, and gives no sign of it.
+// Far above the need of any scene: a run with more would not end and would show no sign of it.
 constexpr int most_substeps = 1 << 20, most_iterations = 10000;
 
 struct Solve {
@@ -54,7 +54,7 @@ struct Solve {
             .writes("v");
     }
 
-    // Which steps it takes depends on whether all points have one value of these: the frame in one, where they do.
+    // The choice of steps depends on whether all points share these values: the frame is then one step.
     std::string couples(const Plan& plan, const PlannedNode& node) const
     {
         const PlannedSimulation& simulation = plan.simulations[node.simulation];
@@ -73,7 +73,7 @@ struct Solve {
         return {};
     }
 
-    // The initial state, before any dynamics: of the nodes upstream only Create has run.
+    // The initial state, before any dynamics: upstream, only Create has run.
     Flow start(std::span<Flow> inputs, const Evaluation&)
     {
         Flow flow = std::move(inputs[0]);
@@ -100,7 +100,7 @@ struct Solve {
             observers_.begin(step, entered);
         }
         step.done = step.advance(flow.points, step.run, step.options);
-        if (!flow.dynamics.actions().empty()) require_in_range(step);  // they write attributes
+        if (!flow.dynamics.actions().empty()) require_in_range(step);  // because they write attributes
         {
             const PointSet moved = flow.points;
             kick(step, step.options.time);
@@ -109,8 +109,8 @@ struct Solve {
         now.figures.died += age_points(flow.points, group, now.frame.dt, [&](std::span<const std::uint8_t> stays) {
             observers_.each([&](StepObserver& observer) { observer.bury(step, stays); });
         });
-        // The state keeps how long points have been still and what holds them; the output does not have those columns.
-        // The copy shares the other columns, which are the state's alone as soon as the flow has been used.
+        // The state stores how long points have been still and what holds them; the output has no such columns. The
+        // copy shares the other columns, which belong to the state alone once the flow has been used.
         flow.points.remove("dt");
         flow.dynamics.clear();
         flow.simulation->state = flow.points;
@@ -148,7 +148,7 @@ private:
         return options;
     }
 
-    // Interactions act at the ends of the step where they do not in each sub-step. time: s since the start.
+    // Applies interactions at the ends of the step, unless they act in each substep. time: s since the start.
     static void kick(Step& step, double time)
     {
         if (!step.options.interacts) interact(step.flow.points, step.run, step.options, time);
@@ -156,7 +156,7 @@ private:
 
     ColliderShapes shapes_;
     StepObservers observers_;
-    ShapeLoads loads_;            // of the previous frame, where points are coupled
+    ShapeLoads loads_;            // of the previous frame, if points are coupled
     SleepRecords sleep_records_;  // of the previous frame
 };
 RAPID_NODE(Solve);

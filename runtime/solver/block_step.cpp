@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// Adds the values, if all of them are finite; shapes [n].
+// Adds the values if all of them are finite; shapes [n].
 bool add_finite(std::span<const Vec3d> values, std::span<Vec3d> to)
 {
     const double* x = coordinates(values);
@@ -41,7 +41,7 @@ void BlockStep::advance(Collisions& collisions, int substep)
     drift(collisions, half_, halves_after);
 }
 
-// The acceleration is constant within the sub-step: forces that vary are evaluated at its middle, half a drift on,
+// The acceleration is constant within the substep. Varying forces are evaluated at its middle, after half a drift,
 // which makes them second order.
 void BlockStep::add_forces(int substep)
 {
@@ -73,8 +73,8 @@ void BlockStep::add_forces(int substep)
     }
 }
 
-// Forces that change within the frame, where none of them differs from point to point: one sum for all, at half
-// the time. False where there is another force.
+// Adds forces that change within the frame but not between points, evaluated once at half the time. Returns false if
+// there is another kind of force.
 bool BlockStep::add_uniform_forces(int substep)
 {
     const StepScene& scene = context_.scene;
@@ -126,7 +126,7 @@ void BlockStep::add_surface_springs(const StepForce& local)
             surface_springs_.add(i, one_.surface_spring(i), block.P[i], block.dt[i], block.own_linear[i]);
 }
 
-// Gives each point a linear part of its own.
+// Gives each point an individual linear part.
 void BlockStep::own_linear()
 {
     if (block.linear.stride != 0) return;
@@ -146,7 +146,7 @@ void BlockStep::drift(Collisions& collisions, std::span<const double> dt, double
     if (!surface_springs_.empty()) surface_springs_.move(block);
 }
 
-// halves_after: half sub-steps from the end of the drift to the end of the frame.
+// halves_after: half substeps from the end of the drift to the end of the frame.
 void BlockStep::drift_among_others(Collisions& collisions, std::span<const double> dt, double halves_after)
 {
     block.damped.clear();
@@ -168,7 +168,7 @@ void BlockStep::drift_among_others(Collisions& collisions, std::span<const doubl
     }
 }
 
-// Of paths without shapes.
+// Finds the velocities at the ends of paths without shapes.
 void BlockStep::find_free_velocities(std::span<const double> dt)
 {
     free_.resize(block.size());
@@ -185,8 +185,8 @@ void BlockStep::add_reactions()
     }
 }
 
-// All actions in the order of the chain, on the points in the middle of the sub-step. The forces that they add are
-// kicks over the whole of it. Dead points move no more.
+// Applies all actions in the order of the chain, with points in the middle of the substep. The forces that they add
+// are kicks over the whole substep. Dead points do not move any more.
 void BlockStep::act(int substep)
 {
     const std::size_t size = block.size();
@@ -205,7 +205,7 @@ void BlockStep::act(int substep)
     }
 }
 
-// Points that a collider has killed stay where they are.
+// Points that a collider has killed stay in place.
 void BlockStep::stop_dead()
 {
     for (std::size_t i = 0; i < block.size(); ++i)
@@ -227,7 +227,7 @@ void BlockStep::store() const
     }
 }
 
-// The middle of each point's sub-step, s since the start.
+// Sets the middle of each point's substep, s since the start.
 void BlockStep::set_time(int substep)
 {
     time_.resize(block.size());

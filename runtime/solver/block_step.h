@@ -3,8 +3,8 @@
 //   no actions     x(t + dt) by the forces at the middle of the sub-step
 //   with actions   half a drift, all actions, half a drift: second order (numerics.md, Motion)
 //
-// Why beside the ballistic batch, which needs none: forces that differ from point to point, actions and contacts have
-// no closed form for the whole frame.
+// This exists alongside the ballistic batch, which needs no substeps, because forces that vary between points, actions
+// and contacts have no closed form for the whole frame.
 #pragma once
 
 #include <span>
@@ -16,26 +16,27 @@
 
 namespace rapid {
 
-// One object serves many blocks, one after the other, and keeps their arrays.
+// One object serves many blocks in turn and reuses their arrays.
 class BlockStep {
 public:
     explicit BlockStep(StepContext& context) : context_(context) {}
 
     PointBlock block;
 
-    // The points at these places of the set, in order; a run of neighbours where forces or actions act.
+    // Begins with the points at these indices of the set, in order; they must be contiguous if forces or actions act.
     void begin(std::span<const std::uint32_t> places, int substeps)
     {
         block.begin(places, context_.P, context_.v, context_.time, substeps);
     }
 
-    // One sub-step, from 0. The collisions have begun this block.
+    // Advances one substep, numbered from 0. The collisions must have begun this block.
     void advance(Collisions& collisions, int substep);
 
-    // That of point k in the sub-step; of w2 = 0 where there is none.
+    // Returns the spring of point k in the substep; w2 is 0 if it has none.
     SurfaceSpring surface_spring(std::size_t k) const { return surface_springs_.of(k); }
 
-    // At the end of the frame, with block.rounded. Checked before it is stored: the message tells what the point had.
+    // Are called at the end of the frame, after block.rounded is set. The check precedes storing, because the message
+    // reports the earlier state.
     void require_finite() const;
     void store() const;
 
@@ -63,9 +64,9 @@ private:
     std::vector<double> half_, after_, time_;  // s
     std::vector<Vec3d> middle_, kick_;         // m, N
     std::vector<Vec3d> free_;                  // m/s
-    std::vector<std::uint8_t> dead_before_;    // the actions, where deaths are logged
-    Forces one_;                               // of one Force
-    Uniform uniform_;                          // the sum of all, where they are uniform in the sub-step
+    std::vector<std::uint8_t> dead_before_;    // before the actions, if deaths are logged
+    Forces one_;                               // from one Force
+    Uniform uniform_;                          // the sum of all forces if they are uniform in the substep
     SurfaceSprings surface_springs_;
 };
 

@@ -1,7 +1,7 @@
-// Dynamics that change within a step: those of a node with parameters that are functions of the frame.
+// Dynamics that change within a step, from a node with parameters that are functions of the frame.
 //
-// What the node adds to the chain is as it is at the end of the step; `at` gives it at other times, for Solve to choose
-// them (operators/solve/changing_dynamics.h). Called on the thread that evaluates nodes.
+// The node adds its state at the end of the step to the chain. `at` provides it at other times, which Solve chooses
+// (operators/solve/step_dynamics.h). Called on the thread that evaluates nodes.
 #pragma once
 
 #include <functional>
@@ -17,8 +17,8 @@
 
 namespace rapid {
 
-// The dynamic at a part of the step, from 0 to 1. finer: by a better interpolation, so that the difference tells the
-// error.
+// Returns the dynamic at a part of the step, from 0 to 1. finer: uses a better interpolation, so that the difference
+// estimates the error.
 template <class D>
 using AtPart = std::function<std::shared_ptr<const D>(double part, bool finer)>;
 
@@ -51,7 +51,7 @@ public:
     const AtPart<Interaction> at_part;
 };
 
-// Runs have these two as they are at the end of the step, and shadows as they are in its middle.
+// Runs use the next two classes in their state at the end of the step, shadows in that at its middle.
 class ChangingConstraint : public Constraint {
 public:
     ChangingConstraint(std::shared_ptr<const Constraint> end, AtPart<Constraint> at_part)

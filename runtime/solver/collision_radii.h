@@ -1,5 +1,5 @@
-// The radii at which points meet shapes, m: those of the collider; else the attribute pscale; where that is 0 or
-// missing, the radius that a constraint gives the point. Points that keep each other at a distance are as large for
+// The radii at which points collide with shapes, m: those of the collider; otherwise the attribute pscale; if that is
+// 0 or missing, the radius from a constraint. Points that keep each other at a distance thus have the same size for
 // shapes.
 #pragma once
 
@@ -12,15 +12,15 @@ namespace rapid {
 
 class CollisionRadii {
 public:
-    // Error: a constraint's attribute is missing, with its node.
+    // Throws Error, with the node, if a constraint's attribute is missing.
     CollisionRadii(const Dynamics& dynamics, const PointSet& points);
 
-    // Valid while this, the collider and the points' columns stay.
+    // Valid while this object, the collider and the points' columns exist.
     Strided<float> of(const Collider& collider) const;
 
 private:
     const PointSet* points_;
-    std::vector<float> by_constraint_;  // pscale, or what constraints give; empty where these give nothing
+    std::vector<float> by_constraint_;  // pscale, or from constraints; empty if these give nothing
 };
 
 }  // namespace rapid

@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// Asked before anything is made. What constraints need besides is asked for by each.
+// Checks memory before anything is allocated. Constraints check their additional memory themselves.
 std::size_t with_room(std::size_t points)
 {
     constexpr double bytes_a_point = 200;  // of the step, and of a search for neighbours: 150 to 275 were measured
@@ -89,7 +89,7 @@ void CoupledStep::run()
     result.asleep = options.sleep_records->records.size();
 }
 
-// Whether nothing acts on the points but an acceleration that is the same for all, and they on each other.
+// Returns true if the points are subject only to a common acceleration and to each other.
 bool CoupledStep::is_isolated(const Projection& projection) const
 {
     const StepScene& scene = context_.scene;
@@ -179,7 +179,7 @@ void CoupledStep::begin_spins()
     }
 }
 
-// Kicks of half a sub-step. They wake sleepers.
+// Applies kicks of half a substep, which wake sleepers.
 void CoupledStep::interact(int kicks, double time)
 {
     std::vector<Vec3d> P(at_.size());
@@ -190,7 +190,7 @@ void CoupledStep::interact(int kicks, double time)
         if (sleep_->asleep(i) && !v_[i].isZero(0)) sleep_->wake(i);
 }
 
-// The free motion of a chunk in one sub-step.
+// Computes the free motion of a chunk in one substep.
 void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
 {
     const StepScene& scene = context_.scene;
@@ -218,7 +218,7 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         begin_block(step, places);
         if (!scene.obstacles.empty()) collisions.begin(block.places);
         step.advance(collisions, now_.index);
-        // A point that was put out of a shape gets no velocity from that towards those that it is put into, as if it
+        // A point that was moved out of a shape gets no velocity from that towards points it now overlaps, as if it
         // had been born there.
         for (const auto& [k, by] : collisions.displacements())
             if (!held_[block.places[k]]) start_[block.places[k]] += by;
@@ -252,7 +252,7 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
     }
 }
 
-// The end of the free motion of a point: where the projection begins. is_carried: a shape prescribes it.
+// Stores the end of a point's free motion, at which the projection starts. is_carried: a shape prescribes it.
 void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_carried)
 {
     const std::uint32_t i = block.places[k];
@@ -263,7 +263,7 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_car
     if (!paths_.empty()) paths_[i] = free_path(block, k);
     if (!mobility_.empty() && inverse_mass_[i] > 0) {
         mobility_[i] = mobility_of(block, k);
-        // What a shape that moves has done by a spring is nothing that drag has taken.
+        // A moving shape's work through a spring is not energy that drag has taken.
         const bool is_driven = surface_springs_[i].w2 > 0 && surface_springs_[i].shape->moves();
         const Vec3d &P = is_driven ? block.P[k] : start_[i], &v = is_driven ? block.v[k] : v_[i];
         energy_[i] = 0.5 * v.squaredNorm() / inverse_mass_[i] + potential_energy(now_, i, P);
@@ -273,7 +273,7 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_car
         at.w = 0;
         return;
     }
-    if (!(at.w > 0)) {  // moved by its own velocity alone
+    if (!(at.w > 0)) {  // moved only by its own velocity
         if (context_.advances(i)) at.P += block.dt[k] * v_[i];
         return;
     }
@@ -288,7 +288,7 @@ void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_car
         displacement_[i] =
             block.linear.data ? Vec3d(at.P - start_[i]) : Vec3d(block.dt[k] * (v_[i] - 0.5 * block.dt[k] * block.a[k]));
     if (!block.linear.data) return;
-    // Of a spring that swings through in the sub-step v_of_G is of any sign.
+    // v_of_G may have any sign for a spring that swings through in the substep.
     at.w *= std::max(mobility_[i].v, mobility_[i].x / now_.dt) / now_.dt;
 }
 
@@ -299,14 +299,15 @@ Mobility CoupledStep::mobility_of(const PointBlock& block, std::size_t k) const
     return {by.v_of_G, by.x_of_G, block.a[k] + block.linear[k].w2q, block.linear[k].w2};
 }
 
-// What drag takes in the free motion, beside what the acceleration of its own, springs and contacts do (J/kg).
+// Adds the energy that drag takes in the free motion: the remainder after the own acceleration, springs and contacts
+// (J/kg).
 void CoupledStep::add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const
 {
     const std::uint32_t i = block.places[k];
     const Linear& linear = block.linear[k];
     const SurfaceSpring& surface = surface_springs_[i];
     if (!(inverse_mass_[i] > 0) || !(block.dt[k] > 0) || (linear.k == 0 && linear.c == 0)) return;
-    if (surface.w2 > 0 && surface.shape->moves()) return;  // what the shape does is not known apart
+    if (surface.w2 > 0 && surface.shape->moves()) return;  // the work of the shape is not known separately
     const Vec3d &from = start_[i], &to = block.P[k], way = to - from;
     const double kinetic = 0.5 * (block.v[k] - v_[i]).dot(block.v[k] + v_[i]);
     double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
@@ -316,7 +317,7 @@ void CoupledStep::add_drag(const PointBlock& block, std::size_t k, double contac
 
 EnergyChanges CoupledStep::changes(const Projection& projection)
 {
-    // In the order of the points: a sum of doubles depends on it.
+    // In the order of the points, because a sum of doubles depends on it.
     std::stable_sort(free_changes_.begin(), free_changes_.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
     EnergyChanges all = projection.changes();
@@ -327,7 +328,7 @@ EnergyChanges CoupledStep::changes(const Projection& projection)
     return all;
 }
 
-// Whether a sleeper under uniform forces stays asleep, and out of the blocks.
+// Returns true if a sleeper under uniform forces stays asleep and can be skipped in the blocks.
 bool CoupledStep::leaves_out(std::size_t i)
 {
     sleep_->check_acceleration(i, context_.scene.uniform.a);
@@ -337,8 +338,8 @@ bool CoupledStep::leaves_out(std::size_t i)
     return true;
 }
 
-// What a point accelerates by towards the end of its free motion. A shape that bears it, by no more than what forces
-// give it, has done so throughout; what changes a velocity by more was a contact.
+// Returns a point's acceleration towards the end of its free motion. A shape that supports it, with at most the
+// acceleration of forces, is assumed to have done so throughout; a larger velocity change was a contact.
 FreePath CoupledStep::free_path(const PointBlock& block, std::size_t k) const
 {
     const std::uint32_t i = block.places[k];
@@ -351,7 +352,7 @@ FreePath CoupledStep::free_path(const PointBlock& block, std::size_t k) const
     return {a + reaction, reaction};
 }
 
-// What acts on a point in a sub-step, m/s²; on a sleeper also the motion and velocity that actions give it.
+// Returns the acceleration of a point in a substep, m/s²; for a sleeper, it includes motion and velocity from actions.
 Vec3d CoupledStep::acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const
 {
     const Vec3d& from = start_[block.places[k]];
@@ -365,13 +366,13 @@ Vec3d CoupledStep::acceleration_of(const PointBlock& block, std::size_t k, bool 
     return a;
 }
 
-// Rounds to single precision. A drift of no duration finds the surface on which a point lies, to round it to the outer
-// side of that.
+// Rounds to single precision. A drift of zero duration finds the surface that a point lies on, so that it can be
+// rounded to its outer side.
 void CoupledStep::store(std::size_t begin, std::size_t end)
 {
     const bool collides = !context_.scene.obstacles.empty();
     CollisionContext context = context_.collision_context();
-    context.log = nullptr;  // what is found here are no contacts of the step
+    context.log = nullptr;  // contacts found here do not belong to the step
     Collisions collisions(context_.scene.obstacles, context);
     BlockStep step(context_);
     PointBlock& block = step.block;
@@ -390,7 +391,7 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
             block.dt.assign(size, 0);
             collisions.begin(block.places);
             collisions.advance(block.P, block.v, {{&context_.scene.uniform.a, 0}, block.dt, block.dt, {}});
-            std::vector<std::size_t> displaced;  // out of shapes, or back to where they stick
+            std::vector<std::size_t> displaced;  // out of shapes, or back to the position at which they stick
             for (std::size_t i = 0; i < size; ++i)
                 if (block.P[i] != at_[first + i].P) displaced.push_back(i);
             deepest = std::max(deepest, collisions.round(block.P, block.rounded));
@@ -399,7 +400,7 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
                 const std::scoped_lock lock(mutex_);
                 if (!holds_still(first + i)) displaced_[first + i] = block.P[i];
             }
-            // Contacts found here do not count: the constraints have treated them.
+            // Contacts found here do not count, because the constraints have treated them.
             for (std::size_t i = 0; i < size; ++i) {
                 block.v[i] = v_[first + i];
                 if (holds_still(first + i)) block.rounded[i] = at_[first + i].P.cast<float>();
@@ -413,8 +414,8 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
     context_.count_penetration(deepest);
 }
 
-// What it takes to put points out of shapes that constraints have pushed them into, and back to where they stick,
-// against forces and rows.
+// Adds the work against forces and rows of moving points out of shapes that constraints pushed them into, and back to
+// the positions at which they stick.
 void CoupledStep::add_displacements(const Projection& projection)
 {
     std::vector<Vec3d> P(at_.size());
@@ -436,7 +437,7 @@ void CoupledStep::add_displacements(const Projection& projection)
     result.ledger->by_motion += by_acceleration - by_forces;
 }
 
-// Whether a constraint prescribes its position, or it has slept: no shape moves it from there.
+// Returns true if a constraint prescribes the position or the point has slept, so that no shape may move it.
 bool CoupledStep::holds_still(std::size_t i) const { return !(at_[i].w > 0) && inverse_mass_[i] > 0 && !carried_[i]; }
 
 double CoupledStep::inverse_mass(std::size_t i) const

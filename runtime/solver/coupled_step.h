@@ -1,4 +1,4 @@
-// A step of points that constraints couple: the sub-step is the barrier. In each, all points move freely, block by
+// A step of points that constraints couple. The substep is the barrier: in each, all points move freely, block by
 // block; then the constraints are projected (constraints/constraint.h).
 #pragma once
 
@@ -52,31 +52,31 @@ private:
     std::vector<ProjectedPoint> at_;
     std::vector<Vec3d> v_, start_;
     std::vector<double> inverse_mass_;  // 1/kg
-    std::vector<Mobility> mobility_;    // empty where no force has a linear part
+    std::vector<Mobility> mobility_;    // empty if no force has a linear part
     std::vector<SurfaceSpring> surface_springs_;
-    // By point: whether a constraint prescribes its motion in the frame; whether that is so or it is asleep, and its
-    // free motion is not taken.
+    // By point. prescribed_: a constraint prescribes its motion in the frame. held_: it is prescribed or asleep, and
+    // has no free motion.
     std::vector<std::uint8_t> prescribed_, held_;
-    std::vector<std::uint8_t> carried_;  // by point: by a shape, in the sub-step
+    std::vector<std::uint8_t> carried_;  // by point: carried by a shape in the substep
     std::vector<Vec3d> carried_v_;       // Substep::carried_v
     std::vector<Vec3d> born_;            // Substep::born
     std::vector<double> energy_;         // Substep::energy
-    std::vector<Vec3d> displacement_;    // Substep::displacement; empty where no constraint needs it
-    std::vector<FreePath> paths_;        // empty where nothing bounces
+    std::vector<Vec3d> displacement_;    // Substep::displacement; empty if no constraint needs it
+    std::vector<FreePath> paths_;        // empty if nothing bounces
 
     std::vector<Vec3d> reaction_;  // Substep::reaction
 
     Substep now_;
-    std::optional<ContactForces> forces_;  // where they are recorded
-    std::optional<SpinState> spin_;        // where points turn
-    // The obstacles as the free motion of points that turn meets them: without friction, which turns them.
+    std::optional<ContactForces> forces_;  // set if they are recorded
+    std::optional<SpinState> spin_;        // set if points turn
+    // Obstacles without friction, for the free motion of turning points; their friction also turns them.
     std::vector<Obstacle> smooth_;
     std::vector<std::vector<float>> smooth_friction_;
-    std::optional<Sleep> sleep_;   // where points may sleep
-    bool skips_sleepers_ = false;  // only uniform forces act: sleeping points are left out of the blocks
+    std::optional<Sleep> sleep_;   // set if points may sleep
+    bool skips_sleepers_ = false;  // only uniform forces act, so sleeping points are skipped in the blocks
     std::mutex mutex_;
-    std::map<std::size_t, Vec3d> displaced_;  // where store() has put points that were inside of shapes
-    std::vector<std::pair<std::size_t, EnergyChanges>> free_changes_;  // in free motion, by a point of the chunk
+    std::map<std::size_t, Vec3d> displaced_;  // displacements by store() of points that were inside shapes
+    std::vector<std::pair<std::size_t, EnergyChanges>> free_changes_;  // in free motion, keyed by a point of the chunk
 };
 
 }  // namespace rapid

@@ -28,11 +28,11 @@ public:
 
     std::string node;                    // for messages
     Location location;                   // of the node, in the graph file
-    std::string group;                   // acts on the points of this group only; on all when empty
+    std::string group;                   // acts only on the points of this group; on all if empty
     std::vector<AttributeRange> ranges;  // of the attributes that it reads
 };
 
-// Calls f; an Error that it throws gets the node of this dynamic.
+// Calls f, and adds the node of this dynamic to an Error that it throws.
 template <class F>
 void at_node(const Dynamic& dynamic, const F& f)
 {
@@ -49,11 +49,11 @@ class Force : public Dynamic {
 public:
     virtual void contribute(const Chunk& chunk, Forces& forces) const = 0;
 
-    // The whole of it, where it is uniform: then contribute() is not called.
+    // Returns the whole force if it is uniform; contribute() is then not called.
     virtual std::optional<Uniform> uniform() const { return std::nullopt; }
 
-    // Adds the potential energy of the chunk's points, J/kg, up to a constant per point; shape [size]. False where the
-    // force has no potential, such as drag.
+    // Adds the potential energy of the chunk's points, J/kg, up to a constant per point; shape [size]. Returns false
+    // if the force has no potential, e.g. drag.
     virtual bool add_potential(const Chunk& chunk, std::span<double> energy) const
     {
         const std::optional<Uniform> force = uniform();
@@ -65,31 +65,31 @@ public:
     }
 };
 
-// The work of an action in one step.
+// The evaluation of an action in one step.
 class ActionPass {
 public:
     virtual ~ActionPass() = default;
 
-    // Called once per sub-step for each chunk, from any thread, with the points at their positions in the middle of the
-    // sub-step. May change P and v, add to `force` (N, initially 0), write columns at chunk.first + i, and set `dead`
-    // to 1 for points that are to die there. All of shape [size].
+    // Is called once per substep for each chunk, from any thread, with the points at their positions in the middle of
+    // the substep. May change P and v, add to `force` (N, initially 0), write columns at chunk.first + i, and set
+    // `dead` to 1 to kill points. All have shape [size].
     virtual void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) = 0;
 };
 
 // An action operator (paper §2.3): changes points at every sub-step, inside Solve, while they are in cache.
 class Action : public Dynamic {
 public:
-    // Before a step, on one thread: makes the columns that act() writes writable.
+    // Is called before a step, on one thread. Makes the columns that act() writes writable.
     virtual void prepare(PointSet&) const {}
-    // After all actions of the step are prepared: columns no longer move in memory. Applies `group` as it is now. Null
-    // where there is nothing to do.
+    // Is called after all actions of the step are prepared: columns no longer move in memory. Applies the current
+    // `group`. Returns null if there is nothing to do.
     virtual std::unique_ptr<ActionPass> begin(PointSet& points) const = 0;
 };
 
-// When a contact is found (numerics.md, Collision), and how the point responds.
+// The time at which contacts are found (numerics.md, Collision), and the response of the point.
 enum class Method {
     Continuous,  // on its path, at the time of impact
-    Backtrack,   // at the end of the step, taken back along its velocity (paper §4.2)
+    Backtrack,   // at the end of the step, moved back along its velocity (paper §4.2)
     Project,     // at the end of the step, moved out along the gradient (paper §4.1)
 };
 enum class Response { Bounce, Slide, Stick, Die };
@@ -98,21 +98,21 @@ class DeformingLevelSet;
 
 class Collider : public Dynamic {
 public:
-    // The shape at rest; for each frame Solve replaces it by the shape in motion.
+    // The shape at rest; Solve replaces it in each frame with the moving shape.
     ShapePtr shape;
-    std::shared_ptr<const DeformingLevelSet> deforming;  // in place of a shape
-    MotionPtr motion;                                    // null where it does not move as a whole
-    std::optional<std::set<std::int64_t>> cuts;          // frames to which it jumps; detected where not given
+    std::shared_ptr<const DeformingLevelSet> deforming;  // replaces shape
+    MotionPtr motion;                                    // null if it does not move as a whole
+    std::optional<std::set<std::int64_t>> cuts;          // frames to which it jumps; detected if not given
     Method method = Method::Continuous;
     Response response = Response::Bounce;
     std::optional<double> record;    // m/s: contacts at least as fast are written to the hit attributes
     PerPoint<float> bounce{0.5f};    // restitution ε in [0, 1]
     PerPoint<float> friction{0.0f};  // Coulomb μ >= 0
-    // Of what sticks or slides: m/s², what it takes to tear a point off, without end for what sticks where it is not
-    // given; 1/s, at which the surface slows what slides on it.
+    // For points that stick or slide. adhesion: m/s², the acceleration that tears a point off; default: unlimited for
+    // points that stick. viscosity: 1/s, the rate at which the surface slows sliding points.
     std::optional<PerPoint<float>> adhesion;
     PerPoint<float> viscosity{0.0f};
-    // Of the points; collision_radii.h where it is not given.
+    // Radius of the points; see collision_radii.h if not given.
     std::optional<PerPoint<float>> radius;
 };
 
@@ -136,7 +136,7 @@ public:
     {
         add(interactions_, std::move(interaction), Type::Interaction);
     }
-    // Adds those of another chain that are not in this one: the two may share a part.
+    // Adds the dynamics of another chain that are missing here: the two may share a part.
     void merge(const Dynamics& other)
     {
         other.visit_in_order([&](const auto& dynamic) {
@@ -155,7 +155,7 @@ public:
     std::size_t size() const { return order_.size(); }
     bool empty() const { return order_.empty(); }
 
-    // Calls `visit` with the pointer to each, in the order of the chain across all types: for errors and reports, of
+    // Calls `visit` with the pointer to each, in the order of the chain across all types, for errors and reports in
     // which the first one counts.
     template <class Visitor>
     void visit_in_order(const Visitor& visit) const

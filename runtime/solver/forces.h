@@ -1,4 +1,4 @@
-// The forces on a chunk of points in one sub-step: accelerations, and the parts that are linear in velocity and
+// The forces on a chunk of points in one substep: accelerations, and the parts that are linear in velocity and
 // position, which the integrator solves exactly (motion/damped_motion.h).
 #pragma once
 
@@ -22,14 +22,14 @@ class Shape;
 struct Chunk {
     const PointSet& points;  // columns, at offset `first`
     std::size_t first;
-    std::span<Vec3d> P, v;         // now: m, m/s
-    std::span<const double> dt;    // s, this sub-step of each point: a newborn's is shorter
-    std::span<const double> time;  // s since the start, at the middle of each point's sub-step
+    std::span<Vec3d> P, v;         // current: m, m/s
+    std::span<const double> dt;    // s, this substep of each point; shorter for a newborn
+    std::span<const double> time;  // s since the start, at the middle of each point's substep
     int substep;                   // from 0
 
     std::size_t size() const { return P.size(); }
 
-    // The values of a parameter for the points of this chunk.
+    // Returns the values of a parameter for the points of this chunk.
     template <class T>
     Strided<T> read(const PerPoint<T>& parameter) const
     {
@@ -62,7 +62,7 @@ struct Linear {
 struct SurfaceSpring {
     double w2 = 0;                 // 1/s²; 0: none
     const Shape* shape = nullptr;  // outlives the step
-    double time = 0;               // of the shape, s (Shape::distance_at): when the point sets out
+    double time = 0;               // time of the shape, s (Shape::distance_at), at which the point starts
     bool two_sided = false;        // the distance is above 0 on both sides of the surface
 };
 
@@ -72,7 +72,7 @@ struct Uniform {
     Linear linear = {};
 };
 
-// The sum of the forces on one chunk in one sub-step. Per-point arrays, shape [size], are allocated when the first
+// The sum of the forces on one chunk in one substep. Per-point arrays, shape [size], are allocated when the first
 // force needs them.
 class Forces {
 public:
@@ -85,16 +85,16 @@ public:
         surface_springs_.clear();
     }
 
-    // Towards the velocity u (m/s) at a rate k (1/s).
+    // Adds a drag towards the velocity u (m/s) at a rate k (1/s).
     void add_drag(std::size_t i, double k, const Vec3d& u)
     {
         Linear& linear = linear_at(i);
         linear.k += k;
         linear.ku += k * u;
     }
-    // -c |v| v
+    // Adds -c |v| v.
     void add_quadratic_drag(std::size_t i, double c) { linear_at(i).c += c; }
-    // Towards the position q (m), w2 (1/s²) per metre.
+    // Adds a spring to the position q (m), w2 (1/s²) per metre.
     void add_spring(std::size_t i, double w2, const Vec3d& q)
     {
         Linear& linear = linear_at(i);
@@ -112,7 +112,7 @@ public:
     bool has_surface_springs() const { return !surface_springs_.empty(); }
     const SurfaceSpring& surface_spring(std::size_t i) const { return surface_springs_[i]; }
 
-    // Accelerations, m/s².
+    // Add accelerations, m/s².
     void add_uniform(const Vec3d& a) { uniform_ += a; }
     void add(const Uniform& force)
     {
@@ -122,7 +122,7 @@ public:
         for (Linear& linear : linear_) linear.add(force.linear);
     }
     void add(std::size_t i, const Vec3d& a) { accelerations()[i] += a; }
-    // The accelerations of all points, to add to.
+    // Returns the accelerations of all points, to add to.
     std::span<Vec3d> accelerations()
     {
         if (per_point_.empty()) per_point_.resize(size_, Vec3d::Zero());

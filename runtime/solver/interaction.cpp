@@ -17,16 +17,16 @@
 namespace rapid {
 namespace {
 
-// Looks of one point at another in a frame, 20 ns each: five hours of one processor.
+// Limit of pairwise evaluations in a frame, 20 ns each: five hours of one processor.
 constexpr double most_looks = 1e12;
 
-// (1 - e^(-2 k t)) / 2: the part of the velocity difference of two points that each gets in the time t, where it decays
-// at the rate k on both sides. At most a half, which makes them equal.
+// Returns (1 - e^(-2 k t)) / 2: the part of the velocity difference of two points that each gets in the time t if it
+// decays at the rate k on both sides. At most a half, which makes them equal.
 double exchanged(double k, double t) { return -0.5 * std::expm1(-2 * k * t); }
 
 class Neighbourhood {
 public:
-    // kicks: how many will be asked for.
+    // kicks: number of later calls to kicks().
     Neighbourhood(const Interaction& interaction, const PointSet& points, const SolveOptions& options,
                   const InteractingPoints& at, int kicks)
         : interaction_(interaction),
@@ -55,7 +55,7 @@ public:
         members_.reserve(count);
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!takes_part(i)) continue;
-            if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solve reports it, with the point's name
+            if (!P_[i].allFinite() || !v_[i].allFinite()) {  // the solver reports it, with the point's name
                 members_.clear();
                 return;
             }
@@ -74,7 +74,7 @@ public:
         for_all([&](std::size_t m, std::size_t other) { weights_[m] += weight_at(distance(m, other)); });
     }
 
-    // The change of velocity of each member, m/s.
+    // Returns the velocity change of each member, m/s.
     std::vector<Vec3d> kicks() const
     {
         std::vector<Vec3d> kicks(members_.size(), Vec3d::Zero());
@@ -86,17 +86,17 @@ public:
     std::span<const std::uint32_t> members() const { return members_; }
 
 private:
-    // Of points each in a cell of its own.
+    // Checks memory for points each in a separate cell.
     static void require_memory(std::size_t points)
     {
-        constexpr double bytes_a_point = 160;  // measured: places, cells, weights, headings, kicks
+        constexpr double bytes_a_point = 160;  // measured: positions, cells, weights, headings, kicks
         const double bytes = bytes_a_point * static_cast<double>(points);
         if (!fits_in_memory(bytes))
             throw beyond_memory(fmt::format("the neighbourhoods of {} points", points), bytes, "let it act on fewer");
     }
 
-    // What a radius that holds all points costs grows with the square of their number, and ends in no lifetime.
-    // Estimated from the neighbours of a few members, where it could be too much at all.
+    // The cost of a radius that contains all points grows with the square of their number, and may be endless. If it
+    // could be too large, it is estimated from the neighbours of a few members.
     void require_affordable(double steps, int kicks) const
     {
         constexpr std::size_t sampled = 32;
@@ -117,7 +117,7 @@ private:
                 interaction_.radius, neighbours, members_.size(), n * neighbours * passes, steps, most_looks));
     }
 
-    // Calls f for each member with each of its neighbours, in order of their places in the set.
+    // Calls f for each member with each of its neighbours, in order of their indices in the set.
     template <class F>
     void for_all(const F& f) const
     {
@@ -128,7 +128,7 @@ private:
         });
     }
 
-    // Leaves those that a member heeds, in their order.
+    // Keeps the neighbours that a member heeds, in order.
     void select(std::size_t m, std::vector<std::uint32_t>& near) const
     {
         std::erase_if(near, [&](std::uint32_t other) { return other == m || !sees(m, other); });
@@ -142,7 +142,7 @@ private:
         near.resize(most);
         std::sort(near.begin(), near.end());
     }
-    // As it goes at the beginning, through all kicks.
+    // Uses the initial direction of motion throughout all kicks.
     bool sees(std::size_t m, std::size_t other) const
     {
         if (headings_.empty()) return true;
@@ -159,7 +159,7 @@ private:
         return own_dt_[i] / steps_;
     }
 
-    // Symmetric in the two but for the sign, to the bit.
+    // Bitwise symmetric in the two points, except for the sign.
     Vec3d kick(std::size_t m, std::size_t other) const
     {
         const std::size_t i = members_[m], j = members_[other];
@@ -169,9 +169,9 @@ private:
         const double length = d.norm(), w = weight_at(length);
         const Vec3d n = length > 0 ? Vec3d(d / length) : direction(id_[i], id_[j]);
 
-        // An acceleration of at most this slope moves the two towards its zero, in a step, and never past it: one
-        // Newton step of the implicit solution. The 4: the weights of a neighbourhood average to a quarter of its
-        // number, by which the slopes are not shared.
+        // Limits an acceleration with at most this slope so that it moves the two points towards its zero in a step,
+        // and never past it: one Newton step of the implicit solution. The 4: the weights of a neighbourhood average
+        // to a quarter of its number, by which the slopes are not divided.
         const auto held = [&](double a, double slope) { return a / (1 + 4 * slope * t * step); };
         const double push = held(mean(separation_) * w, mean(separation_) / interaction_.radius);
         const double draw = held(mean(cohesion_) * 4 * w * (1 - w), 4 * mean(cohesion_) / interaction_.radius);
@@ -188,7 +188,8 @@ private:
         return part * share * change;
     }
 
-    // Away from where the other will be at the nearest approach; from one that it would meet, to any side.
+    // Returns the acceleration away from the other's position at the nearest approach; on a collision course, to an
+    // arbitrary side.
     Vec3d aside(const Vec3d& d, const Vec3d& u, std::int64_t i, std::int64_t j) const
     {
         const double closing = -d.dot(u);
@@ -205,7 +206,7 @@ private:
         return -urgency * e.stableNormalized();
     }
 
-    // Of coincident points: any direction, and the opposite one for the other point.
+    // Coincident points get an arbitrary direction, opposite for the two points of the pair.
     static Vec3d direction(std::int64_t a, std::int64_t b)
     {
         const auto u = uniform4(RandomKey(0, "interact"), static_cast<std::uint64_t>(std::min(a, b)),
@@ -222,11 +223,11 @@ private:
     Strided<float> separation_, cohesion_, alignment_, drag_, avoidance_;
     bool avoids_;
     Strided<float> mass_{&unit_mass, 0}, own_dt_{nullptr, 0};
-    std::vector<std::uint32_t> members_;  // their places in the set
+    std::vector<std::uint32_t> members_;  // indices in the set
     std::optional<Neighbours> grid_;      // of the members
-    std::vector<double> weights_;         // Σ w, of each member
+    std::vector<double> weights_;         // Σ w, by member
     double cos_view_ = std::cos(0.5 * interaction_.view);
-    std::vector<Vec3d> headings_;  // velocities at first; empty where all see all around
+    std::vector<Vec3d> headings_;  // initial velocities; empty if all see in every direction
 };
 
 }  // namespace

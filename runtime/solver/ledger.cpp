@@ -43,8 +43,8 @@ LedgerState LedgerState::of(const Substep& step, double elastic)
 {
     LedgerState state;
     state.elastic = elastic;
-    // m/s a metre: what rounding of places makes of velocities in some tens of sub-steps. Of speeds that it is more
-    // than the largest residue of, there is none to be told.
+    // m/s per metre: the effect of rounded positions on velocities in some tens of substeps. If it exceeds the largest
+    // residue of the speeds, no residue can be reported.
     const double rounding = step.dt > 0 ? 8 * std::numeric_limits<double>::epsilon() / step.dt : 0;
     const auto each = [&](const auto& f) {
         for (std::size_t i = 0; i < step.size(); ++i)
@@ -84,7 +84,7 @@ Ledger ledger_of(const LedgerState& before, const LedgerState& after, const Ener
     const Vec3d pull = before.mass * h * a, torque = (h * before.center + 0.5 * h * h * before.momentum).cross(a);
     const double energy = std::max(before.kinetic, after.kinetic) + std::max(before.elastic, after.elastic) +
                           std::abs(after.potential - before.potential);
-    // Rows that break take what they have stored with them.
+    // Breaking rows remove their stored energy.
     ledger.residue = {part(std::max(0.0, ledger.by_motion), energy),
                       part((after.momentum - before.momentum - pull).norm(), speed),
                       part((after.angular_momentum - before.angular_momentum - torque).norm(),

@@ -50,7 +50,7 @@ void PointBlock::drift_damped(std::span<const double> t)
     }
 }
 
-// The same without springs: the exponentials of all points at once, but for those with quadratic drag.
+// The same without springs: computes the exponentials of all points at once, except for those with quadratic drag.
 void PointBlock::drift_dragged(std::span<const double> t)
 {
     const std::size_t n = P.size();

@@ -1,4 +1,4 @@
-// Errors about single points: which point, in which frame, what is wrong with it, and what it had.
+// Errors about single points: the point, the frame, the problem, and the point's earlier state.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ public:
 
     const Column<std::int64_t>& ids() const { return points_.id(); }
 
-    // When a value was found, as the message puts it.
+    // The occasion on which a value was found, as worded in the message.
     struct Occasion {
         const char *verb, *when, *had;
     };
@@ -27,24 +27,25 @@ public:
     // The point has been overwritten by the result.
     static constexpr Occasion in_step_overwritten{"became", "in the step; the frame was not written", "it has"};
 
-    // Error: P or v of one of the points from `begin` on is not finite; shapes [n].
+    // Throws Error if P or v of one of the points from `begin` on is not finite; shapes [n].
     void require_finite(std::size_t begin, std::span<const Vec3f> P, std::span<const Vec3f> v,
                         const Occasion& occasion) const;
-    // The same of a point whose state would be P and v.
+    // Does the same for a point whose state would be P and v.
     void require_finite(std::size_t i, const Vec3f& P, const Vec3f& v, const Occasion& occasion) const
     {
         if (!P.allFinite() || !v.allFinite()) not_finite(i, P, v, occasion);
     }
 
     [[noreturn]] void bad_acceleration(std::size_t i, const Vec3d& a) const;
-    // The acceleration by a force (N). Error: the mass (kg) is not above 0, or the force not finite.
+    // Returns the acceleration by a force (N). Throws Error if the mass (kg) is not above 0, or the force is not
+    // finite.
     Vec3d acceleration(std::size_t i, const Vec3d& force, float mass) const
     {
         if (force.isZero(0)) return force;
         if (!(mass > 0) || !force.allFinite()) bad_force(i, force, mass);
         return force / mass;
     }
-    // 1/kg. Error: the mass is not above 0.
+    // Returns the inverse mass, 1/kg. Throws Error if the mass is not above 0.
     double inverse_mass(std::size_t i, float mass) const;
 
 private:

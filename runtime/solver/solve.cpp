@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// The values from begin to end: of a column that is the same everywhere, the one.
+// Returns the values from begin to end, or the single value of a uniform column.
 std::span<const Vec3f> values(const Strided<Vec3f>& column, std::size_t begin, std::size_t end)
 {
     return {&column[begin], column.stride == 0 ? 1 : end - begin};
@@ -28,7 +28,7 @@ void require_finite(const PointSet& points, const SolveOptions& options)
     });
 }
 
-// Whether all points are at rest, as one velocity for all tells without a look at each, and nothing acts on them.
+// Returns true if nothing acts on the points and they are at rest, which a uniform velocity shows without a scan.
 bool nothing_moves(const PointSet& points, const Dynamics& dynamics)
 {
     const Strided<Vec3f> v = points.v().read();
@@ -38,7 +38,7 @@ bool nothing_moves(const PointSet& points, const Dynamics& dynamics)
 SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement* refinement)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
-    // Of points that look at one another, before the first that does: their constraints, when these begin.
+    // Interacting points are checked before their constraints or interactions begin.
     if (!dynamics.constraints().empty() || options.interacts) require_finite(points, options);
     StepContext context(points, dynamics, options);
     if (context.scene.constraints.empty() && !options.interacts)

@@ -28,57 +28,58 @@ struct SolveOptions {
     int substeps = 1;
     double time = 0;         // s since the start, at the end of the frame
     double h = 0;            // s, the frame's length
-    std::int64_t frame = 0;  // its number, for messages
-    std::string group;       // only these points are advanced; all when empty
-    // Set to 1 for points that touch a shape, by their place before the step; null where nobody asks.
+    std::int64_t frame = 0;  // number of the frame, for messages
+    std::string group;       // only these points are advanced; all if empty
+    // Set to 1 for points that touch a shape, by their index before the step; null if not requested.
     std::uint8_t* met = nullptr;
-    // With a tolerance: set to the sub-steps of each point's result, by its place before the step; null where nobody
-    // asks.
+    // Set to the substeps of each point's result, by its index before the step, if there is a tolerance; null if not
+    // requested.
     std::int32_t* taken = nullptr;
-    StepLog* log = nullptr;    // receives contacts and deaths; null where nobody asks
+    StepLog* log = nullptr;    // receives contacts and deaths; null if not requested
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0
 
-    // Neighbours act on each other at every sub-step (interaction.h); else not at all in here.
+    // Neighbours act on each other at every substep (interaction.h); otherwise not within solve().
     bool interacts = false;
 
-    int iterations = 1;           // of the constraints, per sub-step
-    ShapeLoads* loads = nullptr;  // warm starts of coupled points, kept from frame to frame; null: none
+    int iterations = 1;           // of the constraints, per substep
+    ShapeLoads* loads = nullptr;  // warm starts of coupled points, stored between frames; null: none
 
-    // s after which points at rest sleep, where they have the column `still`; and what is kept from frame to frame
+    // s after which points at rest sleep, if they have the column `still`; and the records stored between frames
     double sleep = std::numeric_limits<double>::infinity();
     SleepRecords* sleep_records = nullptr;
 };
 
 struct SolveResult {
     std::uint64_t collisions = 0;     // contacts
-    std::uint64_t contact_limit = 0;  // points that ran into the limit of contacts in a step
-    std::uint64_t trapped = 0;        // points deep in a shape, with no way out known
-    double penetration_max = 0;       // m, the deepest at the end of the frame
+    std::uint64_t contact_limit = 0;  // points that reached the limit of contacts in a step
+    std::uint64_t trapped = 0;        // points deep in a shape, with no known way out
+    double penetration_max = 0;       // m, the largest at the end of the frame
     ContactEnergy contact_energy;
-    std::optional<Ledger> ledger;  // where points are constrained
+    std::optional<Ledger> ledger;  // set if points are constrained
     std::uint64_t died = 0;        // points that actions killed
     Residual residual;             // of the constraints, at the end of the frame
     std::uint64_t asleep = 0;      // points, at the end of the frame
 };
 
-// Advances P and v of every point by its own time: the column `dt` where the points have one (s; a newborn's is its age
-// at the end of the frame), else h. Where they have a `force` (N), it acts too, and is then cleared. Points that an
-// action kills are removed. Ages, other deaths and ids are the caller's.
+// Advances P and v of every point by its own time: the column `dt` if the points have one (s; a newborn's is its age
+// at the end of the frame), else h. A `force` (N) acts too, and is then cleared. Points that an action kills are
+// removed. Ages, other deaths and ids are left to the caller.
 //
-// A point of infinite mass, or outside the group, is not moved by constraints: by its own velocity alone, or not at
-// all.
+// Constraints do not move a point of infinite mass, which moves only by its own velocity, nor a point outside the
+// group, which does not move at all.
 //
-// Same bits for any number of threads, any chunk size, and whichever other points there are that it is not coupled to.
-// Error: a velocity or position that is not finite before or after, with the point's id, or a force that is not, with
-// its node; a collider or force whose attribute is missing. Of several points the first one in the set is named.
+// The result for a point is bit-identical for any number of threads, any chunk size, and any other points that it is
+// not coupled to. Throws Error if a velocity or position is not finite before or after, with the point's id; if a
+// force is not finite, with its node; or if an attribute of a collider or force is missing. Among several points, the
+// first one in the set is named.
 SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
-// The same without constraints, where the results of all blocks are handed to `refinement` instead of being stored:
-// P, v, `force` and the dead are left to it. Counts are those of the first run of each block; the penetration is the
-// deepest of all runs.
+// The same without constraints, with the results of all blocks passed to `refinement` instead of being stored: P, v,
+// `force` and the dead are left to it. Counts are those of the first run of each block; the penetration is the largest
+// of all runs.
 SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement& refinement);
 
-// Whether the paths of all points have a closed form for the whole frame, which sub-steps would only repeat.
+// Returns true if the paths of all points have a closed form for the whole frame, which substeps would only repeat.
 bool is_closed_form(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 }  // namespace rapid

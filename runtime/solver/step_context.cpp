@@ -73,7 +73,7 @@ void StepContext::remove_dead()
 
 void StepContext::sum_contact_energy()
 {
-    // In the order of the points: a sum of doubles depends on it.
+    // In the order of the points, because a sum of doubles depends on it.
     std::stable_sort(energies_.begin(), energies_.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
     for (const auto& [first, energy] : energies_) result_.contact_energy += energy;

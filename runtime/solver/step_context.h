@@ -1,4 +1,4 @@
-// What the blocks of a step share: the columns of the points, the scene, and the counts.
+// Data shared by the blocks of a step: the columns of the points, the scene, and the counts.
 #pragma once
 
 #include <exception>
@@ -17,8 +17,8 @@
 
 namespace rapid {
 
-// Points that go through their sub-steps together: their state, paths and contacts stay in the first and second-level
-// caches. A chunk, the unit of work of a thread, is several blocks.
+// Number of points that go through their substeps together: their state, paths and contacts stay in the first and
+// second-level caches. A chunk, the unit of work of a thread, has several blocks.
 constexpr std::size_t block_size = 256;
 
 class StepContext {
@@ -30,19 +30,19 @@ public:
     const StepScene scene;
     const std::span<Vec3f> P, v;     // at the beginning of the frame, until the result is stored
     OwnTime time;                    // s, of each point in the frame
-    std::vector<std::uint8_t> dead;  // 1: killed by an action or a collider; empty where none does
+    std::vector<std::uint8_t> dead;  // 1: killed by an action or a collider; empty if none can kill
     const PointErrors errors;
 
-    // Whether the step advances a point: those outside options.group stay where they are.
+    // Return true if the step advances a point: those outside options.group stay in place.
     bool advances_all() const { return !members_.data; }
     bool advances(std::size_t i) const { return !members_.data || members_[i]; }
     CollisionContext collision_context();
 
-    // Calls f(begin, end) for each chunk, in parallel. Of several errors that of the first chunk is thrown.
+    // Calls f(begin, end) for each chunk, in parallel. Throws the Error of the first failing chunk.
     template <class F>
     void for_each_chunk(const F& f);
 
-    // Counts of a chunk; first: one of its points. From any thread.
+    // Adds the counts of a chunk; first: one of its points. May be called from any thread.
     void count(const Collisions& collisions, double deepest, std::size_t first);
     void count_penetration(double deepest);
 
@@ -57,7 +57,7 @@ private:
 
     std::mutex mutex_;
     SolveResult result_;
-    std::vector<std::pair<std::size_t, ContactEnergy>> energies_;  // by a point of the chunk
+    std::vector<std::pair<std::size_t, ContactEnergy>> energies_;  // keyed by a point of the chunk
     std::exception_ptr error_;
     std::size_t failed_ = 0;  // the beginning of the chunk in which error_ was thrown
 };
@@ -73,7 +73,7 @@ void StepContext::for_each_chunk(const F& f)
             if (!error_ || begin < failed_) error_ = std::current_exception(), failed_ = begin;
         }
     };
-    // Even a few points, such as shadows, are work for all threads.
+    // Split small sets, too, such as shadows, so that all threads have work.
     const std::size_t n = points.size(), part = block_size * (n / (16 * block_size) + 1);
     rapid::for_each_chunk(n, guarded, std::min(part, chunk_size));
     if (error_) std::rethrow_exception(error_);

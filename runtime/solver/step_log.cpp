@@ -17,7 +17,7 @@ std::vector<LoggedHit> StepLog::hits() const
 {
     std::vector<LoggedHit> all;
     for (const std::vector<LoggedHit>& part : hits_) all.insert(all.end(), part.begin(), part.end());
-    // What one thread has logged of a point is in order; which thread it was is not known.
+    // The entries of a point from one thread are in order, but the order of threads is not known.
     std::stable_sort(all.begin(), all.end(), [](const LoggedHit& a, const LoggedHit& b) {
         return std::tie(a.point, a.time, a.collider) < std::tie(b.point, b.time, b.collider);
     });

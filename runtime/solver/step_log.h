@@ -1,4 +1,4 @@
-// What happens to points within one step: contacts, breaks and deaths, with their times.
+// The events of points within one step: contacts, breaks and deaths, with their times.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -13,19 +13,19 @@
 namespace rapid {
 
 struct LoggedHit {
-    std::uint32_t point;    // place in the set before the step
-    std::int32_t collider;  // place among those of the chain
+    std::uint32_t point;    // index in the set before the step
+    std::int32_t collider;  // index among those of the chain
     double time;            // s since the start
-    Vec3f P, n, vc;         // where, m; the surface's normal, unit, and velocity, m/s
+    Vec3f P, n, vc;         // position, m; the surface's normal, unit, and velocity, m/s
     Vec3f v0, v1;           // the point's velocity before and after, m/s
     float speed;            // of approach, m/s
     float impulse;          // kg m/s
     bool recorded;          // in the hit attributes
 };
 
-// One end of a rod or spring that breaks.
+// One end of a breaking rod or spring.
 struct LoggedBreak {
-    std::uint32_t point;  // place in the set before the step
+    std::uint32_t point;  // index in the set before the step
     double time;          // s since the start
     Vec3f P, v;           // m, m/s
 };
@@ -34,15 +34,15 @@ class StepLog {
 public:
     explicit StepLog(std::size_t points) : died_at_(points, std::numeric_limits<double>::quiet_NaN()) {}
 
-    // From the thread that advances the point.
+    // Must be called from the thread that advances the point.
     void add(const LoggedHit& hit) { hits_.local().push_back(hit); }
     void kill(std::size_t point, double time) { died_at_[point] = time; }
-    // From one thread.
+    // Must be called from one thread.
     void add(const LoggedBreak& end) { breaks_.push_back(end); }
-    // The points whose mask is 1 are as they were when they died. Before they are removed.
+    // Stores the points with mask 1 in their state at death, before they are removed.
     void take_dead(const PointSet& points, std::span<const std::uint8_t> dead);
 
-    // By point, then by time.
+    // Returns the hits by point, then by time.
     std::vector<LoggedHit> hits() const;
     const std::vector<LoggedBreak>& breaks() const { return breaks_; }
     const PointSet& dead() const { return dead_; }
@@ -51,7 +51,7 @@ public:
 private:
     tbb::enumerable_thread_specific<std::vector<LoggedHit>> hits_;
     std::vector<LoggedBreak> breaks_;
-    std::vector<double> died_at_;  // by point; NaN of those that live
+    std::vector<double> died_at_;  // by point; NaN for living points
     PointSet dead_;
     std::vector<double> dead_times_;
 };

@@ -64,7 +64,7 @@ const Column<Vec3f>* nonzero_forces_of(const PointSet& points)
 
 StepScene::StepScene(PointSet& points, const Dynamics& dynamics, double h) : mass{&unit_mass, 0}
 {
-    // Actions come first: they make columns writable, and what is looked up afterwards stays where it is in memory.
+    // Actions come first: they make columns writable, and pointers to columns taken afterwards stay valid.
     for (const auto& action : dynamics.actions()) at_node(*action, [&] { action->prepare(points); });
     for (const auto& action : dynamics.actions())
         at_node(*action, [&] {

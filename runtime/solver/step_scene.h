@@ -14,7 +14,7 @@
 
 namespace rapid {
 
-// A force that varies from point to point, or acts on a group only.
+// A force that varies between points, or acts only on a group.
 struct StepForce {
     const Force* force;
     std::optional<Uniform> uniform;
@@ -28,7 +28,7 @@ struct StepAction {
 };
 
 struct StepScene {
-    // Error: of the first dynamic in the chain that does not fit the points, with its node.
+    // Throws Error, with the node, for the first dynamic in the chain that does not fit the points.
     StepScene(PointSet& points, const Dynamics& dynamics, double h);
 
     std::vector<StepAction> actions;
@@ -37,19 +37,19 @@ struct StepScene {
     std::optional<CollisionRadii> radii;  // of the obstacles
     std::vector<Obstacle> obstacles;
     std::vector<LocalConstraint> constraints;
-    bool kills = false, records = false;   // whether a collider does
-    const Column<Vec3f>* force = nullptr;  // the column `force`; null where it is zero
+    bool kills = false, records = false;   // some collider kills, or records hits
+    const Column<Vec3f>* force = nullptr;  // the column `force`; null if it is zero
     Strided<float> mass;                   // kg
 
     bool is_uniform() const { return forces.empty() && !force; }
-    // Whether points far from shapes have a path in closed form for the whole frame.
+    // Returns true if points far from shapes have a path in closed form for the whole frame.
     bool is_ballistic() const;
 };
 
-// Whether the motion under a constant acceleration and this has a closed form for the whole frame.
+// Returns true if motion under a constant acceleration and these linear forces has a closed form for the whole frame.
 inline bool has_closed_form(const Linear& linear) { return linear.w2 == 0 && linear.c == 0; }
 
-// The column `force`; null where there is none, or it is zero everywhere.
+// Returns the column `force`; null if it is missing or zero everywhere.
 const Column<Vec3f>* nonzero_forces_of(const PointSet& points);
 
 }  // namespace rapid

@@ -76,7 +76,7 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
     query();
     for (std::size_t m = 0; m < motions_.size(); ++m) {
         const Vec3d V = shape_velocity(m);
-        // In the middle of a ball any direction is one in which the distance grows.
+        // In the middle of a ball, the distance grows in any direction.
         if (gradient_[m].isZero(0) && std::isinf(springs_[indices_[m]].shape->band()))
             gradient_[m] = (motions_[m].v0 - V).normalized();
         at_[m] = motions_[m].begin(phi_[m], gradient_[m], V);
@@ -99,14 +99,14 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
         if (motions_[m].t > 0 && motions_[m].far_from_asked()) motions_[m].settle(phi_[m], gradient_[m]);
 }
 
-// m/s, of the shape of a motion where it is asked.
+// Returns the velocity of a motion's shape at the queried position, m/s.
 Vec3d SurfaceSprings::shape_velocity(std::size_t m) const
 {
     const Shape& shape = *springs_[indices_[m]].shape;
     return shape.moves() ? shape.velocity_at(at_[m], times_[m]) : Vec3d(Vec3d::Zero());
 }
 
-// The distances and gradients of all points with springs, each of its own shape at its time.
+// Queries the distances and gradients of all points with springs, each for its own shape and time.
 void SurfaceSprings::query()
 {
     phi_.assign(at_.size(), 0);
@@ -142,7 +142,7 @@ void SurfaceSprings::move(PointBlock& block) const
     }
 }
 
-// What follows a contact has the mean acceleration of the step.
+// After a contact, the mean acceleration of the step is used.
 void SurfaceSprings::bend(std::span<Damped> paths) const
 {
     for (std::size_t m = 0; m < motions_.size(); ++m) {

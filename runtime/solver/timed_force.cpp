@@ -7,7 +7,7 @@
 namespace rapid {
 namespace {
 
-// Adds the forces on some points of a chunk, from `begin` on.
+// Adds the forces on some points of a chunk, from index `begin` on.
 void add_part(const Forces& part, std::size_t size, std::size_t begin, Forces& to)
 {
     for (std::size_t i = 0; i < size; ++i) {
@@ -30,7 +30,7 @@ TimedForce::TimedForce(std::vector<std::shared_ptr<const Force>> forces, double 
 {
 }
 
-// Points that were born in the frame have sub-steps of their own.
+// Points born in the frame have individual substeps.
 void TimedForce::contribute(const Chunk& chunk, Forces& forces) const
 {
     for (std::size_t begin = 0; begin < chunk.size();) {

@@ -1,5 +1,4 @@
-// A force that changes within the step: given at evenly spaced times, of which each sub-step has the one nearest to its
-// middle.
+// A force that changes within the step, given at evenly spaced times. Each substep uses the one nearest to its middle.
 #pragma once
 
 #include <memory>
@@ -13,13 +12,14 @@ namespace rapid {
 
 class TimedForce : public Force {
 public:
-    // forces: at k h / (n - 1) after `begin` (s), k = 0 ... n - 1. less: an acceleration that is given beside it, m/s².
+    // forces: at k h / (n - 1) after `begin` (s), k = 0 ... n - 1. less: an acceleration that is applied separately,
+    // m/s².
     TimedForce(std::vector<std::shared_ptr<const Force>> forces, double begin, double h, const Vec3d& less);
 
     void contribute(const Chunk& chunk, Forces& forces) const override;
     bool add_potential(const Chunk&, std::span<double>) const override { return false; }
 
-    // The whole of it at a time, s; nothing where it differs from point to point.
+    // Returns the whole force at a time, s; nothing if it differs between points.
     std::optional<Uniform> uniform_at(double time) const;
 
 private:

@@ -11,7 +11,7 @@ class BlockRun {
 public:
     explicit BlockRun(StepContext& context) : context_(context), step_(context) {}
 
-    // Returns the deepest penetration of a point at the end, m.
+    // Returns the largest penetration of a point at the end, m.
     double advance(Collisions& collisions, std::span<const std::uint32_t> places, int substeps);
     void store() const { step_.store(); }
     BlockResult result(const Collisions& collisions);
@@ -43,7 +43,7 @@ double BlockRun::advance(Collisions& collisions, std::span<const std::uint32_t> 
     return deepest;
 }
 
-// Points outside the group that is advanced stay as they were.
+// Restores points outside the advanced group.
 void BlockRun::restore_others()
 {
     PointBlock& block = step_.block;
@@ -59,7 +59,7 @@ BlockResult BlockRun::result(const Collisions& collisions)
 {
     const PointBlock& block = step_.block;
     const StepScene& scene = context_.scene;
-    // With drag the path between contacts is no parabola, and more sub-steps would find other contacts.
+    // Under drag the path between contacts is not a parabola, and more substeps would find other contacts.
     const PathKind unbroken = scene.is_ballistic() && scene.uniform.linear.is_zero() ? PathKind::Exact
                               : scene.actions.empty()                                ? PathKind::Smooth
                                                                                      : PathKind::Acted;
@@ -117,7 +117,7 @@ BallisticBatch::Progress UncoupledStep::advance_ballistic(std::size_t begin, std
     return batch.advance(context_.P, context_.v, context_.time, begin, end, near);
 }
 
-// Points of one chunk, in order; all of it where forces or actions act.
+// Advances points of one chunk, in order; the whole chunk if forces or actions act.
 void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> places)
 {
     // Contacts are counted in the first run of each block only.

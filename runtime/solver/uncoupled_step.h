@@ -1,8 +1,8 @@
 // A step of points that do not depend on one another: each block goes through the whole frame while it is in cache.
 //
-// Why beside the coupled step, where the sub-step is a barrier: main memory is read and written once a frame, whatever
-// the number of sub-steps; and points that nothing but a uniform acceleration and linear drag moves take no sub-steps
-// at all (motion/ballistic_batch.h).
+// This exists alongside the coupled step, in which the substep is a barrier, because main memory is then read and
+// written once per frame for any number of substeps. Points moved only by a uniform acceleration and linear drag take
+// no substeps at all (motion/ballistic_batch.h).
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace rapid {
 
 class UncoupledStep {
 public:
-    // refinement: takes the results, which then are not stored; null: one run, which is stored.
+    // refinement: takes the results, which are then not stored; null: one run, which is stored.
     UncoupledStep(StepContext& context, Refinement* refinement) : context_(context), refinement_(refinement) {}
 
     void run();

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// The values of a chunk in contiguous memory: in the buffer where the column is uniform.
+// Returns the values of a chunk in contiguous memory: in the buffer if the column is uniform.
 template <class T>
 const T* contiguous(const Strided<T>& values, std::size_t begin, std::size_t end, T* buffer)
 {

@@ -1,10 +1,10 @@
 // Ages and deaths of points.
 //
-// An age must not drift from the count of frames. A float that grows by h each frame is rounded each time, always in
-// the same direction while its exponent stays (0.4 ms after 2,000 frames of 1/24 s): it misses most whole numbers of
-// frames, and a life of that length ends a frame late. Here an age is k h + j δ with integer k, j, and δ = h/2^m is two
-// to four units in the last place: the float determines k and j exactly, and rounding never accumulates. δ grows with
-// the age; in all, an age that is not a whole number of frames loses less than four units in its last place.
+// An age must not drift from the frame count. A float that grows by h each frame is rounded each time, always in the
+// same direction while its exponent stays (0.4 ms after 2,000 frames of 1/24 s). It misses most integer multiples of
+// h, and a life of that length ends a frame late. Here an age is k h + j δ with integers k, j, and δ = h/2^m is two to
+// four units in the last place: the float determines k and j exactly, and rounding never accumulates. δ grows with the
+// age; in total, an age that is not a multiple of h loses less than four units in its last place.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ public:
     // h: frame length, s.
     explicit Aging(double h) : h_(h), per_h_(1 / h), finest_(std::ilogb(h) - 1 + 127 + 23) {}
 
-    // An age one frame later, s. Without branches, so that a loop over it vectorises.
+    // Returns an age one frame later, s. Branchless, so that a loop over it vectorizes.
     float after_frame(float age) const
     {
         const double sum = age + h_;
@@ -36,16 +36,16 @@ public:
     }
 
 private:
-    static constexpr std::int32_t most = 60;  // for younger ages double no longer counts the δ, and rounds as usual
+    static constexpr std::int32_t most = 60;  // double cannot count the δ of younger ages, and rounds as usual
 
     static double power_of_2(std::int32_t m) { return std::bit_cast<double>(std::int64_t{m + 1023} << 52); }
 
     double h_, per_h_;
-    std::int32_t finest_;  // m plus the biased exponent of the float, where δ is two to four units in the last place
+    std::int32_t finest_;  // m plus the biased exponent of the float, for δ of two to four units
 };
 
-// Lets the points of the group grow older by their `dt`, or by a frame, and removes those that have reached their
-// `life`. Calls bury(stays) before it does: their mask is 0. Returns how many died.
+// Advances the ages of the group's points by their `dt`, or by a frame, and removes points that have reached their
+// `life`. Calls bury(stays) before removal: their mask is 0. Returns the number that died.
 std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
                        const std::function<void(std::span<const std::uint8_t>)>& bury);
 

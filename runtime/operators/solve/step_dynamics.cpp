@@ -22,13 +22,13 @@
 namespace rapid {
 namespace {
 
-// Voxels of a level set; and of one whose band is wider than the shape itself, which takes some 4 s to fill and 1.5 GiB
-// to hold: points that large are kept out without voxels that small.
+// Limits of voxels for a level set, and for one whose band is wider than the shape itself, which takes about 4 s to
+// fill and 1.5 GiB to store: points that large collide well without such small voxels.
 constexpr double most_voxels = 0x1p31, most_voxels_of_wide_band = 0x1p27;
 
 LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& collider)
 {
-    // The voxels of the shell around the bounding box.
+    // Number of voxels of the shell around the bounding box.
     const Eigen::Array3d size = shape->bounds().sizes().array() / shape->voxel();
     const double band = needed / shape->voxel();
     const double voxels = (size + 2 * band).prod() - (size - 2 * band).max(0).prod();
@@ -51,7 +51,7 @@ void warn_of_jump(const Collider& collider, const Jump& jump, double frame, cons
                     collider.location.file, collider.location.line, collider.node, describe(jump, number), number));
 }
 
-// The drag that points bear as attributes, whatever node has given them: targetv and airresist, as Houdini names them.
+// Drag from the points' attributes, regardless of the node that set them: targetv and airresist, named as in Houdini.
 //
 //   a = -airresist (v - targetv)        exact at any step
 class AirResistance : public Force {
@@ -82,7 +82,7 @@ private:
     PerPoint<Vec3f> velocity_;
 };
 
-// What all points share is a constant.
+// A value shared by all points becomes a constant.
 template <class T>
 PerPoint<T> parameter_of(const PointSet& points, const char* name)
 {
@@ -91,7 +91,7 @@ PerPoint<T> parameter_of(const PointSet& points, const char* name)
     return column->is_uniform() ? PerPoint<T>((*column)[0]) : PerPoint<T>::of(name);
 }
 
-// Does nothing where no point has an airresist above 0.
+// Does nothing if no point has an airresist above 0.
 void add_air_resistance(Flow& flow, const Evaluation& now)
 {
     PerPoint<float> rate = parameter_of<float>(flow.points, "airresist");
@@ -110,7 +110,7 @@ private:
     Vec3d a_;
 };
 
-// The interaction at the ends of sub-steps.
+// Applies the interaction at the ends of substeps.
 class TimedInteraction : public Interaction {
 public:
     TimedInteraction(std::vector<std::shared_ptr<const Interaction>> interactions, double begin, double h)
@@ -129,7 +129,7 @@ private:
     double begin_, h_;  // s
 };
 
-// Adds a changing force to a chain. intervals: twice the sub-steps, so that their middles are among its times.
+// Adds a changing force to a chain. intervals: twice the substeps, so that their middles are among its times.
 class Times {
 public:
     Times(const SolveOptions& options, int intervals, bool finer, bool has_births)
@@ -141,7 +141,7 @@ public:
     {
         std::vector<std::shared_ptr<const Force>> forces(static_cast<std::size_t>(intervals_) + 1);
         for (int k = 1; k < intervals_; k += has_births_ ? 1 : 2) forces[static_cast<std::size_t>(k)] = at(force, k);
-        // The ends are nobody's middle, and where all points take the same sub-steps no even time is.
+        // The ends are no middles, and even times are unused if all points take the same substeps.
         for (std::size_t k = 0; k < forces.size(); ++k)
             if (!forces[k]) forces[k] = forces[k + 1 < forces.size() ? k + 1 : k - 1];
         const Vec3d mean = mean_of(forces);
@@ -165,8 +165,7 @@ private:
         return force.at(static_cast<double>(k) / intervals_, finer_);
     }
 
-    // What is uniform for all points is given as such as far as it can be: piles know by it where up is. 0 where it is
-    // not uniform.
+    // Returns the uniform part of a force, or 0 if it is not uniform. Piles need it to find the up direction.
     static Vec3d mean_of(const std::vector<std::shared_ptr<const Force>>& forces)
     {
         Vec3d sum = Vec3d::Zero();
@@ -183,7 +182,7 @@ private:
     bool finer_, has_births_;
 };
 
-// A constraint with places that are functions of time; null where it has none.
+// Returns a constraint with positions that are functions of time; null if it has none.
 std::shared_ptr<const Constraint> through_step(const ChangingConstraint& changing, bool finer)
 {
     const std::shared_ptr<const Constraint> end = changing.at(1, finer);
@@ -222,8 +221,8 @@ bool any_of(const Dynamics::List<D>& list)
                        [](const auto& dynamic) { return dynamic_cast<const Changing*>(dynamic.get()) != nullptr; });
 }
 
-// Gives the step the dynamics of its run, and of shadows. changing: the colliders before they were set in motion; null
-// where one does not change.
+// Assigns the dynamics of the run and of shadows. changing: the colliders before they were set in motion; null for
+// those that do not change.
 void resolve(Step& step, const Dynamics::List<ChangingCollider>& changing)
 {
     const Dynamics& dynamics = step.flow.dynamics;
@@ -234,7 +233,7 @@ void resolve(Step& step, const Dynamics::List<ChangingCollider>& changing)
     }
     int substeps = step.options.substeps;
     while (step.tolerance && substeps < step.max_substeps) substeps *= 2;
-    // With a tolerance the middles of coarser runs lie between those of finer ones.
+    // Middles of coarser runs lie between those of finer ones if there is a tolerance.
     const bool at_all = step.tolerance || step.flow.points.has("dt");
     step.run = with(dynamics, Times(step.options, 2 * substeps, false, at_all), false);
     if (!step.estimates_errors()) return;
@@ -252,16 +251,16 @@ void resolve(Step& step, const Dynamics::List<ChangingCollider>& changing)
 
 }  // namespace
 
-// The distance from the surface at which a level set is sampled (§4.3).
+// Computes the distance from the surface within which a level set is sampled (§4.3).
 struct NeededBand {
     const Dynamics& dynamics;
     const PointSet& points;
     double h;  // s
     int substeps;
-    std::optional<CollisionRadii> radii = {};  // once one is needed
+    std::optional<CollisionRadii> radii = {};  // set when one is needed
 
-    // m: the largest radius and two voxels, for the cells at the edge of the band; and the depth that a sub-step
-    // reaches, where points are put back after it.
+    // Returns the band, m: the largest radius plus two voxels, for the cells at its edge, plus the penetration of a
+    // substep if points are moved out only after it.
     template <class Body>
     double of(const Collider& collider, const Body& body)
     {
@@ -269,12 +268,12 @@ struct NeededBand {
         const Strided<float> radius = radii->of(collider);
         float largest = 0, fastest2 = 0;
         for (std::size_t i = 0; i < (radius.stride ? points.size() : 1); ++i) largest = std::max(largest, radius[i]);
-        // A grid keeps its half width in single precision.
+        // A grid stores its half width in single precision.
         const double needed = (largest + 2 * body.voxel()) * (1 - 0x1p-20);
         if (collider.method == Method::Continuous) return needed;
         const Strided<Vec3f> v = points.v().read();
         for (std::size_t i = 0; i < points.size(); ++i) fastest2 = std::max(fastest2, v[i].squaredNorm());
-        // By factors of two, so that points that gather speed do not have it rebuilt in every frame.
+        // Grows by factors of two, so that accelerating points do not cause a rebuild in every frame.
         const double path = std::sqrt(fastest2) * h / substeps;
         double deep = body.voxel();
         while (deep < path) deep *= 2;
@@ -338,7 +337,7 @@ bool ColliderShapes::Band::is_of(const LevelSet& shape) const
            voxels == shape.active_voxels();
 }
 
-// As the step before has left it.
+// Returns the shape that the previous step left.
 ColliderShapes::Widened ColliderShapes::known(const Collider& collider, const LevelSetPtr& shape) const
 {
     if (const auto found = widened_.find(collider.shape); found != widened_.end()) return found->second;

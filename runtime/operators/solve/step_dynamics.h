@@ -1,9 +1,9 @@
-// The dynamics of a step: those of the chain, the drag that points bear as attributes, colliders with their shapes in
-// motion; and what changes within the step.
+// The dynamics of a step: those of the chain, the drag from the points' attributes, colliders with moving shapes, and
+// changes within the step.
 //
-// Forces that change are given at the middles of the step's sub-steps, interactions at their ends, and constraints with
-// places that are functions of time along these. Of other constraints and of colliders the run has those of the end of
-// the step, shadows those of its middle.
+// Changing forces are evaluated at the middles of the step's substeps, interactions at their ends, and constraints
+// follow positions that are functions of time. Other constraints and colliders are those of the end of the step for
+// the run, and those of its middle for shadows.
 #pragma once
 
 #include <cmath>
@@ -19,15 +19,16 @@ namespace rapid {
 
 struct NeededBand;
 
-// The shapes of colliders as one step needs them (paper §4.3, §4.4): level sets with a band as wide as the points
-// require, and moving or deforming shapes along their paths through the step.
+// The shapes of colliders for one step (paper §4.3, §4.4): level sets with a band as wide as the points require, and
+// moving or deforming shapes along their paths through the step.
 //
-// A level set is widened once and kept from step to step, as a deforming one is. A snapshot holds how wide they were,
-// not the grids: points would come to other bits among narrower ones.
+// A level set is widened once and kept between steps, as is a deforming one. A snapshot stores the widths, not the
+// grids, because narrower bands would change the points' bits.
 class ColliderShapes {
 public:
-    // Replaces the colliders whose shapes are too narrow, moving or deforming. substeps: after which points are put
-    // back, for the band of methods that do so. Error: a band that does not fit into memory; a motion that fails.
+    // Replaces the colliders whose shapes are too narrow, moving or deforming. substeps: number of substeps after
+    // which points may be moved out, for the band of the discrete methods. Throws Error if a band does not fit into
+    // memory, or a motion fails.
     void prepare(Dynamics& dynamics, const PointSet& points, const FrameClock& clock, int substeps,
                  const Evaluation& now);
 
@@ -45,9 +46,9 @@ public:
 private:
     struct Widened {
         LevelSetPtr shape;
-        double band;  // m, that it was asked to have
+        double band;  // m, requested
     };
-    // The band that a shape was given, and by what it is known.
+    // The band of a shape, and the data that identify the shape.
     struct Band {
         double band = 0, voxel = 0;  // m
         Vec3d min = Vec3d::Zero(), max = Vec3d::Zero();
@@ -65,17 +66,17 @@ private:
     void widen(Dynamics& dynamics, NeededBand& needed_band, const Evaluation& now);
     void set_in_motion(Dynamics& dynamics, NeededBand& needed_band, const FrameClock& clock, const Evaluation& now);
 
-    std::map<ShapePtr, Widened> widened_;              // by the shape given
+    std::map<ShapePtr, Widened> widened_;              // by the original shape
     std::map<std::string, Band> bands_, restored_;     // by collide node: of the last step; of a snapshot before it
     std::map<std::string, Deformation> deformations_;  // by collide node
 };
 
-// Completes the dynamics in the flow and the columns that they need, and gives the step those of its run and of
-// shadows. On the thread that evaluates nodes. Error: an attribute that stands for a parameter is out of its range; a
-// shape that does not fit into memory.
+// Completes the dynamics in the flow and the columns that they need, and sets the dynamics of the run and of shadows.
+// Must be called on the thread that evaluates nodes. Throws Error if an attribute used as a parameter is out of its
+// range, or a shape does not fit into memory.
 void prepare(Step& step, ColliderShapes& shapes);
 
-// Refuses attributes that stand for parameters as constants are, by one scan of each.
+// Checks the range of attributes used as parameters, with one scan of each. Throws Error as for constants.
 void require_in_range(const Step& step);
 
 }  // namespace rapid

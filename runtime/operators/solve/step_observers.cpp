@@ -28,8 +28,8 @@ void append(std::vector<T>& to, const std::vector<T>& more)
     to.insert(to.end(), more.begin(), more.end());
 }
 
-// Keeps what happens to the points in a step, where an emitter has the simulation as its source (StepRecord). With a
-// tolerance points go through the step several times, and contacts are not recorded.
+// Records the events of a step if an emitter uses the simulation as its source (StepRecord). With a tolerance, points
+// go through the step several times, and contacts are not recorded.
 class StepRecorder final : public StepObserver {
 public:
     bool observes(const Step& step) const override { return step.flow.simulation->record != nullptr; }
@@ -84,8 +84,9 @@ private:
     std::optional<StepLog> log_;
 };
 
-// Examines the points before the step: for stiff forces and actions after 1, 2, 4, 8, ... steps, at little cost, as
-// stiffness changes while points move. With a tolerance the sub-steps are chosen, and there is nothing to advise.
+// Examines the points before the step for stiff forces and actions. Stiffness changes as points move, so it runs after
+// 1, 2, 4, 8, ... steps, at little cost. With a tolerance, substeps are chosen automatically and there is no advice to
+// give.
 class Examination final : public StepObserver {
 public:
     bool observes(const Step&) const override { return true; }
@@ -105,7 +106,7 @@ public:
     }
 
 private:
-    // Actions, which are scripts, may fail.
+    // Actions are scripts and may fail.
     static void try_actions(const Step& step, PointSet points)
     {
         Dynamics actions;
@@ -118,8 +119,8 @@ private:
     }
 };
 
-// Estimates errors: by a sample of the points where each moves alone, else by all of them. Of coupled points a sample
-// tells nothing but rounding.
+// Estimates errors: from a sample of the points if each moves alone, otherwise from all of them. For coupled points, a
+// sample shows only rounding.
 class ErrorEstimate final : public StepObserver {
 public:
     bool observes(const Step& step) const override { return StepObserver::observes(step) && step.estimates_errors(); }
@@ -160,7 +161,7 @@ public:
     void load(StateReader& from) override { from(shadows_, coupled_, drift_, tolerance_check_); }
 
 private:
-    // Parameters that are functions of the frame and in no error.
+    // Notes parameters that are functions of the frame and not included in the errors.
     static void note_left_out(const Step& step)
     {
         const auto& varying = step.flow.simulation->varying;
@@ -177,7 +178,7 @@ private:
         });
     }
 
-    // While the shadows are as they were before the step.
+    // Must be called while the shadows are in their state before the step.
     void check_tolerance(Step& step, const PointSet& moved)
     {
         if (!step.tolerance || shadows_.idle()) return;
@@ -216,7 +217,7 @@ private:
     ToleranceCheck tolerance_check_;
 };
 
-// Reports what the solver has counted.
+// Reports the solver's counts.
 class StepReport final : public StepObserver {
 public:
     void begin(Step& step, const PointSet&) override { all_newborn_ = are_newborn(step.flow.points, step.options.h); }
@@ -235,7 +236,7 @@ public:
     }
 
 private:
-    // Whether there are points, all of which were born in this step.
+    // Returns true if there are points and all of them were born in this step.
     static bool are_newborn(const PointSet& points, double h)
     {
         const auto* own = points.find<float>("dt");
@@ -315,7 +316,7 @@ private:
                             step.beyond, *step.tolerance));
     }
 
-    // Whether a shape that points meet knows its distance in a band only.
+    // Returns true if any collider's shape knows its distance only within a band.
     static bool has_band(const Dynamics& dynamics)
     {
         return std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
@@ -325,14 +326,13 @@ private:
     bool all_newborn_ = false;
 };
 
-// What Solve can tell of single points, as attributes of its result, for those who look at them
-// (Evaluator::tell_points):
+// Adds per-point figures to the result of Solve as attributes, for inspection (Evaluator::tell_points):
 //
-//   error     m, the estimated error of the position; nan where the point is not in the sample
-//   substeps  that the frame took of the point
-//   asleep    1 of those that sleep, else 0
+//   error     m, the estimated error of the position; nan if the point is not in the sample
+//   substeps  that the frame took for the point
+//   asleep    1 for sleeping points, else 0
 //
-// The state does not keep them. A scene's own attribute of one of these names stays.
+// They are not part of the state. A scene's own attribute with one of these names is kept.
 class PointFigures final : public StepObserver {
 public:
     bool observes(const Step& step) const override
@@ -346,7 +346,7 @@ public:
         if (flow.simulation->tells_points) annotate(flow.points);
     }
 
-    // With a tolerance points take sub-steps of their own.
+    // Points take individual substeps if there is a tolerance.
     void begin(Step& step, const PointSet& entered) override
     {
         substeps_ = step.options.substeps;
@@ -368,7 +368,7 @@ public:
     void annotate(PointSet& points) override
     {
         const IdIndex places(points.id());
-        // A column of this value, and of others at the points with these ids.
+        // Adds a column with this value, and other values at the points with these ids.
         const auto add = [&]<class T, class V>(const char* name, T all, T fallback, Strided<std::int64_t> ids,
                                                const std::vector<V>& values) {
             if (points.has(name)) return;
@@ -391,9 +391,9 @@ private:
     bool is_exact_ = true;
     std::int32_t substeps_ = 0;
     Column<std::int64_t> ids_;                  // as the points entered Solve
-    std::vector<std::int32_t> taken_;           // in their order; empty where all take substeps_
+    std::vector<std::int32_t> taken_;           // in their order; empty if all take substeps_
     std::vector<std::int64_t> known_, asleep_;  // ids
-    std::vector<float> errors_;                 // m, of those known
+    std::vector<float> errors_;                 // m, by known_
 };
 
 }  // namespace

@@ -46,7 +46,7 @@ void CoupledErrors::begin(const PointSet& points, const Dynamics& dynamics, cons
     ids_ = points.id();
     apply_differences(points);
     take_attributes(points);
-    solved_ = shadows_ = PointSet();  // columns that the run is to write
+    solved_ = shadows_ = PointSet();  // releases shared columns before the run writes them
     options_ = options;
     options_.substeps *= 2;
     options_.met = nullptr;
@@ -72,7 +72,7 @@ CoupledErrors::Errors CoupledErrors::end(const PointSet& solved)
     return errors;
 }
 
-// The shadows begin where the points are, with what the run remembers.
+// The shadows start at the positions of the points, with the run's memory.
 void CoupledErrors::start(const SolveOptions& options)
 {
     runs_ = true;
@@ -92,7 +92,7 @@ void CoupledErrors::stop()
     sleep_records_ = {};
 }
 
-// Changes of P and v by nodes since the last Solve are applied to the shadows as the same change.
+// Applies changes of P and v by nodes since the last Solve to the shadows, as the same change.
 void CoupledErrors::apply_differences(const PointSet& points)
 {
     const IdIndex index(std::as_const(solved_).id());
@@ -110,8 +110,8 @@ void CoupledErrors::apply_differences(const PointSet& points)
     differences_ = std::move(differences);
 }
 
-// Attributes that no node has changed since the last Solve are what that has left in the shadows: how long they have
-// been still, how they turn, what actions write.
+// Attributes that no node has changed since the last Solve keep the shadows' values: how long they have been still,
+// how they turn, values written by actions.
 void CoupledErrors::take_attributes(const PointSet& points)
 {
     const IdIndex before(std::as_const(solved_).id()), shadow(std::as_const(shadows_).id());
@@ -136,7 +136,7 @@ void CoupledErrors::take_attributes(const PointSet& points)
     }
 }
 
-// False where a constraint has none.
+// Returns false if a constraint has no twin.
 bool CoupledErrors::make_twins(const Dynamics& dynamics)
 {
     const std::vector<std::shared_ptr<const Constraint>> before = std::exchange(twins_, {});
@@ -178,7 +178,7 @@ std::map<std::string, SavedState> CoupledErrors::memories_of_twins() const
     return memories;
 }
 
-// ids: of the points that are compared.
+// ids: of the compared points.
 std::vector<double> CoupledErrors::compare(const PointSet& solved, std::vector<std::int64_t>& ids)
 {
     const PointSet& shadows = set_;

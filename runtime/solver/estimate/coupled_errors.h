@@ -1,12 +1,12 @@
 // Error estimate of points that act on one another, by step halving.
 //
-// A sample of them would move differently, so all have shadows (shadow.h): the whole set is advanced beside the run
-// with twice the sub-steps, from the first frame on. Constraints, sleep and the loads on shapes have memories of their
-// own for it. The estimate is twice the difference, as for points that move alone.
+// A sample of such points would move differently, so all have shadows (shadow.h): the whole set is also advanced with
+// twice the substeps, from the first frame on. Constraints, sleep and the loads on shapes have separate memories for
+// it. The estimate is twice the difference, as for points that move alone.
 //
-// That takes twice the time of Solve, and is done up to `most_points`. Of more, the frames 1, 2, 4, 8, ... and each
-// `stride`th are solved again from where the run's points begin them, and the estimate is that of the error made in
-// this frame; a sum over frames would leave out how later motion damps or spreads it.
+// This doubles the time of Solve, and is done for up to `most_points`. For larger sets, the frames 1, 2, 4, 8, ... and
+// every `stride`th are solved again from the run's initial points, and the estimate is the error made in this frame. A
+// sum over frames would not include the damping or spreading of the error by later motion.
 #pragma once
 
 #include <map>
@@ -25,15 +25,15 @@ namespace rapid {
 class CoupledErrors {
 public:
     static constexpr std::size_t most_points = 1000;
-    static constexpr std::int64_t stride = 40;  // of frames: in long runs a twentieth of the time of Solve
+    static constexpr std::int64_t stride = 40;  // in frames: in long runs a twentieth of the time of Solve
 
-    // Whether the n-th frame of too many points is solved again.
+    // Returns true if the n-th frame of a set that is too large is solved again.
     static bool is_due(std::int64_t frame);
 
     struct Errors {
-        std::vector<double> since_birth, of_frame;  // m, in the order of the points; empty where not estimated
-        std::vector<std::int64_t> ids;              // of those points
-        std::string unknown;                        // why there are none since birth; else empty
+        std::vector<double> since_birth, of_frame;  // m, in the order of the points; empty if not estimated
+        std::vector<std::int64_t> ids;              // of these points
+        std::string unknown;                        // the reason if there are none since birth; else empty
     };
 
     // Call before Solve, and before interactions act at the frame's ends.
@@ -55,7 +55,7 @@ public:
     }
 
 private:
-    // Of a point: what its shadow differs by.
+    // The difference of a point's shadow from the point.
     struct Difference {
         Vec3d P = Vec3d::Zero(), v = Vec3d::Zero();  // shadow minus point, after Solve
         bool is_known = true;                        // both have lived so far
@@ -75,15 +75,15 @@ private:
     std::map<std::string, SavedState> memories_of_twins() const;
     std::vector<double> compare(const PointSet& solved, std::vector<std::int64_t>& ids);
 
-    std::string unknown_;      // why there are no shadows since birth any more; empty while there are
-    std::int64_t frames_ = 0;  // since that
+    std::string unknown_;      // the reason that there are no more shadows since birth; else empty
+    std::int64_t frames_ = 0;  // since then
     bool runs_ = false;        // there are shadows
 
     PointSet solved_, shadows_;            // the points and the shadows, from end() to begin()
     Column<std::int64_t> ids_;             // of the points, from begin() to end()
-    std::vector<Difference> differences_;  // in their order
+    std::vector<Difference> differences_;  // by point
     std::vector<std::shared_ptr<const Constraint>> twins_;
-    std::map<std::string, SavedState> memories_;  // of a snapshot, for twins that are not made yet; by node
+    std::map<std::string, SavedState> memories_;  // of a snapshot, for twins that are not created yet; by node
     ShapeLoads loads_;
     SleepRecords sleep_records_;
 

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-// Kinetic and potential energies, J/kg; nothing where there is no potential.
+// Returns kinetic plus potential energies, J/kg; nothing if there is no potential.
 std::optional<std::vector<double>> energies_of(const PointSet& points, const Dynamics& dynamics)
 {
     std::vector<Vec3d> P(points.size()), v(points.size());
@@ -32,7 +32,7 @@ std::optional<std::vector<double>> energies_of(const PointSet& points, const Dyn
     return energies;
 }
 
-// Whether velocities change by more than the slope of a potential.
+// Returns true if velocities also change in other ways than by the slope of a potential.
 bool spend_energy(const Dynamics& dynamics)
 {
     return !dynamics.actions().empty() || !dynamics.constraints().empty() || !dynamics.interactions().empty();
@@ -64,7 +64,7 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dy
     drift_ = std::move(drift);
     ids_.assign(shadows.ids().begin(), shadows.ids().end());
     if (dynamics.colliders().empty()) return;
-    // The others are not read.
+    // Other entries are not read.
     met_.resize(points.size());
     for (const std::uint32_t i : indices_) met_[i] = 0;
     options.met = met_.data();
@@ -78,14 +78,14 @@ std::optional<std::vector<double>> EnergyDrift::end(const PointSet& solved, cons
         drift_.assign(drift_.size(), 0);
         return std::nullopt;
     }
-    if (shadows.idle()) return std::vector<double>(solved.empty() ? 0 : 1, 0.0);  // in closed form
+    if (shadows.idle()) return std::vector<double>(solved.empty() ? 0 : 1, 0.0);  // solved in closed form
     if (collides_)                                                                // far apart in memory
         for (const std::uint32_t i : indices_) __builtin_prefetch(&met_[i]);
     const auto after = energies_of(solved.select(shadows.indices()), dynamics);
     if (!after) return std::nullopt;
     std::size_t kept = 0;
     for (std::size_t k = 0; k < ids_.size() && kept < shadows.ids().size(); ++k) {
-        if (ids_[k] != shadows.ids()[kept]) continue;  // it has died
+        if (ids_[k] != shadows.ids()[kept]) continue;  // the point has died
         const double change = (*after)[kept] - before_[k];
         const bool counts = std::isfinite(change) && !(collides_ && met_[indices_[k]]);
         ids_[kept] = ids_[k];

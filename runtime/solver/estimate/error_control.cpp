@@ -45,7 +45,7 @@ public:
     }
 
 private:
-    // Whether a run writes more than P and v of the points.
+    // Returns true if a run writes more than P and v of the points.
     static bool writes_more(const Dynamics& dynamics)
     {
         return !dynamics.actions().empty() || StuckColumns::are_needed(dynamics) ||
@@ -53,7 +53,7 @@ private:
                            [](const auto& collider) { return collider->record.has_value(); });
     }
 
-    // The whole set at once, then all unfinished points, and so on.
+    // Runs the whole set first, then all unfinished points, and so on.
     void advance_blocks()
     {
         const std::span<Vec3f> P = points_.P().write(), v = points_.v().write();
@@ -73,7 +73,8 @@ private:
         }
     }
 
-    // For runs that write other columns too: on copies of a few thousand points, from which finished points are kept.
+    // Runs on copies of a few thousand points, and keeps finished points from these. For runs that also write other
+    // columns.
     void advance_copies()
     {
         constexpr std::size_t part_size = 2 * chunk_size;
@@ -88,7 +89,8 @@ private:
         }
     }
 
-    // A run of the points with these indices, which are `start`. All three keep the points that need another run.
+    // Runs the points with these indices, stored in `start`. All three arguments then hold the points that need
+    // another run.
     void advance_copy(PointSet& start, std::vector<std::uint32_t>& indices, Extrapolation& extrapolation, int substeps)
     {
         const std::size_t size = indices.size();
@@ -129,7 +131,7 @@ private:
     {
         SolveOptions options = options_;
         options.substeps = substeps;
-        options.met = nullptr;  // the kinds of the paths tell
+        options.met = nullptr;  // path kinds give that information
         options.taken = nullptr;
         const SolveResult result = solve(set, dynamics_, options, run);
         SolveResult& all = done_.result;

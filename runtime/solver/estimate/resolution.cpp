@@ -10,8 +10,8 @@ namespace rapid {
 namespace {
 
 constexpr std::size_t most_points = 1000;
-constexpr double coarse = 1e-3;  // m: a spacing of a millimetre is seen
-constexpr double fine = 1e-5;    // m: motion that is lost below this spacing is not
+constexpr double coarse = 1e-3;  // m: a spacing of a millimetre is visible
+constexpr double fine = 1e-5;    // m: losing motion below this spacing is not visible
 
 }  // namespace
 

@@ -14,10 +14,10 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t fewest_shadows = 1000, most_shadows = 1250;  // where there are as many points
+constexpr std::size_t fewest_shadows = 1000, most_shadows = 1250;  // if there are that many points
 constexpr std::uint32_t gone = UINT32_MAX;                         // the index of a point that has died
 
-// The rank of an id in the random order (SplitMix64, Steele et al. 2014).
+// Returns the rank of an id in the random order (SplitMix64, Steele et al. 2014).
 std::uint64_t rank_of(std::int64_t id)
 {
     std::uint64_t x = static_cast<std::uint64_t>(id) + 0x9e3779b97f4a7c15u;
@@ -26,7 +26,7 @@ std::uint64_t rank_of(std::int64_t id)
     return x ^ (x >> 31);
 }
 
-// Whether points are in order of id, as they are unless a script or a merge has reordered them.
+// Returns true if points are in order of id, which they are unless a script or a merge has reordered them.
 bool are_sorted(Strided<std::int64_t> ids, std::size_t size)
 {
     if (ids.stride == 0 || size < 2) return size < 2;
@@ -52,8 +52,8 @@ void prefetch(const PointSet& points, std::span<const std::uint32_t> indices)
     }
 }
 
-// The index of the first id from `from` on that is not lower, where ids ascend; found quickly where it is not far
-// before `guess`.
+// Returns the index of the first id, from `from` on, that is not lower, for ascending ids. Fast if it is close to and
+// not after `guess`.
 std::size_t first_near(Strided<std::int64_t> ids, std::size_t size, std::size_t from, std::size_t guess,
                        std::int64_t id)
 {
@@ -63,8 +63,8 @@ std::size_t first_near(Strided<std::int64_t> ids, std::size_t size, std::size_t 
     return first_not_below(ids, begin, end, id);
 }
 
-// The index of the point with each of the ascending ids; `gone` where there is none. before: the previous indices,
-// which are mostly right, or all too high by as many points as have been removed before.
+// Returns the index of the point with each of the ascending ids; `gone` if there is no such point. before: the
+// previous indices, which are usually right, or too high by the number of removed points before them.
 std::vector<std::uint32_t> indices_of(std::span<const std::int64_t> ids, const PointSet& points,
                                       std::span<const std::uint32_t> before)
 {
@@ -92,7 +92,7 @@ std::vector<std::uint32_t> indices_of(std::span<const std::int64_t> ids, const P
     return indices;
 }
 
-// Removes the elements of points that are gone from all lists.
+// Removes the elements of dead points from all lists.
 template <class... T>
 void keep_found(std::vector<std::uint32_t>& indices, std::vector<T>&... lists)
 {
@@ -118,8 +118,8 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
 
     const Strided<std::int64_t> id = points.id().read();
     std::vector<std::pair<std::int64_t, std::uint32_t>> born;
-    // Keeps the first of the random order. It is done as soon as there are many more, so that ten million births at
-    // once need no list.
+    // Keeps the first ids of the random order. Runs as soon as there are many more, so that ten million simultaneous
+    // births need no list.
     const auto thin = [&] {
         std::vector<std::uint64_t> order;
         for (const std::int64_t number : ids_) order.push_back(rank_of(number));
@@ -132,7 +132,7 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
         std::erase_if(born, [&](const auto& point) { return rank_of(point.first) >= threshold_; });
     };
     std::int64_t next = next_id_;
-    // Newborn points are at the end. In a set that a script has sorted they may be anywhere, and are not all found.
+    // Newborn points are at the end. In a set sorted by a script they may be anywhere, and not all are found.
     for (std::size_t i = points.size(); i-- > 0 && id[i] >= next_id_;) {
         next = std::max(next, id[i] + 1);
         if (rank_of(id[i]) >= threshold_) continue;
@@ -167,7 +167,7 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
     }
 }
 
-// Finds the points again; those that have died are left out.
+// Finds the points again and drops dead ones.
 void Shadows::find(const PointSet& solved)
 {
     prefetch(solved, indices_);

@@ -46,7 +46,7 @@ public:
         const int substeps = substeps_;
         substeps_ *= 2;
         if (!open_.empty() && !limits_.is_last(substeps)) {
-            // A needless run of some costs less than gathering the others.
+            // An unnecessary run of some points costs less than gathering the others.
             const bool are_most = 4 * open_.size() >= 3 * indices_.size();
             if (limits_.repeats && (are_most || limits_.is_result_of_all(substeps))) return substeps_;
         }
@@ -80,7 +80,7 @@ private:
         if (!first) keep_outside(end.obstacles, end.places, best_P_, extrapolated_);
     }
 
-    // Keeps the results that are good enough, or final. Leaves open the points that need another run.
+    // Keeps the results that are good enough, or final. Leaves points open that need another run.
     void accept(const BlockResult& end)
     {
         const bool may_be_result = limits_.may_be_result(substeps_);
@@ -130,10 +130,10 @@ private:
     Extrapolation extrapolation_;
     std::vector<std::uint32_t> open_;  // points without a good enough result, by index in the block
     std::vector<Verdict> verdict_;
-    std::vector<std::uint8_t> extrapolated_;  // whether the extrapolation is the result
+    std::vector<std::uint8_t> extrapolated_;  // the extrapolation is the result
     std::vector<Vec3d> best_P_, best_v_;      // extrapolations
     std::vector<Result> result_;
-    std::vector<Vec3f> P_, v_;  // results, where known
+    std::vector<Vec3f> P_, v_;  // results, if known
 };
 
 StepDoubling::StepDoubling(const StepDoublingLimits& limits, int substeps, std::span<Vec3f> P, std::span<Vec3f> v,

@@ -17,14 +17,14 @@
 
 namespace rapid {
 
-// Richardson extrapolation of the runs of points through a frame, each run with twice as many sub-steps as the one
-// before (Romberg 1955).
+// Richardson extrapolation of the runs of points through a frame, each with twice as many substeps as the previous one
+// (Romberg 1955).
 //
-// The error of a run is a series in powers of the step: even powers where forces alone act, all powers from the first
-// on where actions do. Each further run eliminates one more of them. A path with a contact has no such series; its
-// columns begin again.
+// The error of a run is a series in powers of the step: even powers with forces alone, all powers from the first on
+// with actions. Each further run eliminates one more power. A path with a contact has no such series; its columns
+// restart.
 //
-// Layout: column c of the table holds, of each point, the latest extrapolation that uses c + 1 runs; shape [points].
+// Layout: column c of the table holds, for each point, the latest extrapolation from c + 1 runs; shape [points].
 
 class Extrapolation {
 public:
@@ -37,7 +37,7 @@ public:
         died_.assign(size, 0);
     }
 
-    // Becomes that of the points `chosen` of `from`.
+    // Becomes the extrapolation of the points `chosen` of `from`.
     void select(const Extrapolation& from, std::span<const std::uint32_t> chosen)
     {
         reset(0, from.h_);
@@ -48,7 +48,7 @@ public:
         append(from, chosen);
     }
 
-    // Adds the points `chosen` of `from`, which has as many runs.
+    // Adds the points `chosen` of `from`, which has the same number of runs.
     void append(const Extrapolation& from, std::span<const std::uint32_t> chosen)
     {
         h_ = from.h_;
@@ -74,12 +74,12 @@ public:
     }
 
     // The squared differences of the last two runs, and of the last two columns of the table, m²: in position at the
-    // end of this frame, or of the next one by the difference in velocity.
+    // end of this frame, or of the next one due to the difference in velocity.
     struct Difference {
         double run, best;
     };
 
-    // Adds the run of point i; P and v: the best estimate now.
+    // Adds the run of point i; P and v: the best current estimate.
     Difference add(std::size_t i, const BlockResult& end, Vec3d& P, Vec3d& v)
     {
         P = end.P[i];
@@ -117,8 +117,8 @@ private:
     static double squared(double x) { return x * x; }
 
     // The largest divisor of a difference of two columns for the error of the second. The series itself has 15, 63 and
-    // so on; but where steps are still too coarse for it, as in a close encounter with an attractor, columns that are
-    // 0.05 m apart may be wrong by 0.02 m: 3 is safe there, and elsewhere columns converge so fast that it costs
+    // so on. If steps are still too coarse for it, as in a close encounter with an attractor, columns that differ by
+    // 0.05 m may have an error of 0.02 m: 3 is safe there, and elsewhere columns converge so fast that it costs
     // nothing.
     static constexpr double most_trust = 3;
     static constexpr std::size_t most_columns = 6;  // higher powers of the step add only rounding
@@ -135,20 +135,20 @@ private:
     std::array<std::vector<Vec3d>, most_columns> P_, v_;
 };
 
-// When a run may be a point's result, and when it is the last one.
+// Decides if a run may be a point's result, and if it is the last one.
 struct StepDoublingLimits {
     double tolerance;    // m
-    int first_substeps;  // of a point's first run
+    int first_substeps;  // for a point's first run
     int max_substeps;
     double h;             // s, frame length
     std::uint8_t* met;    // set to 1 for points that meet a shape, by index in the set; may be null
-    std::int32_t* taken;  // set to the sub-steps of a point's result, likewise
+    std::int32_t* taken;  // set to the substeps of a point's result; may be null
     bool repeats;         // a block may run through the frame more than once
 
     bool is_first(int substeps) const { return substeps == first_substeps; }
-    // One run has no estimate, so that there is a second even beyond max_substeps, but only for the error.
+    // One run has no error estimate, so there is a second even beyond max_substeps, but only for the error.
     bool may_be_result(int substeps) const { return is_first(substeps) || substeps <= max_substeps; }
-    // Whether it is the result of points that still miss the tolerance.
+    // Returns true if it is also the result of points that still miss the tolerance.
     bool is_result_of_all(int substeps) const { return may_be_result(substeps) && substeps > max_substeps / 2; }
     bool is_last(int substeps) const { return !is_first(substeps) && substeps > max_substeps / 2; }
 };
@@ -164,15 +164,15 @@ struct UnfinishedPoints {
 // One traversal of a set, or of its unfinished points.
 class StepDoubling final : public Refinement {
 public:
-    // substeps: of the next run. P and v: of all points, for the results. unfinished: the points that are solved, as a
-    // set of their own; null: all points, from their first run on.
+    // substeps: for the next run. P and v: of all points, for the results. unfinished: the points to solve, as a
+    // separate set; null: all points, from their first run on.
     StepDoubling(const StepDoublingLimits& limits, int substeps, std::span<Vec3f> P, std::span<Vec3f> v,
                  const UnfinishedPoints* unfinished);
 
     bool takes_exact() const override { return limits_.is_first(substeps_); }
     std::unique_ptr<BlockRefinement> begin() override;
 
-    // Afterwards: the points that need further runs, by the sub-steps of the next one; those that have died.
+    // Afterwards: the points that need further runs, by their next substeps, and the dead points.
     std::map<int, UnfinishedPoints> unfinished();
     std::span<const std::uint32_t> dead() const { return dead_; }
 

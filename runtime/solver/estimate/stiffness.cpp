@@ -16,23 +16,23 @@
 namespace rapid {
 namespace {
 
-// Thresholds of what is reported. A drag or spring that is solved exactly: 1 - 1/e of its relaxation per sub-step.
+// Reporting thresholds. For a drag or spring that is solved exactly: 1 - 1/e of its relaxation per substep.
 constexpr double reported_if_exact = 1;
-// Others: at half a radian per sub-step the phase error of the midpoint rule is 1 % of it, (omega dt)² / 24; beyond 2
-// it is unstable. At a quarter a motion is well resolved.
+// For others: at half a radian per substep the phase error of the midpoint rule is 1 % of it, (omega dt)² / 24; beyond
+// 2 it is unstable. At a quarter, a motion is well resolved.
 constexpr double reported_otherwise = 0.5, resolved = 0.25;
-constexpr int most_proposed = 256;  // sub-steps: eight times as many for a few points take some 30 ms with a script
-constexpr int reference = 8;        // times as many sub-steps for the reference, whose error is 1/64 at order 2
+constexpr int most_proposed = 256;  // substeps: eight times as many for a few points take about 30 ms with a script
+constexpr int reference = 8;        // factor of substeps for the reference, whose error is 1/64 at order 2
 
-// Points whose Jacobians are taken; and the stiffest of these, which are solved.
+// Number of points for Jacobians, and of the stiffest points that are solved.
 constexpr std::size_t most_sampled = 64, most_solved = 16;
 
-// The finite difference, relative to the norm of a position and a velocity (at least least_size, m and m/s): rounding
-// in double and in the single precision of fields both stay far below.
+// Finite difference, relative to the norm of a position and a velocity (at least least_size, m and m/s): rounding in
+// double and in the single precision of fields both stay far below.
 constexpr double difference = 1e-5, least_size = 1e-3;
-constexpr double step_rounding = 1e-6;  // relative error of a step from these differences: equal results keep the first
+constexpr double step_rounding = 1e-6;  // relative error of a step from these differences; ties keep the first
 
-// The indices of points evenly spread over those that the step advances.
+// Returns the indices of points evenly spread over those that the step advances.
 std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& group)
 {
     const Strided<std::uint8_t> members = members_of(points, group);
@@ -85,8 +85,8 @@ public:
             force.contribute({set, 0, at, speed, dt, time, 0}, forces);
     }
 
-    // Accelerations without the terms -k v of drags and -w2 x of springs, which are solved exactly; their targets may
-    // depend on the position.
+    // Returns accelerations without the terms -k v of drags and -w2 x of springs, which are solved exactly; their
+    // targets may depend on the position.
     std::vector<Vec3d> inexact_accelerations(const Force& force, std::span<Vec3d> at, std::span<Vec3d> speed) const
     {
         Forces forces;
@@ -99,7 +99,7 @@ public:
         return a;
     }
 
-    // On a copy of the set, because an action may write what it reads.
+    // Uses a copy of the set, because an action may write the columns that it reads.
     std::vector<Vec3d> accelerations(const Action& action, std::span<Vec3d> at, std::span<Vec3d> speed) const
     {
         PointSet own = set;
@@ -116,7 +116,7 @@ public:
         return a;
     }
 
-    // By central differences.
+    // Computes the Jacobians by central differences.
     std::vector<Jacobians> jacobians(const Accelerations& accelerations_at) const
     {
         std::vector<Jacobians> result(size());
@@ -145,7 +145,7 @@ public:
     std::vector<double> dt, time;
 };
 
-// The largest steps of each kind, of one force or action.
+// Collects the largest steps of each kind for one force or action.
 class StiffnessScan {
 public:
     explicit StiffnessScan(std::size_t size) : inexact_(size, 0) {}
@@ -158,21 +158,21 @@ public:
         if (kind > Stiffness::Spring) inexact_[i] = std::max(inexact_[i], step);
     }
 
-    // The rate of oscillation of x'' = J x + (K - k) x', and the rate of decay by K alone: that of k is solved exactly.
+    // Adds the rate of oscillation of x'' = J x + (K - k) x', and the rate of decay by K alone: k is solved exactly.
     void add(std::size_t i, const Jacobians& by, double k, double dt)
     {
         const Eigen::Matrix3d &J = by.by_position, &K = by.by_velocity;
         if (!J.allFinite() || !K.allFinite() || (J.isZero(0) && K.isZero(0))) return;
         Eigen::MatrixXd both(6, 6);
         both << Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Identity(), J, K - k * Eigen::Matrix3d::Identity();
-        // Both have the type of matrices of any size, because each type of matrix takes 12 s to compile.
+        // Both use dynamic matrices, because each matrix type takes 12 s to compile.
         const Eigen::EigenSolver<Eigen::MatrixXd> oscillating(both, false);
         add(Stiffness::Oscillation, i, dt * oscillating.eigenvalues().imag().cwiseAbs().maxCoeff());
         const Eigen::EigenSolver<Eigen::MatrixXd> decaying(Eigen::MatrixXd(K), false);
         add(Stiffness::Decay, i, -dt * decaying.eigenvalues().real().minCoeff());
     }
 
-    // The worst part that is solved exactly and the worst that is not, where they are above the threshold.
+    // Returns the worst part that is solved exactly and the worst that is not, if they are above the threshold.
     std::vector<Stiffness> result() const
     {
         std::vector<Stiffness> result;
@@ -187,7 +187,7 @@ public:
 
     double inexact(std::size_t i) const { return inexact_[i]; }
 
-    // Whether all of it is solved exactly: linear in place and velocity, with constant coefficients.
+    // All of it is solved exactly: linear in position and velocity, with constant coefficients.
     bool is_linear = true;
 
 private:
@@ -195,8 +195,8 @@ private:
     std::vector<double> inexact_;  // by point
 };
 
-// The angle by which the normal of the surface turns along the path of the sub-step: as omega dt of a circle. On a
-// plane the motion is exact, and the spring's omega dt is told.
+// Scans the angle by which the surface normal turns along the path of the substep, as omega dt of a circle. On a plane
+// the motion is exact, and the spring's omega dt is reported.
 void scan_surface(const SurfaceSpring& spring, const Sample& sample, std::size_t i, StiffnessScan& found)
 {
     if (!(spring.w2 > 0)) return;
@@ -247,7 +247,7 @@ StiffnessScan scan(const Action& action, const Sample& sample)
     return found;
 }
 
-// The sub-steps that resolve the stiffest part that is not solved exactly.
+// Returns the substeps that resolve the stiffest part that is not solved exactly.
 int proposed(const SolveOptions& options, double step)
 {
     int substeps = options.substeps;
@@ -255,7 +255,7 @@ int proposed(const SolveOptions& options, double step)
     return substeps;
 }
 
-// The largest distance between points of the same id, m.
+// Returns the largest distance between points of the same id, m.
 double largest_distance(const PointSet& a, const PointSet& b)
 {
     std::map<std::int64_t, Vec3d> position;
@@ -297,7 +297,7 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
 {
     const Dynamics pulls = forces_and_actions_of(dynamics);
     std::vector<std::uint32_t> indices = sample_of(points, options.group);
-    if (const auto* own = points.find<float>("dt"))  // those born at the frame's end take no step
+    if (const auto* own = points.find<float>("dt"))  // points born at the frame's end take no step
         std::erase_if(indices, [&](std::uint32_t i) { return !((*own)[i] > 0); });
     if (pulls.empty() || indices.empty()) return {};
 
@@ -305,7 +305,7 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
     std::vector<Stiffness> all;
     std::vector<double> inexact(sample.size(), 0);
     double worst = 0;
-    bool alone = pulls.size() == dynamics.size();  // no shapes, constraints and interactions
+    bool alone = pulls.size() == dynamics.size();  // no shapes, constraints or interactions
     const auto look_at = [&](const auto& pull, const std::string& name) {
         std::optional<StiffnessScan> found;
         try {
@@ -378,7 +378,7 @@ std::string text_of(const Stiffness& stiffness)
     if (const auto& cure = stiffness.cure) {
         text += fmt::format("; estimated error {:.1g} m; {} sub-steps would give {:.1g} m", cure->error, cure->substeps,
                             cure->error_then);
-        // An error that converges falls to a quarter where they are twice as many.
+        // A converging error falls to a quarter with twice as many substeps.
         if (cure->error_then > 0.5 * cure->error)
             text += "; they are no remedy near a place where a force has no bound: attract has core for that";
     }

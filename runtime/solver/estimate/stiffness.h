@@ -1,10 +1,10 @@
-// Detection of stiff forces and actions: those whose time scale is that of a sub-step or shorter.
+// Detection of stiff forces and actions: those whose time scale is that of a substep or shorter.
 //
-// A sample of the points is examined where they are. The rates of linear drags and springs are known, and these are
-// solved exactly at any step. For all other parts the Jacobians of the acceleration by position and velocity, J and K,
-// are taken by finite differences: the eigenvalues of x'' = J x + K x' give the rates of oscillation and decay. The
-// resulting error is computed, not guessed: the frame of the sample is solved with the given sub-steps, with as many as
-// resolve the motion, and with many more.
+// A sample of the points is examined at the current positions. The rates of linear drags and springs are known, and
+// these are solved exactly at any step. For all other parts, the Jacobians of the acceleration by position and
+// velocity, J and K, are computed by finite differences: the eigenvalues of x'' = J x + K x' give the rates of
+// oscillation and decay. The resulting error is computed, not guessed: the frame of the sample is solved with the
+// given substeps, with as many as resolve the motion, and with many more.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +30,12 @@ struct Stiffness {
 
     std::string node;  // drag1; action "sun"
     Kind kind = Drag;
-    double step = 0;         // the product that `kind` names, of the stiffest point
+    double step = 0;         // the product that `kind` names, for the stiffest point
     int substeps = 1;        // of the frame
     std::int64_t frame = 0;  // in which it was found
 
-    // The largest position errors of the sample after this frame, m, now and with more sub-steps. Nothing for parts
-    // that are solved exactly, nor where points are coupled, because a sample alone moves differently.
+    // The largest position errors of the sample after this frame, m, with the current and with more substeps. Empty
+    // for parts that are solved exactly, and for coupled points, because a sample alone moves differently.
     struct Cure {
         double error;
         int substeps;
@@ -43,21 +43,23 @@ struct Stiffness {
     };
     std::optional<Cure> cure;
 
-    // Of a kind that is solved exactly: whether all that acts on the points is, so that their motion is exact, too.
+    // For a kind that is solved exactly: everything that acts on the points is, so their motion is exact, too.
     bool alone = false;
 
     bool is_exact() const { return kind == Drag || kind == Spring; }
 };
 
-// The stiff forces and actions, in the order of the chain, on the points before Solve. Changes nothing.
+// Returns the stiff forces and actions, in the order of the chain, for the points before Solve. Changes nothing.
 std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 // Merges `found` into `worst`, which keeps the stiffest result of each node.
 void keep_worst(std::vector<Stiffness>& worst, const std::vector<Stiffness>& found);
 
-// drag1: k dt = 16; treated exactly
-// drag1: k dt = 16; solved in closed form, with what else acts held through a sub-step
-// action "sun": omega dt = 1.9 at 1 sub-step; estimated error 0.2 m; 8 sub-steps would give 0.003 m
+// Returns a line such as
+//
+//   drag1: k dt = 16; treated exactly
+//   drag1: k dt = 16; solved in closed form, with what else acts held through a sub-step
+//   action "sun": omega dt = 1.9 at 1 sub-step; estimated error 0.2 m; 8 sub-steps would give 0.003 m
 std::string text_of(const Stiffness& stiffness);
 
 }  // namespace rapid

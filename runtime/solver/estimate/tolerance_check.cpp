@@ -8,7 +8,7 @@ namespace rapid {
 namespace {
 
 constexpr int frames_between = 4;
-constexpr std::size_t all = 1250, some = 250;  // points that are checked, of so many; and of more
+constexpr std::size_t all = 1250, some = 250;  // points checked of up to `all` points; of more points
 
 double part_beyond(PointSet finer, const PointSet& solved, const Dynamics& dynamics, SolveOptions options,
                    double tolerance, int max_substeps)

@@ -1,11 +1,11 @@
-// A second opinion on what solve_within() promises.
+// An independent check of the results of solve_within().
 //
-// Doubling compares runs of n, 2n, 4n, ... sub-steps. A force that all of them meet at the same phase, such as
-// sin(2π 96 t) at 24 frames a second, or a jump that two of them miss, looks solved. A sample of the points is solved
-// again from the same state with 3n, 6n, 12n, ... sub-steps, which share no moment but the ends, and a quarter of the
-// tolerance; a point that comes out elsewhere by half the tolerance is beyond it, and counts for its share of all.
+// Doubling compares runs of n, 2n, 4n, ... substeps. A force that all of them meet at the same phase, such as sin(2π
+// 96 t) at 24 frames a second, or a jump that two of them miss, looks solved. A sample of the points is solved again
+// from the same state with 3n, 6n, 12n, ... substeps, which share only the ends, and a quarter of the tolerance. A
+// point whose result differs by half the tolerance is beyond it, and counts for its share of all points.
 //
-// In each of the first frames, then in every fourth: the part that was found last holds between.
+// Runs in each of the first frames, then in every fourth; the last fraction found is used in between.
 #pragma once
 
 #include "runtime/points/state_archive.h"
@@ -16,8 +16,8 @@ namespace rapid {
 
 class ToleranceCheck {
 public:
-    // Returns how many of the points in `solved` are beyond the tolerance. sample: points before Solve, some of those.
-    // The rest as given to solve_within().
+    // Returns the number of points in `solved` that are beyond the tolerance. sample: some of the points before Solve.
+    // The other arguments are those of solve_within().
     std::uint64_t beyond(const PointSet& sample, const PointSet& solved, const Dynamics& dynamics,
                          const SolveOptions& options, double tolerance, int max_substeps);
 

@@ -1,10 +1,10 @@
--- ash: glowing flakes are born in the smoke of a fire, and carried by it.
+-- ash: glowing flakes are born in the smoke of a fire, which carries them along.
 --
--- The smoke is a sequence of volumes, one for each sixteenth frame, which graphs/smoke/smoke.lua has made. Between two
--- its density and its velocity change evenly.
+-- The smoke is a sequence of volumes, one for every 16th frame, written by graphs/smoke/smoke.lua. Density and velocity
+-- are interpolated linearly between them.
 --
 -- Shows:  rapid.fog.read as a source, rapid.grid.read as the velocity of a flow, sequences with gaps.
--- Proves: flakes are born where there is smoke, and go as it goes (tests/graphs/test_ash.lua).
+-- Proves: flakes are born inside the smoke and move with it (tests/graphs/test_ash.lua).
 -- Run:    rapid run graphs/ash.lua -f 1-96 -o /tmp/ash.mp4
 local rapid = require "rapid"
 
@@ -21,7 +21,7 @@ return rapid.create { fps = 24, seed = 3 }
   :gravity    { g = {0, -1.2, 0} }
   :turbulence { amplitude = 9, size = 0.25, speed = 1 }
   :points     ("glow", function(p, frame)
-      -- A flake turns, and flares up whenever it is seen face on.
+      -- A flake turns, and flares up when it faces the viewer.
       local flare = 0.4 + 0.6 * math.abs(math.sin((3 + 6 * p:rand(1)) * frame.time + 6.28 * p:rand(2)))
       local heat = p.heat * (1 - p.nage) * flare
       p.Cd = vec3(1.6, 0.75 * heat + 0.15, 0.35 * heat * heat) * (0.08 + heat)

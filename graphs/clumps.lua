@@ -1,8 +1,8 @@
 -- clumps: a body rises out of a pile of wet sand, which tears into clumps (the paper's figure 7).
 --
--- Shows:  :clump beside :contact: bonds between grains that have touched, which break; a collider that moves through.
--- Proves: sand whose bonds bear 40 N is carried higher than dry sand, and none is in the body; how many grains those of
---         10 N carry is chance (tests/graphs/test_clumps.lua).
+-- Shows:  :clump together with :contact: bonds between grains that have touched, which break; a moving collider.
+-- Proves: sand whose bonds hold 40 N is carried higher than dry sand, and no grain is in the body; the number of grains
+--         that 10 N carry is chance (tests/graphs/test_clumps.lua).
 -- Run:    rapid run graphs/clumps.lua -f 1-96 -o /tmp/clumps.####.png
 local rapid = require "rapid"
 
@@ -10,12 +10,12 @@ local strength = rapid.param("strength", 10, "pull that a bond bears, N; 0 for d
 
 local r = 0.04
 
--- A torso and a head, in place of the paper's character.
+-- A torso and a head instead of the paper's character.
 local body = rapid.levelset.sphere { radius = 0.3, voxel = 0.03 }
   :union(rapid.levelset.sphere { radius = 0.19, center = {0, 0.42, 0}, voxel = 0.03 })
   :smooth {}
 
--- At rest below the floor until the sand lies still; then up.
+-- The body rests below the floor until the sand lies still, then rises.
 local function rising(frame)
   local t = math.min(math.max((frame.number - 25) / 48, 0), 1)
   return rapid.translate(0, -0.75 + 1.5 * t * t * (3 - 2 * t), 0)

@@ -1,6 +1,6 @@
 -- column: a column of grain collapses, spreads over the floor and comes to rest as a heap.
 --
--- Shows:  :contact with friction, one of Rapid's constraints; what sub-steps and iterations are for.
+-- Shows:  :contact with friction, one of Rapid's constraints; the effect of sub-steps and iterations.
 -- Proves: no grain overlaps another by more than a tenth of its radius at the end, at most one in a thousand still
 --         tumbles, and more friction makes a steeper heap (tests/graphs/test_column.lua).
 -- Run:    rapid run graphs/column.lua -f 1-72 -o /tmp/column.####.png
@@ -15,7 +15,7 @@ local grain = rapid.points.grid { size = {0.52, 1.56, 0.52}, spacing = 2.6 * r, 
 
 return rapid.create { fps = 24, points = grain, seed = 3 }
   :attribute { pscale = r, Cd = {0.85, 0.65, 0.4} }
-  -- Loose at first: spheres stacked in line, which here do not turn, would stand like a crystal.
+  -- Scatters the grains: spheres stacked in line, which do not turn here, would stand like a crystal.
   :points  ("scatter", function(p, frame)
       if frame.number == 2 then
         p.P = p.P + (vec3(p:rand(1), p:rand(2), p:rand(4)) - vec3(0.5, 0.5, 0.5)) * r
@@ -25,5 +25,5 @@ return rapid.create { fps = 24, points = grain, seed = 3 }
   :gravity {}
   :collide { shape = rapid.shape.plane {}, bounce = 0, friction = friction }
   :contact { friction = friction }
-  -- Friction takes more than one iteration to hold a slope: with one the heap is 4 degrees flatter.
+  -- Friction needs more than one iteration to hold a slope: with one the heap is 4 degrees flatter.
   :solve   { substeps = substeps, iterations = 4 }

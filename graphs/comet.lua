@@ -1,10 +1,10 @@
 -- comet: an emitter that turns by 60 degrees a frame, with its motion as a spline, as straight lines, and with none.
 --
--- Its points stay where they are born, so they draw the way that it is taken to go.
+-- Its points stay where they are born, so they draw the path that it is assumed to take.
 --
 -- Shows:  a moving source, and motion = "spline" (left), "linear" (middle), "none" (right).
 -- Proves: the spline's points lie within 3 % of the circle's radius of it, without a gap between frames; those of the
---         lines are on its chords, and those of no motion at 24 places a second (tests/graphs/test_comet.lua).
+--         lines lie on its chords, and those without motion at 24 places a second (tests/graphs/test_comet.lua).
 -- Run:    rapid run graphs/comet.lua -f 1-14 --camera 2.6,0,7.6,2.6,0,0 -o /tmp/comet.####.png
 local rapid = require "rapid"
 

@@ -1,13 +1,13 @@
 -- debris: a wall of rubble of three sizes comes down, and the small falls through the large.
 --
--- Shows:  :contact with clusters of radii, each in a grid of its own (max_difference, max_grids); masses that go with
---         the volume; pieces that bounce.
+-- Shows:  :contact with clusters of radii, each in a grid of its own (max_difference, max_grids); masses proportional
+--         to the volume; pieces that bounce.
 -- Proves: three grids hold the three sizes, nothing overlaps deeply, and the small pieces end lower than the large ones
 --         (tests/graphs/test_debris.lua).
 -- Run:    rapid run graphs/debris.lua -f 1-96 -o /tmp/debris.####.png
 local rapid = require "rapid"
 
--- Radius, count and colour of each cluster; a radius varies by a tenth.
+-- Radius, count and colour of each cluster; radii vary by a tenth.
 local sizes = {
   { 0.12, 24, {0.55, 0.5, 0.45} }, { 0.05, 220, {0.7, 0.62, 0.5} }, { 0.02, 1400, {0.8, 0.75, 0.65} },
 }

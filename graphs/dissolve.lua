@@ -1,7 +1,7 @@
 -- dissolve: a chess piece crumbles into the wind, in the order that is painted on it.
 --
--- Shows:  births with the colours of a mesh's vertices; a group that gathers members; forces on a group alone.
--- Proves: no point moves before its colour says, and all that should have gone by then have
+-- Shows:  births with the colours of a mesh's vertices; a group that gains members; forces on one group only.
+-- Proves: no point moves before its colour allows, and all whose time has come have moved
 --         (tests/graphs/test_dissolve.lua).
 -- Run:    rapid run graphs/dissolve.lua -f 1-120 -o /tmp/dissolve.mp4
 local rapid = require "rapid"
@@ -9,7 +9,7 @@ local rapid = require "rapid"
 local count = rapid.param("count", 60000, "points")
 local duration = rapid.param("duration", 3, "seconds in which it goes")
 
--- A pawn, turned from its outline {radius, height}; red is painted from 0, what goes first, to 1.
+-- A pawn, turned from its outline {radius, height}; red is painted from 0 (goes first) to 1.
 local outline = {
   {0, 0}, {0.42, 0}, {0.44, 0.1}, {0.36, 0.18}, {0.36, 0.24}, {0.24, 0.36}, {0.17, 0.6}, {0.15, 0.84}, {0.3, 0.9},
   {0.3, 0.95}, {0.16, 1}, {0.24, 1.09}, {0.27, 1.2}, {0.24, 1.31}, {0.15, 1.41}, {0, 1.45},

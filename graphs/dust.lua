@@ -1,4 +1,4 @@
--- dust: a boulder breaks, and every piece drags a plume of dust behind it.
+-- dust: a boulder breaks, and every piece drags a plume of dust along.
 --
 -- Shows:  births all the time along the paths of other points, by an attribute of theirs; Alpha that fades with age.
 -- Proves: dust is born on the paths of the pieces, without gaps, and only as long as they fly

@@ -1,9 +1,9 @@
 -- fireworks: shells rise, burst at the top into stars, and stars draw trails of sparks.
 --
--- Each generation is a chain of its own, which is spawned from the chain before: bursts are at the place and
--- moment of a shell's end, within the frame, and trails are streams without beads along the stars' paths.
+-- Each generation is a chain of its own, spawned from the previous chain: a burst is at the place and time of a shell's
+-- end, within the frame, and trails are continuous streams along the stars' paths.
 --
--- Shows:  :spawn, on = "death", a rate of each parent, inherit.
+-- Shows:  :spawn, on = "death", a rate for each parent, inherit.
 -- Proves: a star is born where its shell ends, on its parabola; the sparks of a star are on its path at even times
 --         (tests/graphs/test_fireworks.lua).
 -- Run:    rapid run graphs/fireworks.lua -f 1-96 --camera 0,9,25,0,8.6,0 -o /tmp/fireworks.####.png

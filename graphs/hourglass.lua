@@ -1,7 +1,7 @@
--- hourglass: sand runs through the neck of a funnel, as fast as the neck is wide and however much is above.
+-- hourglass: sand runs through the neck of a funnel at a rate set by the neck, not by the height of the sand.
 --
--- Shows:  :contact beside a level set that curves; a heap that grows under the stream.
--- Proves: as much sand passes in each half second, however little is left above, and none is in the glass
+-- Shows:  :contact next to a curved level set; a heap that grows under the stream.
+-- Proves: the same amount passes in each half second, however little is left above, and no sand is in the glass
 --         (tests/graphs/test_hourglass.lua).
 -- Run:    rapid run graphs/hourglass.lua -f 1-144 -o /tmp/hourglass.####.png
 local rapid = require "rapid"

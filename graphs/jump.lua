@@ -1,6 +1,6 @@
 -- jump: a wet figure hops; drops tear off it, and splash where they hit the floor.
 --
--- Shows:  births on a body that moves, response = "stick" with adhesion, a second chain born at the hits of the first.
+-- Shows:  births on a moving body, response = "stick" with adhesion, a second chain born at the hits of the first.
 -- Proves: drops ride on the figure until it takes more than their adhesion; droplets begin on the floor
 --         (tests/graphs/test_jump.lua).
 -- Run:    rapid run graphs/jump.lua -f 1-96 -o /tmp/jump.mp4
@@ -19,7 +19,7 @@ for k = 0, 3 do -- arms up, legs apart
   end
 end
 
--- A second in the air, and a quarter of one on the ground.
+-- One second in the air, and a quarter of a second on the ground.
 local function hop(frame)
   local t = math.min(frame.time % 1.1, 0.85)
   return rapid.translate(0, 9.81 / 2 * t * (0.85 - t), 0) * rapid.rotate({0, 1, 0}, 150 * t)

@@ -1,6 +1,6 @@
 -- magic: two wands draw rings of light that wind around each other and scatter when they grow old.
 --
--- Shows:  emission from points, two emitters in one chain, groups that a kernel joins, and edits of a group alone.
+-- Shows:  emission from points, two emitters in one chain, groups that a kernel joins, and edits of one group only.
 -- Proves: a point is in "loose" exactly when it is older than 0.9 s (tests/graphs/test_magic.lua).
 -- Run:    rapid run graphs/magic.lua -f 1-96 -o /tmp/magic.####.png
 local rapid = require "rapid"
@@ -8,7 +8,7 @@ local rapid = require "rapid"
 local rate = rapid.param("rate", 6000, "lights born per second at each wand")
 local turn = rapid.param("turn", 5, "radians a second about the axis")
 
--- Twelve places on a circle, each with a velocity of its own that its children inherit.
+-- Twelve points on a circle, each with its own velocity that its children inherit.
 local function wand(radius, height, lift)
   local places, velocities = {}, {}
   for k = 1, 12 do
@@ -25,7 +25,7 @@ return rapid.create { fps = 24, seed = 5 }
   :emit    { source = wand(0.35, 2.3, -1.1), rate = rate, birth = "even", life = {1.2, 2},
              attributes = { Cd = {1, 0.4, 0.8} } }
   :points  ("wind", function(p)
-      -- Turn the place itself about the y axis, and draw the ring together.
+      -- Turns the position about the y axis, and contracts the ring.
       local P, angle = p.P, turn * p.dt
       local c, s = math.cos(angle), math.sin(angle)
       local pull = math.exp(-0.35 * p.dt)

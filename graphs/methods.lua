@@ -1,18 +1,18 @@
 -- methods: a sheet of grains meets a floor, by each of the three methods (figures 3 and 4 of the paper).
 --
--- Left, "project": what is below the floor after a step is put onto it, and leaves as one: the steps of figure 3.
--- Middle, "backtrack": it is taken back to the floor first, as in figure 4; right, "continuous": it is met on its way.
+-- Left, "project": a point below the floor after a step is moved onto the floor, which makes the steps of figure 3.
+-- Middle, "backtrack": it is first moved back to the floor, as in figure 4. Right, "continuous": it hits on its path.
 --
 -- Shows:  method, and a collider for a group.
--- Proves: continuous keeps the sheet's rows apart to rounding, backtrack to what a point falls in a step, project does
---         not (tests/graphs/test_methods.lua).
+-- Proves: continuous keeps the sheet's rows apart to rounding, backtrack to one step's fall, and project does not
+--         (tests/graphs/test_methods.lua).
 -- Run:    rapid run graphs/methods.lua -f 1-14 --camera 2.9,1.1,5.4,2.9,0.75,0 -o /tmp/methods.####.png
 local rapid = require "rapid"
 
 local methods = { "project", "backtrack", "continuous" }
 local columns, rows, apart, lane = 30, 44, 0.028, 2
 
--- A row is born above the one before it, and takes the same way, later.
+-- Each row is born above the one before it, and follows the same path later.
 local P, v, Cd, of = {}, {}, {}, {}
 for k = 1, #methods do
   for row = 1, rows do
@@ -27,7 +27,7 @@ end
 
 local scene = rapid.create { fps = 24, points = rapid.points.from { P = P, v = v, Cd = Cd, of = of } }
   :gravity {}
--- Deeper, and wider, than a step goes: what is put out by the nearest way is to come out on top.
+-- Deeper and wider than a step goes, so that the nearest way out is the top.
 local floor = rapid.levelset.box { size = {7.4, 1.3, 1.3}, center = {2.8, -0.65, 0}, voxel = 0.03 }
 for k, method in ipairs(methods) do
   scene = scene

@@ -1,8 +1,8 @@
 -- mill: grain falls on a turning cross of paddles, is thrown off, and drifts away in the wind.
 --
--- Shows:  a collider that moves (transform, a function of the frame that is asked between frames too), forces, an
---         action inside the solver, and a tolerance in place of a number of sub-steps.
--- Proves: no grain is inside a paddle or below the floor, and the error of each frame is what was asked for
+-- Shows:  a collider that moves (transform, a function of the frame that is also evaluated between frames), forces, an
+--         action inside the solver, and a tolerance instead of a number of sub-steps.
+-- Proves: no grain is inside a paddle or below the floor, and the error of each frame meets the tolerance
 --         (tests/graphs/test_mill.lua).
 -- Run:    rapid run graphs/mill.lua -f 1-96 -o /tmp/mill.####.png
 local rapid = require "rapid"
@@ -20,7 +20,7 @@ end
 return rapid.create { fps = 24, seed = 5 }
   :emit    { source = rapid.mesh.box { size = {0.7, 0.05, 0.5}, center = {0.25, 2.4, 0} }, rate = rate, life = 3,
              velocity = {0, -1, 0}, spread = 8, attributes = { Cd = {0.95, 0.8, 0.35} } }
-  -- Inside Solve, at every sub-step: grain that is thrown high is lit up by its speed.
+  -- Runs inside Solve, at every sub-step: grain that is thrown high glows with its speed.
   :action  ("glow", function(p, step)
       p.Cd = p.Cd:lerp(p.v:length() > 4 and vec3(1, 0.35, 0.1) or vec3(0.95, 0.8, 0.35), 4 * step.dt)
     end)

@@ -1,7 +1,7 @@
 -- morph: a ball of points becomes a knot.
 --
 -- Shows:  :goal to a mesh, each point at its own time, and a node before it that leads points astray.
--- Proves: at 3.5 s each point is at rest at a place of its own on the knot (tests/graphs/test_morph.lua).
+-- Proves: at 3.5 s each point rests at its own place on the knot (tests/graphs/test_morph.lua).
 -- Run:    rapid run graphs/morph.lua -f 1-108 -o /tmp/morph.mp4
 local rapid = require "rapid"
 

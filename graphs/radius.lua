@@ -1,10 +1,10 @@
--- radius: beads on a ring, by their middles and by their surfaces (figure 5 of the paper).
+-- radius: beads on a ring, colliding by their centres and by their surfaces (figure 5 of the paper).
 --
--- Left, radius = 0: a bead is hit when its middle is, and sinks in to its equator. Right, the attribute pscale: it
--- rests on the ring. The level set's band was made as narrow as can be; Solve widens it to what the beads need.
+-- Left, radius = 0: a bead collides with its centre, and sinks in to its equator. Right, the attribute pscale: the bead
+-- rests on the ring. The level set's band is as narrow as possible; Solve widens it as far as the beads need.
 --
 -- Shows:  pscale, the radius of collisions, and the bodies of points in a picture.
--- Proves: beads on the right touch the ring, those on the left are in it by their radius
+-- Proves: beads on the right touch the ring, and those on the left sink in by their radius
 --         (tests/graphs/test_radius.lua).
 -- Run:    rapid run graphs/radius.lua -f 1-72 --camera 1,1.9,4.2,1,0.35,0 -o /tmp/radius.####.png
 local rapid = require "rapid"

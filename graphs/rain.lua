@@ -1,7 +1,7 @@
--- rain: it falls on an umbrella, runs down and drips from the rim, until the umbrella is twirled.
+-- rain: rain falls on an umbrella, runs down and drips from the rim, until the umbrella is twirled.
 --
--- Shows:  response = "slide" with viscosity and adhesion on a body that turns; droplets born at hits.
--- Proves: what lies on the canopy runs down at g sin a / viscosity, and drops leave the rim when it is twirled
+-- Shows:  response = "slide" with viscosity and adhesion on a rotating body; droplets born at hits.
+-- Proves: drops run down the canopy at g sin a / viscosity, and leave the rim when it is twirled
 --         (tests/graphs/test_rain.lua).
 -- Run:    rapid run graphs/rain.lua -f 1-120 -o /tmp/rain.mp4
 local rapid = require "rapid"
@@ -9,7 +9,7 @@ local rapid = require "rapid"
 local rate = rapid.param("rate", 9000, "drops per second")
 local viscosity = rapid.param("viscosity", 16, "of drops on the canopy, 1/s")
 
--- A cap of a ball of 1.1 m, whose rim is at 1.28 m, and a stick.
+-- A cap of a ball of radius 1.1 m, with its rim at a height of 1.28 m, and a stick.
 local canopy = rapid.levelset.sphere { radius = 1.1, center = {0, 0.7, 0}, voxel = 0.02 }
   :subtract(rapid.levelset.sphere { radius = 1.04, center = {0, 0.7, 0}, voxel = 0.02 })
   :intersect(rapid.levelset.box { size = {3, 1, 3}, center = {0, 1.78, 0}, voxel = 0.02 })
@@ -19,7 +19,7 @@ for k = 0, 7 do -- a bight between each two ribs
   canopy = canopy:subtract(rapid.levelset.sphere { radius = 0.32, center = middle, voxel = 0.02 })
 end
 
--- Four turns, from 2.5 s to 4.5 s.
+-- The umbrella makes four turns, from 2.5 s to 4.5 s.
 local function twirl(frame)
   return rapid.rotate({0, 1, 0}, 1440 * rapid.math.smoothstep(2.5, 4.5, frame.time))
 end

@@ -1,7 +1,7 @@
 -- ribbons: lights circle the tip of a wand that is swung, and leave ribbons behind.
 --
 -- Shows:  :trail, drawn as lines that shine; a kernel that knows where the wand is.
--- Proves: the places of a trail are those of the frames before, in their order (tests/graphs/test_ribbons.lua).
+-- Proves: a trail holds the positions of the previous frames, in order (tests/graphs/test_ribbons.lua).
 -- Run:    rapid run graphs/ribbons.lua -f 1-96 -o /tmp/ribbons.mp4
 local rapid = require "rapid"
 

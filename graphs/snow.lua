@@ -1,7 +1,7 @@
--- snow: it settles on a fir until the fir is shaken, and comes down in a cloud. It begins two seconds before frame 1.
+-- snow: snow settles on a fir, and comes down in a cloud when the fir is shaken. It begins two seconds before frame 1.
 --
--- Shows:  response = "stick" with an adhesion on a body that moves; meshes made in the scene.
--- Proves: flakes stay where they have come to lie, until the fir's motion takes more than their adhesion
+-- Shows:  response = "stick" with an adhesion on a moving body; meshes made in the scene.
+-- Proves: flakes stay where they landed until the fir's motion exceeds their adhesion
 --         (tests/graphs/test_snow.lua).
 -- Run:    rapid run graphs/snow.lua -f 1-132 -o /tmp/snow.mp4
 local rapid = require "rapid"
@@ -24,7 +24,7 @@ end
 local fir = rapid.levelset.box { size = {0.14, 0.5, 0.14}, center = {0, 0.22, 0}, voxel = 0.025 }
 for k = 0, 4 do fir = fir:union(tier(0.85 - 0.15 * k, 0.35 + 0.36 * k, 0.95 + 0.37 * k)) end
 
--- Still until frame 82; then it is shaken for a second.
+-- The fir is still until frame 82; then it is shaken for a second.
 local function shaken(frame)
   local t = rapid.math.clamp(frame.time - 5.4, 0, 1)
   return rapid.rotate({0.3, 0, 1}, 5 * math.sin(math.pi * t) * math.sin(2 * math.pi * 5 * t))

@@ -1,7 +1,7 @@
 -- splash: drops fall on a stone in a pool, and throw up crowns of droplets where and when they hit.
 --
--- Shows:  on = "hit" with the least speed, births off the surface along its normal, split, a second chain.
--- Proves: droplets begin at contacts of their drops, on a surface, and have the mass of the drop together
+-- Shows:  on = "hit" with a minimum speed, births off the surface along its normal, split, a second chain.
+-- Proves: droplets begin at contacts of their drops, on a surface, and together have the mass of the drop
 --         (tests/graphs/test_splash.lua).
 -- Run:    rapid run graphs/splash.lua -f 1-72 --camera 0,1.6,4.2,0,0.5,0 -o /tmp/splash.####.png
 local rapid = require "rapid"

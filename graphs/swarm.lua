@@ -1,7 +1,7 @@
--- swarm: fireflies wind their way through pillars to a lamp, and there become a ring.
+-- swarm: fireflies wind their way through pillars to a lamp, and form a ring there.
 --
 -- Shows:  :look_ahead, :arrive and :goal, in one chain.
--- Proves: nobody touches a pillar, and everybody is on the ring at 4.5 s (tests/graphs/test_swarm.lua).
+-- Proves: no firefly touches a pillar, and all are on the ring at 4.5 s (tests/graphs/test_swarm.lua).
 -- Run:    rapid run graphs/swarm.lua -f 1-120 -o /tmp/swarm.####.png
 local rapid = require "rapid"
 

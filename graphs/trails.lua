@@ -1,7 +1,7 @@
--- trails: fragments of a blast bounce on the ground, and leave dust behind them all the way.
+-- trails: fragments of a blast bounce on the ground, and leave dust along their paths.
 --
 -- Shows:  continuous births from a chain that collides: the stream follows each bounce within the frame; source_group.
--- Proves: dust is born on the fragments' paths, never below the ground, and as much of each as its rate says
+-- Proves: dust is born on the fragments' paths, never below the ground, and each emits as much as its rate says
 --         (tests/graphs/test_trails.lua).
 -- Run:    rapid run graphs/trails.lua -f 1-60 --camera 0,2.2,11,0,1.6,0 -o /tmp/trails.####.png
 local rapid = require "rapid"

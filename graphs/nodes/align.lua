@@ -1,7 +1,7 @@
 -- align: a field of scales stands up as a wave of normals passes: bright where they face the viewer.
 --
 -- Shows:  :align; the picture is frame 30.
--- Proves: tests/lua/nodes/test_align.lua: the axis is where the attribute points, and comes there in time.
+-- Proves: tests/lua/nodes/test_align.lua: the axis points along the attribute, and gets there in time.
 -- Run:    rapid run graphs/nodes/align.lua -f 30 --size 288x162 -o /tmp/align.png
 local rapid = require "rapid"
 

@@ -1,4 +1,4 @@
--- align_to_velocity: darts look where they fly: their colour is the direction in which their z axis points.
+-- align_to_velocity: darts point where they fly; their colour is the direction of their z axis.
 --
 -- Shows:  :align_to_velocity; the picture is frame 36.
 -- Proves: tests/lua/nodes/test_align_to_velocity.lua has its closed form.

@@ -1,7 +1,7 @@
--- follow_leader: a swarm goes after one point that circles.
+-- follow_leader: a swarm follows one point that circles.
 --
 -- Shows:  :follow_leader; the picture is frame 60.
--- Proves: tests/lua/nodes/test_follow_leader.lua: each comes to its place, at most at its speed.
+-- Proves: tests/lua/nodes/test_follow_leader.lua: each point reaches its place, at most at its speed.
 -- Run:    rapid run graphs/nodes/follow_leader.lua -f 60 --size 288x162 -o /tmp/follow_leader.png
 local rapid = require "rapid"
 

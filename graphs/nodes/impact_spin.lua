@@ -1,7 +1,7 @@
--- impact_spin: pebbles hit a slope and turn from there on: dark while they only fall.
+-- impact_spin: pebbles hit a slope and spin from then on; those that only fall are dark.
 --
 -- Shows:  :impact_spin; the picture is frame 40.
--- Proves: tests/lua/nodes/test_impact_spin.lua: what has hit turns as it would roll.
+-- Proves: tests/lua/nodes/test_impact_spin.lua: a point that has hit turns as if it rolled.
 -- Run:    rapid run graphs/nodes/impact_spin.lua -f 40 --size 288x162 -o /tmp/impact_spin.png
 local rapid = require "rapid"
 

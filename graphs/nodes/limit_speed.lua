@@ -1,4 +1,4 @@
--- limit_speed: a burst that a bound keeps in a dome: whatever is thrown, no point is faster than 1.2 m/s.
+-- limit_speed: a burst that a speed limit holds in a dome: no point is faster than 1.2 m/s.
 --
 -- Shows:  :limit_speed; the picture is frame 20.
 -- Proves: tests/lua/nodes/test_limit_speed.lua has its closed form.

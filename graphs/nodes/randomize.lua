@@ -1,4 +1,4 @@
--- randomize: a bed of gravel: few large stones, many small ones.
+-- randomize: a bed of gravel with few large stones and many small ones.
 --
 -- Shows:  :randomize; the picture is frame 3.
 -- Proves: tests/lua/nodes/test_randomize.lua has its closed form.

@@ -1,4 +1,4 @@
--- spin: a field of coins, each turning at its own rate: bright where it faces up.
+-- spin: a field of coins, each turning at its own rate, bright where it faces up.
 --
 -- Shows:  :spin; the picture is frame 30.
 -- Proves: tests/lua/nodes/test_spin.lua has its closed form.

@@ -1,4 +1,4 @@
--- torque: light balls come up to speed sooner than heavy ones: the faster they turn, the brighter.
+-- torque: light balls spin up sooner than heavy ones; the faster they turn, the brighter they are.
 --
 -- Shows:  :torque; the picture is frame 30.
 -- Proves: tests/lua/nodes/test_torque.lua has its closed form.

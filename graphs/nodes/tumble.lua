@@ -1,4 +1,4 @@
--- tumble: leaves fall, each turning by an angular velocity of its own: bright where the light meets them.
+-- tumble: leaves fall, each turning with its own angular velocity, bright where the light hits them.
 --
 -- Shows:  :tumble; the picture is frame 30.
 -- Proves: tests/lua/nodes/test_tumble.lua has its closed form.

@@ -1,4 +1,4 @@
--- smoke: a plume of points that rises and curls, and the sequence of volumes that ash.lua reads.
+-- smoke: a plume of points that rises and curls, and writes the sequence of volumes that ash.lua reads.
 --
 -- Run:    rapid run graphs/smoke/smoke.lua -f 49-113x16 --set to=graphs/smoke/smoke.####.vdb
 local rapid = require "rapid"

@@ -1,7 +1,7 @@
--- action: one circle, drawn by two actions: a force that depends on the place, and one that depends on the velocity.
+-- action: the same circle by two actions: a force that depends on the position, and one that depends on the velocity.
 --
--- Shows:  what decides the order of an :action. Solve calls it in the middle of a sub-step, when P is there already and
---         v is still the old one. A force of P is of second order; a force of v, here that of a magnet, is of first.
+-- Shows:  what decides the order of an :action. Solve calls it in the middle of a sub-step, when P is already there but
+--         v is still the old one. A force of P is of second order; a force of v, here a magnet's, is of first order.
 -- Proves: the orders are 2 and 1 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/action.lua -o /tmp/action
 local rapid = require "rapid"

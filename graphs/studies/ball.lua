@@ -1,14 +1,14 @@
--- ball: dropped from 2 m, against the parabolas between its bounces.
+-- ball: a ball dropped from 2 m, compared with the parabolas between its bounces.
 --
--- Shows:  the three methods of :collide. "continuous" meets the contact at its moment, on the parabola, and is exact at
+-- Shows:  the three methods of :collide. "continuous" finds the contact at its time, on the parabola, and is exact at
 --         one sub-step; "backtrack" and "project" (the paper's §4.2 and §4.1) look after each step, and converge.
--- Proves: continuous is exact, and each of the others worse at any number of sub-steps (tests/graphs/test_studies.lua).
+-- Proves: continuous is exact, and the others are worse at any number of sub-steps (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/ball.lua -o /tmp/ball
 local rapid = require "rapid"
 
 local g, top, bounce = 9.81, 2, 0.7
 
--- Flight follows flight, each with `bounce` times the speed of the one before, until they take no time.
+-- Sums the flights, each with `bounce` times the speed of the one before, until they take no time.
 local function height(time)
   local landing = math.sqrt(2 * top / g)
   if time <= landing then return top - g * time ^ 2 / 2 end

@@ -1,10 +1,10 @@
--- collapse: a column of grain that comes down along a wall, by the deepest overlap that is left at the end of a frame.
+-- collapse: a column of grain collapses along a wall; the error is the deepest overlap at the end of a frame.
 --
--- Shows:  error = "residual": what is left of the constraints themselves, in metres, which needs no reference; and
---         sub-steps before iterations (Macklin et al. 2019): as many sweeps leave less as sub-steps of one iteration
---         each than as iterations of eight sub-steps.
--- Proves: sub-steps leave less than as many iterations do, from 32 on less than a third, from 64 on less than a
---         tenth, and less with each doubling (tests/graphs/test_studies.lua).
+-- Shows:  error = "residual": the violation of the constraints themselves, in metres, which needs no reference; and
+--         sub-steps before iterations (Macklin et al. 2019): the same number of sweeps leaves less overlap as sub-steps
+--         of one iteration each than as iterations in eight sub-steps.
+-- Proves: sub-steps leave less overlap than the same number of iterations, from 32 on less than a third, from 64 on
+--         less than a tenth, and less with each doubling (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/collapse.lua -o /tmp/collapse
 local rapid = require "rapid"
 
@@ -13,7 +13,7 @@ local step = 2.1 * r
 local places = {}
 for k = 0, side * side * high - 1 do
   local i, j, layer = k % side, math.floor(k / side) % side, math.floor(k / side / side)
-  local off, across = 0.02 * ((k * 0.754878) % 1), 0.02 * ((k * 0.569840) % 1) -- or it would stand
+  local off, across = 0.02 * ((k * 0.754878) % 1), 0.02 * ((k * 0.569840) % 1) -- or the column would stand
   places[k + 1] = {step * (i + 0.5 + off), step * (layer + 0.5), step * (j + 0.5 + across)}
 end
 
@@ -33,7 +33,7 @@ return rapid.study {
       :collide (wall({0, 0, -1}, -step * side))
       :contact { radius = r, friction = 0.3 }
       :solve   { substeps = by_substeps and k.sweeps or 8, iterations = by_substeps and 1 or k.sweeps / 8,
-                 sleep = math.huge } -- all take part in what is timed
+                 sleep = math.huge } -- so that all points are in the timing
   end,
   frames = {1, 37},
   sweep  = { sweeps_as = {"sub-steps", "iterations"}, sweeps = {8, 16, 32, 64, 128} },

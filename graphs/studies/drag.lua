@@ -1,15 +1,15 @@
--- drag: points that air slows, in three ways, against the exponential.
+-- drag: points slowed by air in three ways, compared with the exponential.
 --
--- Shows:  where an edit of v belongs. In :points it is made once a frame, and no sub-step makes it better. In :action
---         it is made at each sub-step: first order, since it depends on the velocity that it writes. :drag hands Solve
---         its rate, and is exact.
+-- Shows:  where an edit of v belongs. In :points it is made once a frame, and no sub-step improves it. In :action it is
+--         made at each sub-step: first order, since it depends on the velocity that it writes. :drag hands Solve its
+--         rate, and is exact.
 -- Proves: the node is exact, the action of order 1, the kick of order 0 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/drag.lua -o /tmp/drag
 local rapid = require "rapid"
 
 local rate, count = 3, 1000 -- 1/s
 
--- Where points are that started from 0 with a velocity of their own.
+-- Returns the state of points that started from 0 with their own velocities.
 local function slowed(time)
   local P, v = {}, {}
   for i = 1, count do

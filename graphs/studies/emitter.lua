@@ -1,17 +1,17 @@
--- emitter: a point that runs round a circle and leaves others behind, against the circle.
+-- emitter: a point that runs round a circle and leaves others along the way, compared with the circle.
 --
 -- Shows:  motion, the path of an emitter between frames (the paper's §3): "none" leaves points where the frame ends,
---         "linear" on a chord, "spline" on a curve that bends as the circle does. The step is a frame.
+--         "linear" on a chord, "spline" on a curve that bends like the circle. The step is a frame.
 -- Proves: the orders are 1, 2 and 3 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/emitter.lua -o /tmp/emitter
 local rapid = require "rapid"
 
 local rate, omega = 1000, 2 -- 1/s, rad/s
-local size = 1e-7 -- m, of the emitter: below the rounding of single precision
+local size = 1e-7 -- m, of the emitter: below single-precision rounding
 
 local function turning(frame) return rapid.rotate({0, 1, 0}, math.deg(omega * frame.time)) end
 
--- The k-th is born at (k + 1) / rate, and stays there.
+-- Point k is born at (k + 1) / rate, and stays there.
 local function left_behind(time)
   local P = {}
   for k = 1, math.floor(rate * time + 1e-6) do P[k] = {math.cos(omega * k / rate), 0, -math.sin(omega * k / rate)} end

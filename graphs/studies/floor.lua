@@ -1,14 +1,14 @@
--- floor: a ball on a floor that rises, against the parabolas between its bounces.
+-- floor: a ball on a rising floor, compared with the parabolas between its bounces.
 --
--- Shows:  a collider that moves. What bounces is the velocity relative to the floor, at the moment of the contact;
---         "backtrack" and "project" take the floor where it is after the step.
--- Proves: continuous is exact; the others converge, and are worse (tests/graphs/test_studies.lua).
+-- Shows:  a moving collider. The velocity relative to the floor bounces, at the time of the contact; "backtrack" and
+--         "project" use the floor's position after the step.
+-- Proves: continuous is exact; the others converge and are worse (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/floor.lua -o /tmp/floor
 local rapid = require "rapid"
 
 local g, top, rise, bounce = 9.81, 1, 0.8, 0.6
 
--- Above the floor, for the floor is as good a place to stand as any: thrown down at the speed at which the floor rises.
+-- Returns the height in the floor's frame, in which the ball is thrown down at the floor's speed.
 local function above_floor(time)
   local height, speed = top, -rise
   while true do

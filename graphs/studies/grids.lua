@@ -1,7 +1,7 @@
--- grids: rubble of radii from 1 to 16 comes down, by the grids that its contacts are looked for in (the paper's §5.2).
+-- grids: rubble of radii from 1 to 16 comes down, by the number of grids in the contact search (the paper's §5.2).
 --
--- Shows:  max_grids, and that it trades nothing but time: pairs, and so places, are the same by any number of grids, to
---         the bit; with one, small grains are looked for in the cells of the large.
+-- Shows:  max_grids affects only time: pairs, and so positions, are bit-identical for any number of grids; with one
+--         grid, small grains are searched in the cells of the large ones.
 -- Proves: the error is 0 in every row (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/grids.lua -o /tmp/grids
 local rapid = require "rapid"
@@ -9,7 +9,7 @@ local rapid = require "rapid"
 local places, radii, masses = {}, {}, {}
 local count = 3000
 for k = 1, count do
-  -- Few are large: as many in each doubling of the volume.
+  -- Few are large: each doubling of the volume has the same number.
   local r = 0.01 * 16 ^ (((k * 0.618034) % 1) ^ 6)
   radii[k], masses[k] = r, 1e4 * r ^ 3
   places[k] = {(k * 0.754878) % 1, 0.2 + 3 * k / count, (k * 0.569840) % 1}

@@ -1,8 +1,8 @@
--- impacts: balls that fly into others at rest, obliquely, by where all of them are afterwards.
+-- impacts: balls that hit others at rest, obliquely; the error is in the positions of all of them afterwards.
 --
--- Shows:  impacts at their times within a sub-step. Where forces are constant in it they are exact; where these depend
---         on the place an impact is of order 2. Where they depend on the velocity it is of order 1, as the force after
---         an impact is that of the velocity before.
+-- Shows:  impacts at their times within a sub-step. If forces are constant in it they are exact; if forces depend on
+--         position, an impact is of order 2. If they depend on velocity it is of order 1, as the force after an impact
+--         is that of the velocity before.
 -- Proves: both orders (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/impacts.lua -o /tmp/impacts
 local rapid = require "rapid"

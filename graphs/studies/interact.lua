@@ -1,7 +1,7 @@
--- interact: pairs that come near and are driven apart, against the oscillator that each of them is.
+-- interact: pairs that come near and are driven apart, compared with the oscillator that each pair is.
 --
--- Shows:  neighbours that are found at every sub-step. With w = 1 - d / radius the separation of two points is a spring
---         of the rest length `radius`: d'' = 2 separation (1 - d / radius).
+-- Shows:  neighbours found at every sub-step. With w = 1 - d / radius the separation of two points is a spring with the
+--         rest length `radius`: d'' = 2 separation (1 - d / radius).
 -- Proves: the order by sub-steps is 2 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/interact.lua -o /tmp/interact
 local rapid = require "rapid"
@@ -10,7 +10,7 @@ local pairs_along, spacing = 10, 10 -- in x and z; m, many radii
 local radius, separation = 1, 40 -- m, m/s²
 local omega = math.sqrt(2 * separation / radius)
 
--- The distance between the two of a pair that is 0.9 m at first and closes at `speed`.
+-- Returns the distance within a pair that is 0.9 m at first and closes at `speed`.
 local function distance(speed, time)
   return radius - 0.1 * math.cos(omega * time) - speed / omega * math.sin(omega * time)
 end
@@ -40,7 +40,7 @@ return rapid.study {
       :interact { radius = radius, separation = separation }
       :solve { substeps = k.substeps }
   end,
-  frames = {1, 6}, -- within half a period, in which they stay within the radius
+  frames = {1, 6}, -- within half a period, so that they stay within the radius
   sweep  = { substeps = {2, 4, 8, 16, 32} },
   reference = function(frame) return state(frame.time) end,
 }

@@ -1,9 +1,9 @@
--- net: a square net that hangs from two corners and swings, by how far its links are stretched at the worst.
+-- net: a square net hangs from two corners and swings; the error is the greatest stretch of a link.
 --
--- Shows:  sub-steps before iterations (Macklin et al. 2019): as many sweeps stretch a net less as sub-steps of one
---         iteration each than as iterations of four sub-steps. Chains and trees are solved directly, at once; a net is
---         not.
--- Proves: sub-steps stretch it less than iterations at each cost, and less with each doubling
+-- Shows:  sub-steps before iterations (Macklin et al. 2019): the same number of sweeps stretches a net less as
+--         sub-steps of one iteration each than as iterations in four sub-steps. Chains and trees are solved directly; a
+--         net is not.
+-- Proves: sub-steps stretch the net less than iterations at each cost, and less with each doubling
 --         (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/net.lua -o /tmp/net
 local rapid = require "rapid"
@@ -20,7 +20,7 @@ for i = 0, side - 1 do
   end
 end
 
--- The largest strain of all links, in all frames, which follow each other.
+-- Returns the largest strain of all links in all frames, whose columns follow each other.
 local function strain(points)
   local worst = 0
   for frame = 0, #points.P - 1, side * side do

@@ -1,15 +1,15 @@
--- orbit: a thousand points on a circle about an attracting centre, against the circle itself.
+-- orbit: a thousand points on a circle about an attracting centre, compared with the circle itself.
 --
--- Shows:  a force that is solved by steps: :attract, of second order. Twice the sub-steps, a quarter of the error.
+-- Shows:  a force that is integrated in steps: :attract, of second order. Doubling the sub-steps quarters the error.
 -- Proves: the order is 2 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/orbit.lua -o /tmp/orbit
 local rapid = require "rapid"
 
 local count, radius, strength = 1000, 1, 4
-local speed = math.sqrt(strength / radius) -- where the attraction strength / radius² bends the path into the circle
+local speed = math.sqrt(strength / radius) -- the attraction strength / radius² then bends the path into the circle
 local omega = speed / radius
 
--- The points' places on the circle at a time: they are evenly spread, and turn about y.
+-- Returns the points' state at a time: they are evenly spread on the circle, and turn about y.
 local function on_circle(time)
   local P, v = {}, {}
   for i = 1, count do

@@ -1,15 +1,15 @@
--- rods: free rods that turn and drift, of points whose masses differ by up to ten thousand, against the circles that
--- their ends should follow.
+-- rods: free rods that turn and drift, with point masses that differ by up to ten thousand, compared with the circles
+-- that their ends should follow.
 --
--- Shows:  the force of a rod is the same throughout a sub-step, along the discrete gradient between its places at both
---         ends (Gonzalez 1996), so that the places are of second order, whatever the masses.
--- Proves: order 2 for each ratio of masses (tests/graphs/test_studies.lua).
+-- Shows:  the force of a rod is constant over a sub-step, along the discrete gradient between its positions at both
+--         ends (Gonzalez 1996), so the positions are of second order, whatever the masses.
+-- Proves: order 2 for each mass ratio (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/rods.lua -o /tmp/rods
 local rapid = require "rapid"
 
 local count, length, omega, drift = 50, 1, 5, 0.3 -- rods; m; 1/s; m/s
 
--- Rod i turns about the axis z from an angle of its own; its centre of mass drifts along x.
+-- Rod i turns about the z axis from its own angle; its centre of mass drifts along x.
 local function state(ratio, time)
   local P, v, mass, links = {}, {}, {}, {}
   for i = 1, count do

@@ -1,8 +1,8 @@
--- spring: the same spring as a node and as an action in Lua, against the cosine that both should follow.
+-- spring: the same spring as a node and as an action in Lua, compared with the cosine that both should follow.
 --
--- Shows:  what a node knows and a script can't say: :spring hands Solve its stiffness, which is solved exactly at any
---         step; an :action only adds a force, which Solve takes in the middle of each sub-step: second order, and no
---         further than omega dt = 2.
+-- Shows:  a node has knowledge that a script cannot express: :spring hands Solve its stiffness, which is solved exactly
+--         at any step; an :action only adds a force, which Solve takes in the middle of each sub-step: second order,
+--         and stable only up to omega dt = 2.
 -- Proves: the node is exact, the action of order 2 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/spring.lua -o /tmp/spring
 local rapid = require "rapid"
@@ -11,7 +11,7 @@ local stiffness = 90 -- N/m at a mass of 1 kg
 local omega = math.sqrt(stiffness)
 local count = 1000
 
--- Each point swings about 0 from a place of its own.
+-- Each point swings about 0 from its own position.
 local function swung(time)
   local P = {}
   for i = 1, count do P[i] = {i / count * math.cos(omega * time), 0, 0} end

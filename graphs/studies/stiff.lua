@@ -1,15 +1,15 @@
--- stiff: points on springs in thick air, from soft to a thousand times what a step can follow.
+-- stiff: points on springs in thick air, from soft to a thousand times stiffer than a step can follow.
 --
--- Shows:  that no stiffness and no drag is too stiff. Spring and drag are solved together, exactly, at one sub-step a
+-- Shows:  no stiffness and no drag is too stiff. Spring and drag are solved together, exactly, at one sub-step a
 --         frame, with omega dt from 0.4 to 4,000.
 -- Proves: every row is exact to rounding (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/stiff.lua -o /tmp/stiff
 local rapid = require "rapid"
 
 local count = 1000
-local damping = 0.1 -- of the critical
+local damping = 0.1 -- fraction of the critical damping
 
--- Each swings about 0, from a place of its own and at rest.
+-- Each point swings about 0 from its own position, starting at rest.
 local function swung(time, omega)
   local P = {}
   local turning = omega * math.sqrt(1 - damping ^ 2)

@@ -1,14 +1,14 @@
--- subframes: a drag that a script makes once a frame, by two ways to take smaller steps, against the exponential.
+-- subframes: a drag that a script applies once a frame, with two kinds of smaller steps, compared with the exponential.
 --
--- Shows:  what create's subframes are for. Sub-steps are Solve's own, and a script before Solve does not see them; with
---         sub-frames the whole graph is evaluated more often, and so is the script.
+-- Shows:  the purpose of create's subframes. Sub-steps belong to Solve, and a script before Solve does not see them;
+--         sub-frames evaluate the whole graph more often, including the script.
 -- Proves: by sub-frames the order is 1, by sub-steps 0 (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/subframes.lua -o /tmp/subframes
 local rapid = require "rapid"
 
 local rate, count = 3, 1000 -- 1/s
 
--- Where points are that started from 0 with a velocity of their own.
+-- Returns the state of points that started from 0 with their own velocities.
 local function slowed(time)
   local P, v = {}, {}
   for i = 1, count do

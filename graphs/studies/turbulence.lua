@@ -1,9 +1,9 @@
--- turbulence: points in curling air, against themselves at many sub-steps, for nobody knows their paths.
+-- turbulence: points in curling air, compared with themselves at many sub-steps, since no closed form exists.
 --
--- Shows:  a study whose reference is a setting of its own knobs; error = "p95", which a few points that the swirls tear
---         apart do not decide; a tolerance against a number of sub-steps.
+-- Shows:  a study whose reference is a setting of its own knobs; error = "p95", which ignores the few points that the
+--         swirls separate; a tolerance against a number of sub-steps.
 -- Proves: by sub-steps the order is 2; by a tolerance that falls with the square of the effort, as the error of a frame
---         does, each step of the effort makes the error less (tests/graphs/test_studies.lua).
+--         does, each increase of the effort reduces the error (tests/graphs/test_studies.lua).
 -- Run:    rapid study graphs/studies/turbulence.lua -o /tmp/turbulence
 local rapid = require "rapid"
 

@@ -17,7 +17,7 @@
 namespace rapid {
 namespace {
 
-// A type of an attribute, in Lua.
+// Returns the Lua type of an attribute type.
 std::string_view lua_type(AttributeType type)
 {
     switch (type) {
@@ -34,7 +34,7 @@ std::string_view lua_type(AttributeType type)
     }
 }
 
-// A parameter's type; any where the list does not have it.
+// Returns the Lua type of a parameter, or `any` if the list lacks it.
 std::string lua_type(const Param& param)
 {
     static const std::map<std::string_view, std::string_view> known = {
@@ -92,14 +92,15 @@ std::string lua_type(const Param& param)
     return type;
 }
 
-// :points and :action take a name and a kernel, too.
+// Returns true for :points and :action, which also take a name and a kernel.
 bool takes_kernel(const NodeType& type)
 {
     const Param* kernel = type.find("kernel");
     return kernel && !kernel->internal;
 }
 
-// function(p, frame), as the documentation of the parameter says, or function(p, step).
+// Returns the signature of the kernel: function(p, frame), as the documentation of the parameter says, or function(p,
+// step).
 std::string kernel_of(const NodeType& type)
 {
     const bool action = type.kind == NodeKind::Dynamic;
@@ -122,7 +123,7 @@ std::string fields_of(const std::vector<Param>& params, bool functions, const st
     return text;
 }
 
-// The attributes that every scene has, or that Rapid knows.
+// Returns the attributes that every scene has or that Rapid knows.
 std::string point_fields()
 {
     std::string text;
@@ -160,8 +161,8 @@ std::string annotated(const NodeType& type)
                               required ? "" : "?", type.name, source ? "rapid." : "Node:", type.name);
 }
 
-// rapid.mesh.sphere { ... }, rapid.mesh.read(path), rapid.levelset.from_mesh(mesh, { ... }): required arguments
-// come first, as in lua/rapid.lua.
+// Returns the declaration of a maker: rapid.mesh.sphere { ... }, rapid.mesh.read(path), rapid.levelset.from_mesh(mesh,
+// { ... }). Required arguments come first, as in lua/rapid.lua.
 std::string maker_of(const Maker& maker)
 {
     static const std::map<std::string_view, std::string_view> results = {
@@ -174,7 +175,7 @@ std::string maker_of(const Maker& maker)
     std::vector<Param> first, named;
     for (const Param& param : maker.params) (param.required && own != "from" ? first : named).push_back(param);
 
-    // levelset:offset(metres): a tool of the value that it takes first.
+    // levelset:offset(metres): a tool is a method of its first argument.
     const bool tool = !first.empty() && first.front().name == family;
     if (tool) first.erase(first.begin());
 
@@ -202,7 +203,7 @@ std::string makers_but(const std::set<std::string>& excepted)
     return text;
 }
 
-// Replaces the line `--@NAME WORD...` by the text that generate() makes from the set of its words.
+// Replaces the line `--@NAME WORD...` with the text that generate() makes from the set of its words.
 template <class F>
 void fill_in(std::string& text, const std::string& name, const F& generate)
 {

@@ -1,5 +1,5 @@
-// lua/rapid.d.lua: the graph language as the Lua language server reads it, so that any editor completes and checks
-// nodes, parameters, makers and kernels. Written by `rapid nodes --annotations`.
+// Writes lua/rapid.d.lua, the graph language for the Lua language server: any editor then completes and checks nodes,
+// parameters, makers and kernels. The command is `rapid nodes --annotations`.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// lua/chunk.h in C++. That one is given to ffi.cdef as it stands, so it can have no guard of its own.
+// lua/chunk.h in C++. That file is passed to ffi.cdef unchanged, so it cannot have an include guard of its own.
 #pragma once
 
 extern "C" {

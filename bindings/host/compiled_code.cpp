@@ -9,12 +9,12 @@ namespace rapid {
 namespace {
 
 struct Walk {
-    const void* luajit;  // where the library begins
+    const void* luajit;  // start of the library
     bool is_in_luajit = false;
     bool is_compiled = false;
 };
 
-// The frames of the allocator, those of LuaJIT, and the one that called it: compiled code is in no file.
+// Skips the frames of the allocator and of LuaJIT, and examines their caller: compiled code belongs to no file.
 _Unwind_Reason_Code visit(_Unwind_Context* frame, void* data)
 {
     Walk& walk = *static_cast<Walk*>(data);

@@ -1,13 +1,13 @@
-// Whether LuaJIT asks for memory from code that it compiled, or from its interpreter.
+// Distinguishes memory requests of code that LuaJIT compiled from those of its interpreter.
 //
-// Where a request fails LuaJIT looks for the function that runs, to put its error on that one's stack. While compiled
-// code runs the interpreter's place is out of date: what LuaJIT finds there may be no function, and it ends by a
-// signal.
+// If a request fails, LuaJIT looks for the running function to put its error on that function's stack. While compiled
+// code runs, the interpreter's position is out of date: LuaJIT may find something there that is not a function, and
+// crash.
 #pragma once
 
 namespace rapid {
 
-// Of the request that is being answered: to be called below LuaJIT's allocator. Takes no memory.
+// Returns true if compiled code made the current request. Call it below LuaJIT's allocator. It allocates nothing.
 bool is_asked_by_compiled_code();
 
 }  // namespace rapid

@@ -12,12 +12,12 @@
 namespace rapid {
 namespace {
 
-// A maker as graph code calls it: rapid.mesh.box, rapid.rotate, :transform, :offset.
+// Returns a maker's name in graph code: rapid.mesh.box, rapid.rotate, :transform, :offset.
 std::string shown_name(const Maker& maker, const Table& options)
 {
     const std::size_t dot = maker.name.find('.');
     if (dot == std::string::npos) return ":" + maker.name;
-    // A tool of a level set is its method.
+    // A tool of a level set is a method of it.
     if (maker.params.front().name == "levelset") {
         const auto how = options.named.find("how");
         return ":" + (how == options.named.end() ? maker.name.substr(dot + 1) : *how->second.get<std::string>());

@@ -1,4 +1,5 @@
-// Constructors: what graph code makes, in the main state once and in each worker again, by the order of calls.
+// Constructors of the objects of graph code. The main state makes each object once, and each worker gets it again by
+// the order of calls.
 #pragma once
 
 #include <memory>
@@ -13,23 +14,23 @@ namespace rapid {
 // Native functions of lua/rapid.lua.
 int make_object(State& state);     // (maker, options): the object
 int make_attribute(State& state);  // (name)
-int take_offer(State& state);      // (name): an object of the program that embeds Rapid
+int take_offer(State& state);      // (name): an object offered by the program that embeds Rapid
 
-// The table at `index`, which Rapid's Lua files have made or checked.
+// Returns the table at `index`, which Rapid's Lua files have made or checked.
 std::shared_ptr<const Table> table_at(State& state, int index);
 
-// Error: a value without a name, as in :gravity { 0, -9.81, 0 }.
+// Throws Error if the table has a value without a name, as in :gravity { 0, -9.81, 0 }.
 void check_named(const Table& options);
 
-// Error: a kernel runs now. It would make an object for each point, in states that do not tell each other.
+// Throws Error if a kernel is running. It would make an object for each point, in states that do not share them.
 void refuse_in_kernels(const State& state, const std::string& what, const std::string& remedy);
 
-// Pushes the object of a constructor call: in the main state the one that make() returns, in a worker that of the main
-// state's call.
+// Pushes the object of a constructor call: in the main state the one that make() returns, in a worker the one that the
+// main state's call made.
 template <class F>
 int construct(State& state, const F& make)
 {
-    if (state.is_loaded()) {  // for a function of the frame, which workers never call
+    if (state.is_loaded()) {  // in a function of the frame, which workers never call
         push_object(state, make());
         return 1;
     }

@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-// Leaves the killed points (their places from 0) and the detail values on the stack.
+// Calls the function. Leaves the indices (from 0) of the killed points and the detail values on the stack.
 void call_function(const Kernel& function, const PointSet& points, const Evaluation& now,
                    const KernelArguments& arguments)
 {
@@ -55,7 +55,7 @@ void number_newborn(Flow& flow, std::size_t before)
     flow.simulation->next_id += static_cast<std::int64_t>(born);
 }
 
-// Removes the points whose places, from 0, the list at `index` holds. Returns how many.
+// Removes the points in the list at `index`, which holds indices from 0. Returns their number.
 std::size_t remove_killed(PointSet& points, lua_State* L, int index)
 {
     const auto dead = static_cast<std::size_t>(lua_objlen(L, index));

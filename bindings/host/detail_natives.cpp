@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-constexpr char run_in_registry[] = "rapid.detail";  // in the registry: the run that goes on
+constexpr char run_in_registry[] = "rapid.detail";  // registry key of the current run
 
 DetailRun& detail_run_of(State& state)
 {
@@ -25,7 +25,7 @@ DetailRun& detail_run_of(State& state)
     return *run;
 }
 
-// native.column(name, writable): pointer, stride in scalars, type.
+// native.column(name, writable): returns pointer, stride in scalars, type.
 int column(State& state)
 {
     lua_State* L = state.lua();
@@ -46,14 +46,14 @@ int column(State& state)
     return 3;
 }
 
-// native.has(name)
+// native.has(name): returns true if the set has the attribute.
 int has(State& state)
 {
     lua_pushboolean(state.lua(), detail_run_of(state).points.has(text_at(state.lua(), 1)));
     return 1;
 }
 
-// native.group(name, writable): pointer and stride; nothing for a group that does not exist and is only read.
+// native.group(name, writable): returns pointer and stride, or nothing if the group does not exist and is only read.
 int group(State& state)
 {
     lua_State* L = state.lua();
@@ -68,7 +68,7 @@ int group(State& state)
     return 2;
 }
 
-// native.append(n, dt): makes the column dt, of the frame's length, where it is given.
+// native.append(n, dt): appends n points. If dt is given, makes the column dt, with the frame's length as default.
 int append(State& state)
 {
     lua_State* L = state.lua();
@@ -79,7 +79,7 @@ int append(State& state)
     return 0;
 }
 
-// native.neighbours(place, radius): the places, from 1, of the others.
+// native.neighbours(place, radius): returns the indices, from 1, of the others.
 int neighbours(State& state)
 {
     lua_State* L = state.lua();
@@ -105,7 +105,7 @@ int neighbours(State& state)
     return 1;
 }
 
-// native.reorder(places from 1)
+// native.reorder(indices from 1): reorders the points.
 int reorder(State& state)
 {
     lua_State* L = state.lua();
@@ -148,7 +148,7 @@ std::vector<Value> deaths_in(const PointSet& dead, const std::vector<double>& ti
     return deaths;
 }
 
-// native.events(): what happened in the last step: { hits = {...}, deaths = {...}, births = {...} }.
+// native.events(): returns the last step's events, { hits = {...}, deaths = {...}, births = {...} }.
 int events(State& state)
 {
     const StepRecord* record = detail_run_of(state).record;

@@ -1,4 +1,4 @@
-// The native functions of lua/detail.lua: they work on the set of the running :detail function.
+// Native functions of lua/detail.lua, which act on the set of the running :detail function.
 #pragma once
 
 #include <map>
@@ -11,11 +11,11 @@ namespace rapid {
 
 class State;
 
-// A run of a :detail function on a set, in the main state; one at a time. When it ends, views of its points are no
-// longer valid, and the stack is as before.
+// A run of a :detail function on a set, in the main state; one at a time. Its destructor invalidates the views of its
+// points and restores the stack.
 class DetailRun {
 public:
-    // record: of the last step of the simulation; null where the graph keeps none.
+    // record: the last step of the simulation; null if the graph records none.
     DetailRun(State& state, PointSet& of, const StepRecord* record);
     ~DetailRun();
     DetailRun(const DetailRun&) = delete;
@@ -23,7 +23,7 @@ public:
 
     PointSet& points;
     const StepRecord* const record;
-    // By radius, of the positions at the first search.
+    // Neighbour searches by radius, over the positions at the first search.
     std::map<double, Neighbours> neighbours;
 
     void changed() { neighbours.clear(); }

@@ -28,8 +28,8 @@ void copy_table(lua_State* L, int index)
     lua_replace(L, index);
 }
 
-// Kernels among the arguments are numbered in the order of the type's parameters, in every state alike. Takes them from
-// the table at `index`; returns, in the main state, the kernels by parameter.
+// Takes the kernels from the table of arguments at `index`. They are numbered in the order of the type's parameters,
+// equally in every state. Returns the kernels by parameter in the main state.
 std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type, int index)
 {
     std::map<std::string, ObjectPtr> kernels;
@@ -37,7 +37,7 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     ScriptHost& host = state.host();
     for (const Param& param : type.params) {
         const bool of_the_set = param.type == Kernel::set_function_type;
-        // "function of a point", or that among others.
+        // "function of a point", alone or as one of several types.
         if (!of_the_set && !param.type.ends_with(PointFunction::param_type)) continue;
         if (param.internal)
             push_kernel_of_type(state, type.name);
@@ -65,10 +65,10 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
     return kernels;
 }
 
-// The nodes in the graph that are numbered together, and so many more.
+// Adds to the number of nodes that share this stem in the graph, and returns the sum.
 int count_nodes(lua_State* L, const std::string& stem, int more)
 {
-    constexpr char counts[] = "rapid.node_counts";  // in the registry, by stem
+    constexpr char counts[] = "rapid.node_counts";  // registry key; counts by stem
     lua_getfield(L, LUA_REGISTRYINDEX, counts);
     if (lua_isnil(L, -1)) {
         lua_pop(L, 1);
@@ -84,7 +84,7 @@ int count_nodes(lua_State* L, const std::string& stem, int more)
     return count;
 }
 
-// The variable of graph code that holds the value at `index`; empty if none does.
+// Returns the variable of graph code that holds the value at `index`; empty if none does.
 std::string variable_of(lua_State* L, int index)
 {
     lua_Debug info;
@@ -104,7 +104,7 @@ std::string variable_of(lua_State* L, int index)
     return found;
 }
 
-// A value as a scene writes it: of tables all entries, where messages show some.
+// Returns a value as a scene writes it: with all entries of tables, of which messages show only some.
 std::string written(const Value& value)
 {
     const Table* table = value.table();
@@ -116,8 +116,8 @@ std::string written(const Value& value)
     return fmt::format("{{{}}}", fmt::join(entries, ", "));
 }
 
-// Refuses `:emit { source = chain }`, and says how :spawn takes the arguments, which are on the stack behind the type;
-// and `inherit`, which no rule of likeness leads to inherit_velocity.
+// Refuses `:emit { source = chain }` and shows how :spawn takes the arguments, which follow the type on the stack. Also
+// refuses `inherit`, which is not similar enough to inherit_velocity to be suggested.
 void refuse_former_words(State& state)
 {
     lua_State* L = state.lua();
@@ -152,7 +152,7 @@ void refuse_former_words(State& state)
     throw error;
 }
 
-// Sets the arguments and, where they have one, the name.
+// Sets the arguments and, if given, the name.
 void take_options(Node& node, const Table& options)
 {
     const NodeType& type = *node.type;
@@ -170,7 +170,7 @@ void take_options(Node& node, const Table& options)
     node.arguments.erase(named);
 }
 
-// The inputs are on the stack behind the type and the arguments.
+// Sets the inputs, which follow the type and the arguments on the stack.
 void take_inputs(State& state, Node& node)
 {
     for (int i = 3; i <= lua_gettop(state.lua()); ++i) {
@@ -213,7 +213,7 @@ int make_node(State& state)
     });
 }
 
-// A type that Lua defines must have been defined in this state, too, which has its kernel.
+// Returns true if the type exists. A Lua type must also be defined in this state, which then has its kernel.
 int has_type(State& state)
 {
     lua_State* L = state.lua();
@@ -228,7 +228,7 @@ int has_type(State& state)
     return 1;
 }
 
-// The nearest name is looked for among the shipped types, too, which are loaded when they are first used.
+// Raises an error with the nearest name, including those of shipped types, which are loaded on first use.
 int unknown_type(State& state)
 {
     const Registry& registry = state.host().registry;

@@ -1,4 +1,4 @@
-// The nodes that a graph's body makes: node:type { ... }.
+// Creates the nodes of a graph's body: node:type { ... }.
 #pragma once
 
 namespace rapid {
@@ -7,7 +7,7 @@ class State;
 
 // Native functions of lua/rapid.lua.
 int make_node(State& state);     // (type, arguments, inputs...): the node
-int has_type(State& state);      // (type): whether it is defined in this state
-int unknown_type(State& state);  // (type): an error, always
+int has_type(State& state);      // (type): true if it is defined in this state
+int unknown_type(State& state);  // (type): always an error
 
 }  // namespace rapid

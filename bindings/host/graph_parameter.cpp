@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-// "1,2,3", "{1, 2, 3}" or "5": its numbers. Nothing: a word of it is no number.
+// Returns the numbers of "1,2,3", "{1, 2, 3}" or "5", or nothing if a word is not a number.
 std::vector<double> numbers_in(std::string text)
 {
     std::vector<double> numbers;
@@ -30,7 +30,7 @@ std::vector<double> numbers_in(std::string text)
     return numbers;
 }
 
-// "5000" as a value of the type of the default. Error: the text is no such value.
+// Returns a text such as "5000" as a value of the default's type. Throws Error if it is not one.
 Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
 {
     const auto refuse = [&](const char* wanted) -> Value {

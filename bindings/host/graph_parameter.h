@@ -9,10 +9,10 @@ namespace rapid {
 
 class State;
 
-// The value of an argument that a command line gives as text: true or false, a number, a vec3 {x,y,z}, else the text.
+// Returns the value of an argument given as text on a command line: a boolean, a number, a vec3 {x,y,z}, else the text.
 Value read_argument(const std::string& text);
 
-// Native function of lua/rapid.lua: (name, default, doc): the value.
+// Native function of lua/rapid.lua: takes (name, default, doc) and returns the value.
 int declare_parameter(State& state);
 
 }  // namespace rapid

@@ -20,13 +20,13 @@ namespace {
 
 constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
 
-constexpr std::size_t least_held = std::size_t{16} << 20;  // bytes that are not worth a collection
+constexpr std::size_t least_held = std::size_t{16} << 20;  // bytes below which a collection is not worthwhile
 
-constexpr std::size_t piece = std::size_t{64} << 20;  // bytes that are asked for at once
+constexpr std::size_t piece = std::size_t{64} << 20;  // bytes per request
 
 struct Counts {
     std::size_t held = 0, most = least_held;
-    std::size_t left = piece;  // of the last one; the first is not asked for
+    std::size_t left = piece;  // bytes left of the last request; the first piece is not requested
 };
 
 Counts& counts_of(lua_State* L)
@@ -37,20 +37,20 @@ Counts& counts_of(lua_State* L)
     return counts;
 }
 
-// Of OpenVDB's tree, the nodes above the leaves: each of the two upper kinds has a pointer for every child that it may
-// have, 32^3 and 16^3 of them, and what lies about the origin is in eight of each.
+// OpenVDB's nodes above the leaves: each of the two upper kinds has a pointer for every possible child, 32^3 and 16^3
+// of them, and an object at the origin spans eight nodes of each kind.
 constexpr std::size_t bytes_of_upper_nodes = 8 * (32 * 32 * 32 + 16 * 16 * 16) * sizeof(void*);
 
-// Bytes of an object's arrays, roughly.
+// Returns the approximate bytes of an object's arrays.
 std::size_t weight_of(const Object& object)
 {
-    constexpr std::size_t bytes_of_node = 1024;  // of a graph's
+    constexpr std::size_t bytes_of_node = 1024;  // of a graph node
     if (dynamic_cast<const NodeHandle*>(&object)) return bytes_of_node;
-    // A level set is two grids of floats, the one for queries, whose blocks are about half full, and OpenVDB's, which
-    // some get later and all are charged for.
+    // A level set is two grids of floats: one for queries, whose blocks are about half full, and OpenVDB's, which some
+    // get later but all are charged for.
     constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
-    constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // of grids that do not tell their size
-    if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // its level set is another's, which weighs
+    constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // for grids that do not report their size
+    if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // the level set's owner is charged
     if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
         return bytes_of_upper_nodes + static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
     if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
@@ -58,7 +58,7 @@ std::size_t weight_of(const Object& object)
     if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
     if (dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object))
         return bytes_of_upper_nodes + bytes_of_leaves;
-    // A shape that a program offers holds memory of the program's, which is not known here.
+    // A shape offered by an embedding program uses that program's memory, whose size is unknown.
     constexpr std::size_t bytes_of_shape = std::size_t{64} << 10;
     return dynamic_cast<const Shape*>(&object) ? bytes_of_shape : 0;
 }
@@ -83,7 +83,7 @@ void hold(lua_State* L, const Object& object)
     lua_gc(L, LUA_GCCOLLECT, 0);
     counts.most = std::max(least_held, 2 * counts.held);
     if (!full) return;
-    malloc_trim(0);  // what the collector has let go
+    malloc_trim(0);  // memory released by the collector
     if (!fits_in_memory(piece))
         throw beyond_memory("a further 64 MiB of nodes, level sets, meshes and points", piece,
                             "let the scene make fewer");

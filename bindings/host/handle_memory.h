@@ -1,6 +1,6 @@
-// What the handles of a state hold: level sets, meshes and points, whose bytes Lua's collector does not see. It runs
-// when they have doubled, so that a script which makes another one in each frame keeps a few, not all. Many that are
-// small, nodes of the graph too, fill the memory as one does that is large: beyond the budget the next one is an error.
+// Accounts for the memory of objects that handles hold: level sets, meshes and points, whose bytes Lua's collector does
+// not see. The collector runs when they have doubled, so that a script that makes a new one in each frame retains a
+// few, not all. Small objects, graph nodes included, count too: beyond the budget the next one is an error.
 #pragma once
 
 #include <cstddef>
@@ -11,10 +11,11 @@ struct lua_State;
 
 namespace rapid {
 
-// Of a new state: keeps the counts in its registry.
+// Stores the counts of a new state in its registry.
 void count_handles(lua_State* L);
 
-// A handle holds an object, or has let it go. The first may run the collector. Error: the memory is full.
+// Counts an object that a handle holds or releases. hold() may run the collector. Throws Error if the memory is
+// full.
 void hold(lua_State* L, const Object& object);
 void release(lua_State* L, const Object& object);
 

@@ -15,14 +15,14 @@
 namespace rapid {
 namespace {
 
-// Ignored by default, so that one which comes late harms nobody.
+// Ignored by default, so that a late signal does no harm.
 constexpr int our_signal = SIGURG;
 
 thread_local Interruption::Call* innermost = nullptr;
 
 struct sigaction handler_before = {};
 
-// Where code may be left by a jump: what LuaJIT compiled, and LuaJIT. Read before the first signal that asks for one.
+// Code that a jump may leave: code that LuaJIT compiled, and LuaJIT. Read before the first signal requests a jump.
 struct CodeRanges {
     struct Range {
         std::uintptr_t begin, end;
@@ -62,7 +62,7 @@ CodeRanges& code_ranges()
     static CodeRanges ranges;
     return ranges;
 }
-std::mutex code_ranges_mutex;  // of those who read them anew
+std::mutex code_ranges_mutex;  // guards rereading the ranges
 
 }  // namespace
 
@@ -102,8 +102,8 @@ Interruption::Slot::~Slot()
     owner_.slots_.erase(this);
 }
 
-// The call is counted before it is asked whether there is an interruption, and the other way round in
-// signal_until_over(): one of them sees the other.
+// The call is counted before the check for an interruption. signal_until_over() does the reverse, so that one of them
+// always sees the other.
 Interruption::Call::Call(Slot& slot, lua_State* L) : slot_(slot), lua_(L), outer_(innermost)
 {
     if (slot_.calls_.load() == 0) slot_.thread_ = pthread_self();
@@ -116,7 +116,7 @@ Interruption::Call::Call(Slot& slot, lua_State* L) : slot_(slot), lua_(L), outer
 
 Interruption::Call::~Call() { end(); }
 
-// The lock: a signal is sent to threads that run, and this one may end.
+// The lock is needed because a signal may be sent only to a running thread, and this one may end.
 void Interruption::Call::end()
 {
     innermost = outer_;
@@ -180,7 +180,7 @@ void Interruption::on_signal(int signal, siginfo_t* info, void* context)
     if (code_ranges().contains(static_cast<std::uintptr_t>(place))) siglongjmp(call->place, 1);
 }
 
-// The hook stays: what catches the error is stopped, too.
+// The hook stays set, so that code that catches the error is stopped, too.
 void Interruption::stop(lua_State* L, lua_Debug*)
 {
     if (innermost) luaL_error(L, "%s", innermost->slot_.owner_.why_.message().c_str());

@@ -1,8 +1,8 @@
-// Stops the scripts of a session from another thread, wherever they are, and the process goes on.
+// Stops the scripts of a session from another thread, wherever they are, without ending the process.
 //
-// The interpreter is stopped by a hook, at its next instruction; it raises an ordinary error. Compiled code asks for no
-// hook: a loop in it that never ends is left by a jump from a signal's handler, where nothing of C++ is in between.
-// What the jump leaves behind is no valid state of Lua: it is not used again, and its memory is lost.
+// A hook stops the interpreter at its next instruction with an ordinary error. Compiled code checks no hook: a signal
+// handler leaves an endless loop in it by a jump, if no C++ frame lies in between. After the jump the Lua state is
+// invalid: it is not used again, and its memory is leaked.
 #pragma once
 
 #include <setjmp.h>
@@ -29,7 +29,7 @@ public:
     Interruption(const Interruption&) = delete;
     Interruption& operator=(const Interruption&) = delete;
 
-    // Stops what runs, and refuses what would run later, with this error. The first one counts. From any thread.
+    // Stops running scripts and refuses later ones with this error. The first error wins. Callable from any thread.
     void request(const Error& why);
     bool is_requested() const { return is_requested_.load(); }
     // Throws the error if it has been requested.
@@ -37,7 +37,7 @@ public:
     // Precondition: it has been requested.
     const Error& why() const { return why_; }
 
-    // A state of Lua, and the thread that runs in it.
+    // A Lua state and the thread that runs in it.
     class Slot {
     public:
         explicit Slot(Interruption& owner);
@@ -49,23 +49,23 @@ public:
         friend class Interruption;
         Interruption& owner_;
         pthread_t thread_{};
-        std::atomic<int> calls_ = 0;  // one within the other, by that thread
+        std::atomic<int> calls_ = 0;  // nested calls of that thread
     };
 
     // A call of Lua: `if (sigsetjmp(call.place, 0) == 0) lua_pcall(...) else call.has_left()`. Takes no lock.
     class Call {
     public:
-        // Error: an interruption has been requested.
+        // Throws if an interruption has been requested.
         Call(Slot& slot, lua_State* L);
         ~Call();
         Call(const Call&) = delete;
         Call& operator=(const Call&) = delete;
 
-        // After the jump.
+        // Called after the jump.
         void has_left() const;
-        // Jumps out of the innermost call of this thread, if it is one of the slot and nothing of C++ is in between.
+        // Jumps out of this thread's innermost call if it belongs to the slot and no C++ frame lies in between.
         static void try_to_leave(const Slot& slot);
-        // The same, from a function of C++ whose objects are gone by now, if the call is one of the slot.
+        // Does the same from a C++ function whose objects are already destroyed, if the call belongs to the slot.
         static void leave(const Slot& slot);
 
         sigjmp_buf place;
@@ -77,10 +77,10 @@ public:
         Slot& slot_;
         lua_State* const lua_;
         Call* const outer_;
-        std::atomic<int> natives_ = 0;  // functions of C++ between the call and what runs
+        std::atomic<int> natives_ = 0;  // C++ functions between the call and the running code
     };
 
-    // A function of C++ that Lua has called: while it runs nobody jumps over it.
+    // A C++ function called by Lua: no jump crosses it while it runs.
     class InNative {
     public:
         InNative();
@@ -97,7 +97,7 @@ private:
     void signal_until_over();
 
     std::atomic<bool> is_requested_ = false;
-    std::atomic<bool> jumps_ = false;  // the hooks have had their time
+    std::atomic<bool> jumps_ = false;  // the hooks have had time to act
     bool is_any_running() const;
 
     std::mutex mutex_;
@@ -105,7 +105,7 @@ private:
     std::set<const Slot*> slots_;
     Error why_{""};  // set once, before is_requested_
     bool stop_ = false;
-    std::thread thread_;  // made by the first request
+    std::thread thread_;  // started by the first request
 };
 
 }  // namespace rapid

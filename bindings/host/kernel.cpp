@@ -54,7 +54,7 @@ void Kernel::uses(Uses& uses) const
     add(analysis_.joins, uses.makes_groups);
     add(analysis_.joins, uses.joins_groups);
     add(analysis_.asks, uses.takes_groups);
-    // The bytecode does not tell which attributes a function of all points reads by the argument of a method.
+    // The bytecode does not show which attributes a function of all points reads by a method's argument.
     if (source.of_the_set || analysis_.asks_any) uses.reads_all = true;
 }
 
@@ -89,7 +89,7 @@ std::optional<KernelLayout> Kernel::make_writable(PointSet& points, const std::s
     return layout;
 }
 
-// In the reversed sequence all of the set, so that the last chunk comes first, too.
+// In reversed order the chunk is the whole set, so that the last point comes first.
 std::size_t Kernel::chunk_of(const KernelCaller& caller, std::size_t size) const
 {
     return host_.sequence_of(caller.node) == KernelOrder::Reversed ? std::max(size, chunk_size) : chunk_size;

@@ -1,4 +1,4 @@
-// A function of a point, written in Lua: the columns that it reads and writes, and its run over a set.
+// A Lua function of a point: the columns that it reads and writes, and its run over a set.
 #pragma once
 
 #include <map>
@@ -26,7 +26,7 @@ class ScriptHost;
 // A Lua node's arguments for its kernel.
 struct KernelArguments {
     std::map<std::string, Value> values;  // its third argument
-    // Attributes and groups that the node names; the kernel uses them under computed names.
+    // Attributes and groups that the node names; the kernel accesses them by computed names.
     std::set<std::string> reads, writes, joins;
 };
 
@@ -34,10 +34,10 @@ class Kernel : public PointFunction, public PointEditor, public StepShapeUser, p
 public:
     Kernel(ScriptHost& host, KernelSource of) : source(std::move(of)), host_(host) {}
 
-    // The type of a parameter that takes a function of all points.
+    // Type of a parameter that takes a function of all points.
     static constexpr std::string_view set_function_type = "function of the points";
 
-    // Reads its bytecode, in the main state, once the file has run. Error: see analyse_kernel().
+    // Reads its bytecode, in the main state, after the file has run. Throws like analyse_kernel().
     void analyse();
 
     void uses(Uses& uses) const override;
@@ -45,18 +45,19 @@ public:
     void edit(PointSet& points, std::size_t first, const Evaluation& now) const override;
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const override;
 
-    // As PointEdit's, for the points that are in `group` (all points if it is empty) when they are visited.
+    // Prepares a pass like PointEdit, over the points that are in `group` (all points if it is empty) when they are
+    // visited.
     std::unique_ptr<EditPass> prepare(PointSet& points, const std::string& group, const Evaluation& now,
                                       const KernelArguments& arguments, const Before& before) const;
     bool kills() const { return analysis_.kills; }
 
-    // Its effect inside Solve, at every sub-step, on the points of `group`.
+    // Returns its action inside Solve, at every sub-step, on the points of `group`.
     std::shared_ptr<const Action> action(const std::string& group, const Evaluation& now,
                                          const KernelArguments& arguments) const;
 
-    // With the names that its node declares.
+    // Adds its uses, including the names that its node declares.
     void uses(Uses& uses, const KernelArguments& arguments) const;
-    // As an action, where `force` is that of the sub-step and no attribute.
+    // Adds its uses as an action, in which `force` is the sub-step's force and not an attribute.
     void uses_in_action(Uses& uses, const KernelArguments& arguments) const;
 
     int numbers_of(const std::string& attribute) const override
@@ -70,16 +71,16 @@ public:
         return found == analysis_.places.end() ? Location() : found->second;
     }
 
-    // Shapes that it asks, and that move or are meshes: found among what it reaches.
+    // Returns true if it queries shapes that move or are meshes, found among the objects that it reaches.
     bool asks_moving_shapes() const override { return !moving_.empty(); }
     bool varies() const override { return asks_moving_shapes(); }
     void begin_step(const FrameClock& clock, const Frame& frame) const override;
-    // As they are in this step.
+    // Shapes as they are in this step.
     using StepShapes = std::vector<std::pair<const Object*, std::shared_ptr<const StepShape>>>;
     const StepShapes& step_shapes() const { return step_shapes_; }
 
     ScriptHost& host() const { return host_; }
-    // Whether it may read a field of this name of something.
+    // Returns true if it may read a field of this name of any object.
     bool may_read(const std::string& name) const { return analysis_.may.count(name) > 0; }
 
     const KernelSource source;
@@ -91,12 +92,12 @@ private:
     class ScriptAction;
     class ScriptActionPass;
 
-    // Its names among the columns and groups of the set. To be settled.
+    // Returns the columns and groups of the set that it names. The result still has to be settled.
     KernelLayout layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate) const;
-    // None where it has no point to visit.
+    // Returns nothing if no point is to be visited.
     std::optional<KernelLayout> make_writable(PointSet& points, const std::string& group,
                                               const KernelArguments& arguments) const;
-    // The number of points that go through it together.
+    // Returns the number of points that it processes together.
     std::size_t chunk_of(const KernelCaller& caller, std::size_t size) const;
 
     ScriptHost& host_;

@@ -1,4 +1,4 @@
-// Kernels inside Solve: actions, at every sub-step.
+// Runs kernels inside Solve: actions, at every sub-step.
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_pass.h"
 #include "bindings/host/script_host.h"
@@ -41,7 +41,7 @@ public:
 private:
     const Watchdog::Section section_;
     const KernelLayout layout_;
-    const std::vector<std::uint8_t> chosen_;  // members of the action's group, where it is masked
+    const std::vector<std::uint8_t> chosen_;  // members of the action's group, if it is masked
     const KernelPass pass_;
 };
 
@@ -63,7 +63,7 @@ public:
         KernelLayout layout = kernel_.layout_for(points, arguments_, false);
         layout.settle(points, members.stride != 0);
         layout.settle_action(reads_force(), writes_force());
-        // A copy: a kernel may leave the very group that chooses its points, and acts on them for the whole step.
+        // This is a copy: a kernel may leave the group that chooses its points, but acts on them for the whole step.
         std::vector<std::uint8_t> chosen;
         if (layout.masked) chosen.assign(members.data, members.data + points.size());
         return std::make_unique<ScriptActionPass>(kernel_, points, caller_, std::move(layout), arguments_.values,

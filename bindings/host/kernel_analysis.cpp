@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// The keys of a field of the table at the top of the stack.
+// Returns the keys of a field of the table at the top of the stack.
 std::set<std::string> keys_of(lua_State* L, const char* field)
 {
     std::set<std::string> keys;
@@ -45,7 +45,7 @@ int number_of(lua_State* L, const char* field)
     return number;
 }
 
-// The number that a field of the table at the top of the stack has for a name; 0 for none.
+// Returns the number stored under a name in a field of the table at the top of the stack; 0 if there is none.
 int number_under(lua_State* L, const char* field, const std::string& name)
 {
     lua_getfield(L, -1, field);

@@ -1,4 +1,4 @@
-// Kernels between the nodes of a graph: as tests of points, and as edits.
+// Runs kernels between the nodes of a graph: as tests of points, and as edits.
 #include <algorithm>
 #include <optional>
 
@@ -114,7 +114,7 @@ public:
 
     void visit(const Stretch& stretch) override
     {
-        // A copy: a kernel may leave the very group that chooses its points.
+        // This is a copy: a kernel may leave the group that chooses its points.
         std::vector<std::uint8_t> chosen;
         if (layout_.masked) chosen = stretch.choose(members_);
         std::vector<std::uint8_t> killed(kernel_.kills() ? stretch.size() : 0);

@@ -26,7 +26,7 @@ NoiseOptions noise_options(double time, double octaves, double seed)
     return {time, static_cast<int>(octaves), static_cast<std::uint32_t>(seed)};
 }
 
-// lua/numeric.lua has checked the numbers.
+// lua/numeric.lua has already checked the numbers.
 double noise_at(double x, double y, double z, double time, double octaves, double seed)
 {
     return noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
@@ -36,7 +36,7 @@ void curl_noise_at(double x, double y, double z, double time, double octaves, do
     Eigen::Map<Vec3d>(curl, 3) = curl_noise(Vec3d(x, y, z), noise_options(time, octaves, seed));
 }
 
-// lua/shape.lua keeps the shape alive, or the pass a StepShape.
+// The shape is kept alive by lua/shape.lua, or by the pass through a StepShape.
 double shape_distance(const void* shape, double x, double y, double z, double* gradient)
 {
     const Vec3d P(x, y, z);
@@ -60,7 +60,7 @@ void shape_velocity(const void* shape, double x, double y, double z, double* val
     Eigen::Map<Vec3d>(value, 3) = known->velocity_at(Vec3d(x, y, z), step ? KernelMoment::since_begin(*step) : 0);
 }
 
-// mesh: of which the shape is the surface, in this step. Of one that deforms the values are those of its first file.
+// shape: the mesh's surface in this step. A deforming mesh has the values of its first file.
 std::int32_t mesh_value(const void* mesh, const void* shape, const char* name, double x, double y, double z,
                         double* value)
 {
@@ -72,7 +72,7 @@ std::int32_t mesh_value(const void* mesh, const void* shape, const char* name, d
                          std::span<double, 3>(value, 3));
 }
 
-// So it does the grid.
+// The grid is kept alive in the same way.
 template <class G>
 typename G::Value sample(const void* grid, const Vec3d& P)
 {

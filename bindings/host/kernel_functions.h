@@ -1,4 +1,4 @@
-// Functions that compiled kernels call directly, by their addresses (lua/chunk.h has their types).
+// Functions that compiled kernels call directly by address (lua/chunk.h has their types).
 #pragma once
 
 struct lua_State;

@@ -1,4 +1,4 @@
-// A kernel as a program of lanes (runtime/lanes/lane_program.h), where lua/lanes.lua makes one of it.
+// A kernel as a program of lanes (runtime/lanes/lane_program.h), if lua/lanes.lua can translate it.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +17,17 @@ namespace rapid {
 
 class KernelLanes {
 public:
-    // Of fewer points a set is not worth it.
+    // Smaller sets are not worth a program.
     static constexpr std::size_t least_points = 32;
 
-    // Of the function at the top of the stack, which makes the program; it is taken off.
+    // Takes the translating function off the top of the stack.
     KernelLanes(State& state, const KernelLayout& layout, const Location& location);
 
-    // Whether it can go over the chunk. Of a kernel that is none it can't; nor where what all points share has changed
-    // its kind, or too many tiles have failed. What they share is asked for once in a pass, of which this is the
-    // number.
+    // Returns true if the program can process the chunk. It cannot if the kernel has no program, if a shared value has
+    // changed its kind, or if too many tiles have failed. Shared values are read once per pass; `pass` is its number.
     bool is_ready(State& state, const rapid_chunk& chunk, std::uint64_t pass);
-    // memory: of the columns and groups, at the chunk's first point. Calls failed(begin, end) for the points of tiles
-    // that the kernel itself must go over.
+    // Processes the chunk. memory: the columns and groups, at the chunk's first point. Calls failed(begin, end) for the
+    // points of tiles that the kernel itself must process.
     void run(const rapid_chunk& chunk, std::span<const LaneChunk::Memory> memory,
              const std::function<void(std::int32_t begin, std::int32_t end)>& failed);
 
@@ -39,8 +38,8 @@ private:
     int inputs_now_ = 0;  // a function in the registry
     bool kills_ = false;
     std::size_t columns_, id_;
-    std::uint64_t pass_ = 0;   // whose inputs it has
-    bool has_inputs_ = false;  // they are of the kinds that the program takes
+    std::uint64_t pass_ = 0;   // the pass of the cached inputs
+    bool has_inputs_ = false;  // their kinds match the program
     std::vector<double> inputs_;
     LaneRunner runner_;
     std::size_t tiles_ = 0, failed_tiles_ = 0;

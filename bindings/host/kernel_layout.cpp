@@ -49,7 +49,7 @@ void push_layout(lua_State* L, const KernelLayout& layout)
     set_flag(L, "action", layout.action);
 }
 
-// With room for the pointers to its columns and groups. It stays for as long as the state lives.
+// Pushes a chunk with room for the pointers to its columns and groups. It lives as long as the state.
 rapid_chunk* push_chunk(lua_State* L, std::size_t pointers)
 {
     auto* chunk = static_cast<rapid_chunk*>(lua_newuserdata(L, sizeof(rapid_chunk) + pointers * sizeof(void*)));
@@ -64,7 +64,7 @@ rapid_chunk* push_chunk(lua_State* L, std::size_t pointers)
 
 void KernelLayout::make_writable(PointSet& points) const
 {
-    double bytes = 0;  // of columns that have had one value for all points
+    double bytes = 0;  // bytes of columns that were uniform before
     std::size_t expanded = 0;
     const auto add = [&]<class T>(const Column<T>& column) {
         if (!column.is_uniform()) return;
@@ -87,7 +87,7 @@ void KernelLayout::make_writable(PointSet& points) const
 void KernelLayout::settle(const PointSet& points, bool mask)
 {
     masked = mask;
-    // Writable columns have a value for each point by now.
+    // Every writable column now has a value for each point.
     for (Entry& e : columns)
         e.uniform = !e.writable && std::visit([](const auto& c) { return c.is_uniform(); }, *points.find(e.name));
     for (Entry& e : groups) e.uniform = !e.writable && points.find_group(e.name)->is_uniform();

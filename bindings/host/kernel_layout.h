@@ -17,25 +17,26 @@ struct KernelLayout {
         bool uniform = false;  // all points share one value
     };
     std::vector<Entry> columns, groups;
-    bool predicate = false;  // the kernel's result is kept, and nothing may be written
-    bool masked = false;     // it visits some points of a chunk alone
+    bool predicate = false;  // the kernel's result is stored, and nothing may be written
+    bool masked = false;     // it visits only some points of a chunk
     bool action = false;     // it runs inside Solve
-    std::string key;         // equal for layouts that one runner serves
+    std::string key;         // equal for layouts that can share a runner
 
-    // Makes the columns writable that the kernel writes.
+    // Makes the columns that the kernel writes writable.
     void make_writable(PointSet& points) const;
 
-    // Completes it, once columns stay where they are.
+    // Completes the layout, when columns no longer move in memory.
     void settle(const PointSet& points, bool mask);
 
-    // Makes a settled layout that of an action: P and v are in double inside Solve, and the force is the sub-step's.
+    // Turns a settled layout into that of an action: P and v are in double inside Solve, and the force is the
+    // sub-step's.
     void settle_action(bool reads_force, bool writes_force);
 
 private:
     void make_key();
 };
 
-// The state's runner of a kernel for a layout; made when it is first asked for.
+// Returns the state's runner of a kernel for a layout. Makes it on first use.
 State::Runner& runner_for(State& state, std::size_t kernel, const KernelLayout& layout);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// The time of the point that a kernel on this thread works on, for what it asks of shapes that move.
+// The time of the point that a kernel processes on this thread, for queries of moving shapes.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@ namespace rapid {
 
 class KernelMoment {
 public:
-    // From now on, until it is destroyed, on this thread. times: of the chunk's points, s since the start; null: the
-    // end of the step. at: the point that is worked on.
+    // Applies on this thread until destruction. times: the chunk's points, s since the start; null means the end of the
+    // step. at: the point being processed.
     KernelMoment(const double* times, const std::int32_t* at);
     ~KernelMoment();
     KernelMoment(const KernelMoment&) = delete;
     KernelMoment& operator=(const KernelMoment&) = delete;
 
-    // The present, in seconds since the start; nothing: the end of the step.
+    // Returns the current time, s since the start, or nothing for the end of the step.
     static std::optional<double> time();
-    // The present, in seconds since the step of the shape began.
+    // Returns the current time, s since the beginning of the shape's step.
     static double since_begin(const StepShape& shape);
 
 private:

@@ -1,4 +1,4 @@
-// The nodes whose kernel is written in place: `:points`, `:action` and `:detail`.
+// Nodes whose kernel is written in the scene: `:points`, `:action` and `:detail`.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 constexpr std::string_view reads_doc = "attributes that the kernel reads under names that it computes";
 constexpr std::string_view writes_doc = "attributes that it assigns under names that it computes";
 
-// The names that a kernel computes, which its bytecode does not tell.
+// Returns the declared names, which a kernel computes and its bytecode does not show.
 KernelArguments declared(const std::vector<std::string>& reads, const std::vector<std::string>& writes)
 {
     KernelArguments arguments;
@@ -30,7 +30,7 @@ void check_writable(const std::vector<std::string>& writes)
             throw Error(fmt::format("writes: {} is read only", known.name));
 }
 
-// points: an edit of the points, one by one, written in Lua.
+// points: edits the points one by one with a Lua function.
 struct Points {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
@@ -61,7 +61,7 @@ struct Points {
 };
 RAPID_NODE(Points);
 
-// action: the same inside Solve, at every sub-step (paper §2.3).
+// action: does the same inside Solve, at every sub-step (paper §2.3).
 struct ScriptAction {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
@@ -89,7 +89,7 @@ struct ScriptAction {
 };
 RAPID_NODE(ScriptAction);
 
-// detail: a function over the whole set, once a frame.
+// detail: runs a function over the whole set once a frame.
 struct Detail {
     std::shared_ptr<const Kernel> kernel;
 

@@ -54,7 +54,7 @@ KernelPass::KernelPass(const Kernel& kernel, const PointSet& points, const Kerne
     serial_ = ++last;
     for (const KernelLayout::Entry& entry : layout.columns)
         columns_.push_back(entry.type == "vec3d"
-                               ? ColumnMemory{nullptr, sizeof(Vec3d)}  // Solve's own
+                               ? ColumnMemory{nullptr, sizeof(Vec3d)}  // Solve's own memory
                                : std::visit([](const auto& c) { return memory_of(c); }, *points.find(entry.name)));
     for (const KernelLayout::Entry& entry : layout.groups) groups_.push_back(memory_of(*points.find_group(entry.name)));
 }
@@ -166,7 +166,7 @@ void KernelPass::set_params(State& state, State::Runner& runner) const
     runner.pass = serial_;
 }
 
-// The error of the point at which the chunk has stopped, with all that the point has where a value became infinite.
+// Returns the error with the point at which the chunk stopped, and that point's values if one became infinite.
 Error KernelPass::placed(const Error& error, const rapid_chunk& chunk, const rapid_chunk& after) const
 {
     std::string at = fmt::format("frame {}", caller_.frame.number);

@@ -1,4 +1,4 @@
-// Texts on Lua's stack.
+// Strings on Lua's stack.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace rapid {
 
-// The string, or the number, at `index`; empty for any other value.
+// Returns the string or number at `index` as text; empty for any other value.
 inline std::string text_at(lua_State* L, int index)
 {
     std::size_t size = 0;
@@ -16,7 +16,7 @@ inline std::string text_at(lua_State* L, int index)
     return text ? std::string(text, size) : std::string();
 }
 
-// Raises an error of Lua where it is neither a string nor a number.
+// Returns the same, but raises a Lua error if the value is neither a string nor a number.
 inline std::string checked_text_at(lua_State* L, int index)
 {
     std::size_t size = 0;

@@ -1,5 +1,5 @@
-// Makers of the objects of graph code (meshes, level sets, shapes, points, motions): each is declared once, with
-// parameters that are checked and documented like those of nodes.
+// Makers of graph code's objects (meshes, level sets, shapes, points, motions). Each is declared once, with parameters
+// that are checked and documented like those of nodes.
 //
 //   struct MeshSphere {
 //       double radius; int divisions; Vec3d center;
@@ -20,13 +20,13 @@
 namespace rapid {
 
 struct MakeContext {
-    std::filesystem::path folder;  // of the graph file: relative paths start there
+    std::filesystem::path folder;  // folder of the graph file, to which paths are relative
     std::vector<std::string>& warnings;
     bool may_write;  // false in check, explain and test, which write nothing
     std::function<void(const std::filesystem::path& file)> on_read;  // may be empty
     std::function<std::string(const std::string& path)> find_file;   // may be empty, and return nothing
 
-    // The path of a file that will be read.
+    // Returns the path of a file that will be read.
     std::filesystem::path resolve(const std::string& path) const
     {
         std::filesystem::path file = folder / path;  // an absolute path stays itself
@@ -70,7 +70,7 @@ public:
     {
         return maker_.params.back().choices = std::move(names), *this;
     }
-    // Given by Rapid's own Lua files, not by users.
+    // Marks a parameter that Rapid's own Lua files set, not users.
     MakerDeclaration& internal() { return maker_.params.back().internal = true, *this; }
 
     operator Maker() const { return maker_; }
@@ -85,20 +85,20 @@ MakerDeclaration<T> maker(std::string name, std::string doc)
     return MakerDeclaration<T>(std::move(name), std::move(doc));
 }
 
-// Error: no such maker (a bug of Rapid's own Lua files).
+// Returns a maker. Throws if there is none, which is a bug in Rapid's own Lua files.
 const Maker& find_maker(std::string_view name);
 
-// All of them, in order of name.
+// Returns all makers, ordered by name.
 std::vector<const Maker*> all_makers();
 
-// Asked when a maker is first needed, after all registrations of the program.
+// Evaluated when a maker is first needed, after all registrations of the program.
 struct MakerRegistration {
     explicit MakerRegistration(std::vector<Maker> (*declare)());
 };
 #define RAPID_MAKER(Type)                                 \
     static const ::rapid::MakerRegistration maker_##Type( \
         []() -> std::vector<::rapid::Maker> { return {Type::declare()}; })
-// A function that returns several.
+// Registers a function that returns several makers.
 #define RAPID_MAKERS(function) static const ::rapid::MakerRegistration makers_of_##function(function)
 
 }  // namespace rapid

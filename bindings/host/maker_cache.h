@@ -1,7 +1,7 @@
-// The objects that a function of the frame made in its last call: a constructor that is called again with the same
+// Caches the objects that a function of the frame made in its last call. A constructor called again with the same
 // arguments returns the same object, so that nothing is built twice, and caches by identity stay valid.
 //
-// It holds the objects of two calls: a function that returns another shape at each frame keeps two shapes, not one a
+// It holds the objects of two calls: a function that returns a new shape at each frame retains two shapes, not one per
 // frame.
 #pragma once
 
@@ -15,7 +15,7 @@ namespace rapid {
 
 class MakerCache {
 public:
-    // The cached object of equal arguments, else the object that make() returns.
+    // Returns the cached object for equal arguments, or the object that make() returns.
     template <class F>
     ObjectPtr get(const Maker& maker, std::shared_ptr<const Table> arguments, const F& make)
     {
@@ -25,10 +25,10 @@ public:
         return object;
     }
 
-    // Forgets all objects that the last call did not make.
+    // Forgets all objects that the last call did not use.
     void begin_call();
 
-    // A call of the function: for as long as it lives, `active` points to its cache.
+    // A call of the function. While it lives, `active` points to its cache.
     class Call {
     public:
         Call(MakerCache& cache, MakerCache*& active) : active_(active), before_(std::exchange(active, &cache))
@@ -52,10 +52,11 @@ private:
     };
     ObjectPtr find(const Maker& maker, const Table& arguments) const;
 
-    std::vector<Entry> last_, current_;  // of the call before, and of this one
+    std::vector<Entry> last_, current_;  // objects of the previous call and of this one
 };
 
-// Whether two values can't be told apart: numbers by their bits, objects by identity. Functions always can.
+// Returns true if two values are indistinguishable: numbers bitwise, objects by identity. Functions are never
+// identical.
 bool identical(const Value& a, const Value& b);
 
 }  // namespace rapid

@@ -19,26 +19,26 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_of_text = std::size_t{64} << 20;  // bytes; no program, but what a device or a hole may give
+constexpr std::size_t most_of_text = std::size_t{64} << 20;  // bytes; more is no program but a device or sparse file
 
 Error too_long(const std::filesystem::path& path)
 {
     return Error("it has more than 64 MiB, which is no scene and no module").at({shown(path), 0});
 }
 
-// A module, which others may have put beside the scene: regular files alone, or a pipe there would be waited for.
+// Reads a module, which others may have put next to the scene. Only regular files are read: a pipe would block.
 std::optional<std::string> read_module(const std::filesystem::path& path)
 {
     try {
         if (check_readable(path) > most_of_text) throw too_long(path);
         return std::string(InputFile(path).text());
     } catch (const Error& error) {
-        if (error.location().file.empty()) return std::nullopt;  // not there
+        if (error.location().file.empty()) return std::nullopt;  // it does not exist
         throw;
     }
 }
 
-// Of the program or of the library that this code is in, without symbolic links.
+// Returns the path of the program or library that contains this code, without symbolic links.
 std::filesystem::path own_file()
 {
     Dl_info here{};
@@ -61,8 +61,8 @@ std::filesystem::path lua_folder()
 {
     static const std::filesystem::path folder = [] {
         std::error_code ignored;
-        // bin/rapid, or lib/x86_64-linux-gnu/librapid_host.so: share is beside one of the folders above. In a build
-        // folder it has links to the sources.
+        // bin/rapid, or lib/x86_64-linux-gnu/librapid_host.so: `share` is next to one of the folders above. A build
+        // folder has links to the sources there.
         for (auto above = own_file().parent_path(); above.has_relative_path(); above = above.parent_path()) {
             const auto installed = above.parent_path() / "share/rapid/lua";
             if (std::filesystem::exists(installed / "host.lua", ignored)) return std::filesystem::canonical(installed);
@@ -95,7 +95,7 @@ std::string shown(const std::filesystem::path& path) { return path.lexically_nor
 
 std::optional<Modules::Source> Modules::find(std::string_view name, bool node, std::string& looked_in) const
 {
-    // A name is a path of words: nothing above the folders that are searched.
+    // A name is a path of words, so it cannot leave the searched folders.
     std::string relative(name);
     const bool words = !relative.empty() && std::all_of(relative.begin(), relative.end(), [](unsigned char c) {
         return std::isalnum(c) || c == '_' || c == '-' || c == '.';
@@ -124,7 +124,7 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
     return std::nullopt;
 }
 
-// By the system's own list of a folder: libstdc++'s iterator ends the process where memory runs out.
+// Uses the system's own directory functions: libstdc++'s iterator ends the process when memory runs out.
 std::vector<std::string> shipped_nodes()
 {
     std::vector<std::string> names;

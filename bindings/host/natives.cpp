@@ -32,14 +32,14 @@
 namespace rapid {
 namespace {
 
-// native.outside_kernels(what, remedy): an error while a kernel runs.
+// native.outside_kernels(action, remedy): raises an error while a kernel runs.
 int outside_kernels(State& state)
 {
     refuse_in_kernels(state, text_at(state.lua(), 1), text_at(state.lua(), 2));
     return 0;
 }
 
-// native.print(text): to the program that opened the scene, or to standard output, for a terminal.
+// native.print(text): prints to the program that opened the scene, or to standard output in a form safe for terminals.
 int print_text(State& state)
 {
     if (const auto& tell = state.host().options().on_print) return tell(text_at(state.lua(), 1)), 0;
@@ -48,7 +48,7 @@ int print_text(State& state)
     return 0;
 }
 
-// native.did_you_mean(name, names): `; did you mean "NEAREST"?`, or nothing.
+// native.did_you_mean(name, names): returns `; did you mean "NEAREST"?`, or nothing.
 int suggest(State& state)
 {
     std::vector<std::string> names;
@@ -57,14 +57,15 @@ int suggest(State& state)
     return 1;
 }
 
-// native.names_frames(path): whether it names a sequence of files.
+// native.names_frames(path): returns true if the path names a sequence of files.
 int names_frames(State& state)
 {
     lua_pushboolean(state.lua(), FramePattern(text_at(state.lua(), 1)).has_frame());
     return 1;
 }
 
-// native.require_memory(what, bytes, remedy): an error where so many bytes are not free, or more than scripts may take.
+// native.require_memory(what, bytes, remedy): raises an error if that much memory is not free, or exceeds the scripts'
+// limit.
 int require_memory(State& state)
 {
     const double bytes = lua_tonumber(state.lua(), 2);
@@ -84,8 +85,8 @@ int kind_of(State& state)
     return 1;
 }
 
-// native.shape(object): its pointer, valid while the object is; of one that moves, while a kernel runs, that of the
-// step, and true. Nil and true for one that moves, or a mesh, at any other time; nil for any other object.
+// native.shape(object): returns its pointer, valid while the object is. For a moving shape or a mesh it returns nil and
+// true; while a kernel runs, the pointer of the step and true. Returns nil for any other object.
 int pointer_to_shape(State& state)
 {
     lua_State* L = state.lua();
@@ -104,7 +105,7 @@ int pointer_to_shape(State& state)
     return 2;
 }
 
-// native.mesh(object): the pointer to a mesh, or to that at rest of one that moves; nil for any other object.
+// native.mesh(object): returns the pointer to a mesh, or to the mesh at rest if it moves; nil for any other object.
 int pointer_to_mesh(State& state)
 {
     const ObjectPtr object = to_object(state, 1);
@@ -117,7 +118,7 @@ int pointer_to_mesh(State& state)
     return 1;
 }
 
-// native.vector_grid(object), .fog(object): its pointer, valid while the object is; nil for any other object.
+// native.vector_grid(object), .fog(object): return its pointer, valid while the object is; nil for any other object.
 template <class T>
 int pointer_to(State& state)
 {
@@ -129,7 +130,7 @@ int pointer_to(State& state)
     return 1;
 }
 
-// native.text(number), native.number(text): of an attribute (runtime/points/token.h).
+// native.text(number), native.number(text): convert strings of attributes (runtime/points/token.h).
 int text_of_number(State& state)
 {
     push_text(state.lua(), token_of_number(static_cast<std::uint32_t>(lua_tonumber(state.lua(), 1))).text());
@@ -147,7 +148,7 @@ int trace_aborted(State& state)
     return 0;
 }
 
-// native.add_code(file, list): the functions of a file, as lua/bytecode.lua lists them: line and text by turns.
+// native.add_code(file, list): adds the functions of a file, as lua/bytecode.lua lists them: line and text alternate.
 int add_code(State& state)
 {
     lua_State* L = state.lua();
@@ -163,7 +164,7 @@ int add_code(State& state)
     return 0;
 }
 
-// native.read_module(name), native.read_node(name): text and chunk name, or nil and where it was looked for.
+// native.read_module(name), native.read_node(name): return text and chunk name, or nil and the searched paths.
 template <bool node>
 int read_source(State& state)
 {
@@ -189,7 +190,7 @@ void push_names(lua_State* L, const std::vector<std::string>& names)
     }
 }
 
-// native.maker_names(family): the makers of a family by their names in it: "shape" gives box, plane, sphere.
+// native.maker_names(family): returns the makers of a family by their names in it: "shape" gives box, plane, sphere.
 int maker_names(State& state)
 {
     const std::string prefix = text_at(state.lua(), 1) + ".";
@@ -200,7 +201,7 @@ int maker_names(State& state)
     return 1;
 }
 
-// native.defaults(maker): its parameters that have a default, with that, by name.
+// native.defaults(maker): returns the defaults of its parameters by name.
 int push_defaults(State& state)
 {
     std::map<std::string, Value> defaults;

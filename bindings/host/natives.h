@@ -1,4 +1,4 @@
-// The table of native functions that lua/host.lua is given.
+// The table of native functions passed to lua/host.lua.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@ namespace rapid {
 
 class State;
 
-// Pushes it. chunk_header: the text of lua/chunk.h.
+// Pushes the table. chunk_header: the text of lua/chunk.h.
 void push_natives(State& state, const std::string& chunk_header);
 
 }  // namespace rapid

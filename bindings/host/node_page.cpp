@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// A default in JSON; a value that JSON has no form for is written as in messages.
+// Adds a default to the JSON. A value without a JSON form is written as in messages.
 void add_value(JsonText& json, const Value& value)
 {
     if (value.is_nil()) return json.value(nullptr);

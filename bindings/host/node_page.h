@@ -1,4 +1,4 @@
-// What is told of a type of node: its page, for people and for programs.
+// The page of a node type, for people and for programs.
 #pragma once
 
 #include <string>

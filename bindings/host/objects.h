@@ -1,4 +1,4 @@
-// Objects that only graph code knows: an attribute's name.
+// Objects that only graph code uses: the name of an attribute.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a program that embeds Rapid offers to a scene: objects that it takes as rapid.host "NAME", and node types.
+// Objects and node types that an embedding program offers to a scene, which takes the objects as rapid.host "NAME".
 #pragma once
 
 #include <fmt/format.h>
@@ -13,10 +13,10 @@
 namespace rapid {
 
 struct Offers {
-    std::map<std::string, ObjectPtr> objects;  // changes between frames alone, on the scene's thread
+    std::map<std::string, ObjectPtr> objects;  // changes only between frames, on the scene's thread
     std::vector<NodeType> node_types;
 
-    // Error: there is none of this name, with those that there are.
+    // Throws Error if there is none of this name, and lists the existing names.
     const ObjectPtr& object(const std::string& name) const
     {
         if (const auto found = objects.find(name); found != objects.end()) return found->second;

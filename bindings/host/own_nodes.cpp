@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// Whether a file defines a node: scenes and modules lie beside them.
+// Returns true if a file defines a node: scenes and modules may lie next to it.
 bool defines_node(const std::filesystem::path& file)
 {
     std::error_code none;

@@ -1,4 +1,4 @@
-// The nodes written in Lua that lie in the current folder, and on RAPID_PATH.
+// Nodes written in Lua in the current folder and on RAPID_PATH.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace rapid {
 
 struct NodeTypes {
     Registry registry;                // these, and those of Session::all_node_types()
-    std::vector<std::string> faults;  // of files that define a node with a mistake in it
+    std::vector<std::string> faults;  // messages for files whose node definition is wrong
 };
 
 NodeTypes with_own_nodes();

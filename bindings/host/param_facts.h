@@ -1,4 +1,4 @@
-// The facts behind a parameter's documentation, on its page and in an editor.
+// Formats the facts after a parameter's documentation, on its page and in an editor.
 #pragma once
 
 #include <string>

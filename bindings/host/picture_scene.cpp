@@ -17,8 +17,8 @@
 namespace rapid {
 namespace {
 
-// A shape without a surface mesh is infinite. Among infinite shapes a picture can show planes. The distance of a plane
-// is n · x - offset, which five points verify.
+// Returns the plane of a shape, if it is one. A shape without a surface mesh is infinite, and planes are the only
+// infinite shapes that a picture can show. The distance to a plane is n · x - offset, which five points verify.
 std::optional<PictureScene::Plane> plane_of(const Shape& shape)
 {
     const std::array<Vec3d, 5> P = {Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, 1), Vec3d(-3, 5, 7)};
@@ -32,7 +32,7 @@ std::optional<PictureScene::Plane> plane_of(const Shape& shape)
     return plane;
 }
 
-// What a `:picture` says in this frame.
+// Returns the settings of a `:picture` in this frame.
 PictureNode picture_at(const Node& node, const Frame& now)
 {
     std::map<std::string, Value> arguments = node.arguments;
@@ -55,7 +55,7 @@ bool gives(const Node& node, const char* param)
     return given != node.arguments.end() && !given->second.is_nil();
 }
 
-// Whether the mesh encloses all of a sample of these points.
+// Returns true if the mesh encloses all of a sample of these points.
 bool encloses(const RayCrossings& mesh, std::span<const Vec3f> P)
 {
     constexpr std::size_t sample_size = 63;
@@ -112,7 +112,7 @@ bool SceneOfPlan::may_have_colliders() const
 }
 
 // Finds the colliders that enclose a source of points, or initial points, when the scene begins. The first frame
-// decides, so that a collider looks the same in all frames, whichever are drawn.
+// decides, so that a collider looks the same in all frames, whichever frames are drawn.
 std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
 {
     std::set<Argument> vessels;
@@ -120,7 +120,7 @@ std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
     std::vector<std::span<const Vec3f>> sources;
     for (const PictureScene::Body& body : first.scene->bodies)
         if (body.role == PictureScene::Body::Emitter) sources.emplace_back(body.mesh->positions);
-    std::vector<std::vector<Vec3f>> places;  // of points, which may have one value for all
+    std::vector<std::vector<Vec3f>> places;  // of points; a column may hold one shared value
     for (const PlannedNode& planned : plan_.nodes)
         for (const auto& [name, value] : planned.node->arguments)
             if (const auto given = value.object<PointsObject>();
@@ -133,7 +133,7 @@ std::set<SceneOfPlan::Argument> SceneOfPlan::find_vessels()
         const PictureScene::Body& body = first.scene->bodies[b];
         if (body.role != PictureScene::Body::Collider) continue;
         const Box3f bounds = body.mesh->bounds();
-        std::optional<RayCrossings> crossings;  // costs a pass over the mesh
+        std::optional<RayCrossings> crossings;  // built lazily: it costs a pass over the mesh
         const auto is_inside = [&](const auto& P) {
             if (P.empty() || !bounds.contains(P.front())) return false;
             if (!crossings) crossings.emplace(body.mesh);
@@ -210,7 +210,7 @@ SceneOfPlan::Described SceneOfPlan::describe(std::int64_t frame)
     return result;
 }
 
-// What a `:picture` names takes the place of what those before it say. fps: of the points, whose frame may have several
+// Applies a `:picture`: its settings override those of earlier ones. fps: of the points, whose frame may have several
 // steps.
 void SceneOfPlan::add_look(Described& to, const Node& node, const Frame& now, double fps)
 {

@@ -1,4 +1,4 @@
-// The shapes of a picture: those that a plan's points collide with or are born from.
+// The shapes in a picture: those that a plan's points collide with or are born from.
 #pragma once
 
 #include <map>
@@ -18,18 +18,18 @@ class SceneOfPlan {
 public:
     explicit SceneOfPlan(const Plan& plan) : plan_(plan) {}
 
-    // Functions of the frame and motions are evaluated at the frame's time. A level set is turned into a mesh once, and
-    // again where it was not in the frame before.
+    // Returns the scene at a frame, with functions of the frame and motions evaluated. A level set is turned into a
+    // mesh once, and again if the frame before did not have it.
     std::shared_ptr<const PictureScene> at(std::int64_t frame);
-    // Whether the scene may have colliders in any frame; evaluates nothing.
+    // Returns true if the scene may have colliders in any frame. Evaluates nothing.
     bool may_have_colliders() const;
 
 private:
-    using Argument = std::pair<std::size_t, std::string>;  // the place of a node in the plan, and a parameter
+    using Argument = std::pair<std::size_t, std::string>;  // index of a node in the plan, and a parameter
     // All shapes of a frame, shown or not.
     struct Described {
         std::shared_ptr<PictureScene> scene;
-        std::vector<Argument> given_by;  // of each body
+        std::vector<Argument> given_by;  // source of each body
         bool moves = false, emitters = true, colliders = true;
     };
     Described describe(std::int64_t frame);
@@ -38,7 +38,7 @@ private:
     void add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& place, const Argument& given_by);
 
     const Plan& plan_;
-    std::map<ObjectPtr, MeshPtr> surfaces_, surfaces_before_;  // of this frame, and of the one before
+    std::map<ObjectPtr, MeshPtr> surfaces_, surfaces_before_;  // of this frame, and of the previous one
     std::shared_ptr<const PictureScene> still_;                // if nothing moves
     std::optional<std::set<Argument>> vessels_;
 };

@@ -1,4 +1,4 @@
-// A ramp: keys {position, value} of a script node's parameter. Its kernel gets a function of the position.
+// A ramp: keys {position, value} of a script node's parameter. The kernel gets it as a function of the position.
 #pragma once
 
 #include <utility>
@@ -13,11 +13,11 @@ public:
     static constexpr std::string_view param_type = "ramp";
     std::string_view kind() const override { return "ramp"; }
 
-    // At least one, with rising positions; the values are all numbers or all vec3.
+    // At least one key, with rising positions. The values are all numbers or all vec3.
     std::vector<std::pair<double, Value>> keys;
 };
 
-// Error: the value is not a list of keys.
+// Returns the ramp. Throws Error if the value is not a list of keys.
 std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value);
 
 }  // namespace rapid

@@ -17,16 +17,16 @@ namespace {
 constexpr int levels_searched = 50;  // for an error's own line, which `error(text, level)` may put further down
 constexpr char engine_errors[] = "rapid.engine_errors";  // in the registry
 
-// Of the table that describe_error() makes.
+// Fields of the table that describe_error() makes.
 enum Description { message_field = 1, place_field, trace_field, is_memory_field };
 
 struct EngineError {
     std::string message;
-    bool full_stack;  // Lua leaves no more than a few slots to the message handler
+    bool full_stack;  // Lua leaves only a few slots to the message handler
     bool is_memory;   // there was none left
 };
 
-// The text for one of LuaJIT's own errors, those of limits and of assignments to constants.
+// Returns the replacement for one of LuaJIT's own errors: limits and assignments to constants.
 std::optional<EngineError> engine_error(lua_State* L, const std::string& message)
 {
     const int top = lua_gettop(L);
@@ -51,7 +51,7 @@ std::optional<EngineError> engine_error(lua_State* L, const std::string& message
     return found;
 }
 
-// What is added to one of LuaJIT's messages by how it ends; empty for others.
+// Returns the remedy added to a LuaJIT message with a known ending; empty for others.
 std::string remedy_of(lua_State* L, const std::string& message)
 {
     const int top = lua_gettop(L);
@@ -76,8 +76,8 @@ std::string message_of(lua_State* L, int index)
 
 std::string shown(const Location& place) { return fmt::format("{}:{}", place.file, place.line); }
 
-// The line of the error itself where that is graph code, else the nearest line of graph code that led there; empty
-// where there is none. Removes the position that Lua's `error` puts in front of the message.
+// Returns the line of the error itself if it is graph code, else the nearest line of graph code that led there; empty
+// if there is none. Removes the position that Lua's `error` prepends to the message.
 std::string find_place(lua_State* L, std::string& message)
 {
     const Location& tail_call = State::of(L).tail_call;
@@ -111,7 +111,7 @@ std::string get_field(lua_State* L, int table, Description field)
     return text;
 }
 
-// "file:12" -> a Location.
+// Parses "file:12" into a Location.
 Location parse_place(const std::string& place)
 {
     const std::size_t colon = place.rfind(':');
@@ -119,8 +119,8 @@ Location parse_place(const std::string& place)
     return {place.substr(0, colon), std::atoi(place.c_str() + colon + 1)};
 }
 
-// Lua has positions only as the beginning of a message, "file:12: what": one that is there, as the compiler's and the
-// nodes' messages have it, comes before `place`.
+// Returns the error at its position. Lua has positions only as the beginning of a message, "file:12: text": such a
+// position, as in messages of the compiler and of nodes, takes precedence over `place`.
 Error with_place(const std::string& message, const std::string& place, ErrorKind kind)
 {
     const std::size_t end = message.find(": ");
@@ -165,7 +165,7 @@ Error take_error(lua_State* L, int status)
         trace = get_field(L, top, trace_field);
         lua_rawgeti(L, top, is_memory_field);
         is_memory = is_memory || lua_toboolean(L, -1) != 0;
-    } else {  // no handler was called, or it failed: there was no memory, or no stack, to describe the error
+    } else {  // no handler was called, or it failed: memory or stack ran out while describing the error
         message = lua_isstring(L, top) ? text_at(L, top) : "an error that could not be described";
         if (const auto of_engine = engine_error(L, message)) {
             message = of_engine->message;

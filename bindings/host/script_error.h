@@ -1,5 +1,5 @@
-// Errors between Lua and C++: what a script raises becomes an Error at its line of graph code, and an Error that a
-// native function throws becomes a Lua error.
+// Translates errors between Lua and C++: an error in a script becomes an Error at its line of graph code, and an Error
+// that a native function throws becomes a Lua error.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@ namespace rapid {
 
 class State;
 
-// A message handler of lua_pcall: replaces the error by a description, for take_error().
+// Message handler for lua_pcall: replaces the error with a description for take_error().
 int describe_error(lua_State* L);
 
-// The error at the top of the stack that a call has left with this status, not 0; takes it off.
+// Pops the error that a call has left at the top of the stack, and returns it. status: the call's, not 0.
 Error take_error(lua_State* L, int status);
 
-// Takes the table of lua/engine_errors.lua off the stack: what Rapid says in place of LuaJIT's own messages.
+// Pops the table of lua/engine_errors.lua: Rapid's replacements for LuaJIT's own messages.
 void set_engine_errors(lua_State* L);
 
 // Runs f for a function that Lua calls, and turns an Error into a Lua error at the calling graph code.

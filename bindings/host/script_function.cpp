@@ -63,7 +63,7 @@ private:
     State& state_;
     Location location_;
     int reference_ = 0;
-    mutable MakerCache cache_;  // asked on one thread
+    mutable MakerCache cache_;  // used on one thread
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A function of the frame, written in Lua: a parameter's value that is asked for at each frame.
+// A Lua function of the frame: a parameter's value that is evaluated at each frame.
 #pragma once
 
 #include <memory>
@@ -9,10 +9,11 @@ namespace rapid {
 
 class State;
 
-// The function at `index` of the main state's stack; kept in its registry while any node holds it.
+// Returns the function at `index` of the main state's stack. The registry holds it as long as any node does.
 std::shared_ptr<const FrameFunction> script_function(State& state, int index);
 
-// Reads the bytecode of such a function. Error: it keeps something for its next call, which no snapshot can hold.
+// Reads the function's bytecode. Throws Error if it stores something for its next call, which no snapshot can
+// hold.
 void refuse_memory(const FrameFunction& function);
 
 }  // namespace rapid

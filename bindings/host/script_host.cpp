@@ -19,7 +19,7 @@
 
 namespace rapid {
 
-// What the watchdog calls. An interruptible script is stopped, and the process goes on.
+// Returns the watchdog's callback. An interruptible script is stopped, and the process continues.
 Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
 {
     if (options.interruptible)
@@ -70,10 +70,10 @@ void ScriptHost::run_graph()
         run_file(*main_, 1);
     }
     if (options_.knobs && options_.knobs->empty())
-        lua_pop(main_->lua(), 1);  // a study of which only the description is wanted: it made no scene
+        lua_pop(main_->lua(), 1);  // a study of which only the description was requested: it made no scene
     else
         collect_outputs(*main_);
-    // A function that makes several chains gives the kernels of each one name.
+    // A function that makes several chains gives all of them kernels of the same name.
     graph = with_names_apart(graph, [](const Node& node) {
         const Param* kernel = node.type->find("kernel");
         return kernel && !kernel->internal;
@@ -88,10 +88,10 @@ void ScriptHost::run_graph()
 
 namespace {
 
-// Error: a name that may not stand for {output} in the name of a file.
+// Throws Error if the name must not replace {output} in a file name.
 void check_output_name(const std::string& name, const std::string& file)
 {
-    constexpr std::size_t most = 200;  // bytes; a file's name has at most 255
+    constexpr std::size_t most = 200;  // bytes; a file name has at most 255
     const bool plain =
         std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f || c == '/'; });
     if (name.empty() || name.size() > most || name.front() == '.' || !plain)
@@ -104,8 +104,8 @@ void check_output_name(const std::string& name, const std::string& file)
 
 }  // namespace
 
-// Gives nodes what --set NODE.PARAM=VALUE says; a rapid.param has its value already. Error: the graph has no such
-// parameter or node.
+// Applies --set NODE.PARAM=VALUE to nodes; a rapid.param already has its value. Throws Error if the graph has no
+// such parameter or node.
 void ScriptHost::apply_arguments()
 {
     std::vector<std::string> names;
@@ -117,7 +117,7 @@ void ScriptHost::apply_arguments()
             throw Error(fmt::format("{} {}={}: the graph has no parameter \"{}\"{}", name_of(Setting::Value), name,
                                     value, name, did_you_mean(name, names)))
                 .at({graph.file, 0});
-        constexpr std::string_view offered = "host:";  // in a scene of a program: what rapid.host gives
+        constexpr std::string_view offered = "host:";  // prefix, in a program's scene, for an object of rapid.host
         arguments.emplace(name, options_.offers && value.starts_with(offered)
                                     ? Value(options_.offers->object(value.substr(offered.size())))
                                     : read_argument(value));
@@ -146,7 +146,7 @@ void ScriptHost::analyse_kernels()
     }
 }
 
-// Error: a function of the frame keeps something from call to call.
+// Throws Error if a function of the frame stores something between calls.
 void ScriptHost::refuse_memory() const
 {
     for (const std::shared_ptr<const FrameFunction>& function : frame_functions) {
@@ -175,7 +175,7 @@ void ScriptHost::run_file(State& state, int results)
     try {
         state.call(3, results);
     } catch (Error& error) {
-        error.at({graph.file, 0});  // if no line is known: on a stack overflow, or out of memory
+        error.at({graph.file, 0});  // if no line is known: stack overflow or out of memory
         throw;
     }
 }
@@ -246,7 +246,7 @@ std::unique_ptr<State> ScriptHost::make_worker()
     return state;
 }
 
-// Kernels are matched by their number and their bytecode.
+// Matches kernels by their number and their bytecode.
 void ScriptHost::check_kernels(State& worker) const
 {
     for (const std::shared_ptr<Kernel>& kernel : kernels)

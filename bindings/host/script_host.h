@@ -1,4 +1,4 @@
-// The scripts of one session: the states, the objects that constructors made, the kernels.
+// The scripts of a session: the states, the objects made by constructors, the kernels.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -24,7 +24,7 @@ namespace rapid {
 
 class ScriptHost {
 public:
-    // An empty path: no graph is run.
+    // An empty path means that no graph is run.
     ScriptHost(const std::filesystem::path& file, SessionOptions options);
 
     Graph graph;
@@ -41,25 +41,25 @@ public:
     const SessionOptions& options() const { return options_; }
     std::filesystem::path folder() const { return file_.parent_path(); }
     State& main() { return *main_; }
-    // The thread whose state is the main one.
+    // Makes the calling thread the one that uses the main state.
     void use_from_this_thread() { main_thread_ = std::this_thread::get_id(); }
-    // The calling thread's state; made when it is first asked for. Error: the file behaves otherwise than in the main
-    // state.
+    // Returns the calling thread's state, made on first use. Throws Error if the file behaves differently there
+    // than in the main state.
     State& local();
-    // A second state of the main thread, for KernelOrder::TwoStates.
+    // Returns a second state of the main thread, for KernelOrder::TwoStates.
     State& second();
-    // The sequence of points in which a node's kernel runs.
+    // Returns the sequence of points in which a node's kernel runs.
     KernelOrder::Sequence sequence_of(const std::string& node) const;
 
-    // The objects that the constructors of the main state made, in order; a worker's calls take them from here. A call
-    // that failed left its message.
+    // Objects made by the constructors of the main state, in order; a worker's calls take them from here. A call that
+    // failed left its message.
     using Made = std::variant<ObjectPtr, Error>;
     std::deque<Made> made;
-    // Of the function of the frame that runs now; else null.
+    // The cache of the running function of the frame, else null.
     MakerCache* maker_cache = nullptr;
 
     std::vector<std::shared_ptr<Kernel>> kernels;
-    // With keeps_state, those that were made before the graph had run.
+    // With keeps_state, the functions made before the graph had run.
     std::vector<std::shared_ptr<const FrameFunction>> frame_functions;
 
     void load_shipped_nodes();

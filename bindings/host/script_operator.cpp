@@ -5,7 +5,7 @@
 namespace rapid {
 namespace {
 
-// An action, or a function of all points.
+// An operator for an action or a function of all points.
 class ScriptOperator : public Operator {
 public:
     ScriptOperator(NodeKind kind, ScriptFields fields) : kind_(kind), fields_(std::move(fields)) {}

@@ -1,4 +1,4 @@
-// The operator of a node type that rapid.node defines.
+// The operator of a node type defined by rapid.node.
 #pragma once
 
 #include <memory>
@@ -9,21 +9,21 @@
 
 namespace rapid {
 
-// The parameters' values by name, the kernel, and the attributes that the node makes.
+// The parameters' values by name, the kernel, and the attributes that the node adds.
 struct ScriptFields {
     std::string group;
     std::shared_ptr<const Kernel> kernel;
     KernelArguments arguments;
     std::vector<AttributeSpec> makes;
 
-    // Points of another simulation, and those behind Solve, may not have them yet.
+    // Adds the attributes to points that may lack them: those of another simulation, and those after Solve.
     void add_attributes(PointSet& points, const Evaluation& now) const
     {
         for (const AttributeSpec& spec : makes)
             if (now.keeps(spec.name)) points.add(spec);
     }
 
-    // As an edit of the points, one by one.
+    // Adds the uses of an edit of the points, one by one.
     void uses(Uses& uses) const { kernel->uses(uses, arguments); }
     bool removes_points() const { return kernel->kills(); }
     bool asks_places() const { return kernel->asks_places(); }
@@ -34,7 +34,7 @@ struct ScriptFields {
     }
 };
 
-// For a kernel that edits the points one by one, an action, or a function of all points.
+// Makes the operator of a kernel that edits the points one by one, of an action, or of a function of all points.
 std::unique_ptr<Operator> make_script_operator(NodeKind kind, bool edits_points, ScriptFields fields);
 
 }  // namespace rapid

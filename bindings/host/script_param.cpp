@@ -59,7 +59,7 @@ void keep_name(const Param& param, void* fields, const Value& value)
         if (access == Access::Writes && is_read_only(name))
             throw Error(fmt::format("{} = \"{}\"; that attribute is read only", param.name, name));
         if (access == Access::Reads && name == "nage")
-            arguments.reads.insert({"age", "life"});  // from which the kernel computes it
+            arguments.reads.insert({"age", "life"});  // the kernel's nage is computed from these
         else
             (access == Access::Writes ? arguments.writes : arguments.reads).insert(name);
     }
@@ -68,11 +68,11 @@ void keep_name(const Param& param, void* fields, const Value& value)
 struct DeclaredType {
     std::string_view shown;
     decltype(Param::assign) assign;
-    bool ranged = false;    // min and max mean something
-    bool constant = false;  // takes no function of the frame
+    bool ranged = false;    // min and max are meaningful
+    bool constant = false;  // does not take a function of the frame
 };
 
-// How a value of each declared type is checked and kept for the kernel.
+// Maps each declared type to the check and the storage of its values.
 const std::map<std::string, DeclaredType>& declared_types()
 {
     static const std::map<std::string, DeclaredType> types = {
@@ -133,7 +133,7 @@ const DeclaredType& find_type(const std::string& type, const std::string& what)
                             near.empty() ? fmt::format("; there are {}", fmt::join(names, ", ")) : near));
 }
 
-// A default is checked where it is declared.
+// Checks a default at its declaration.
 void check_default(const Param& param, const std::string& what)
 {
     ScriptFields scratch;
@@ -161,7 +161,7 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     if (param.doc.empty()) throw Error(what + ": say what it is, doc = \"...\"");
     read_limit(*table, "min", what, param.range.lo);
     read_limit(*table, "max", what, param.range.hi);
-    param.range.infinity = find_field(*table, "max") && std::isinf(param.range.hi);  // max = math.huge takes it
+    param.range.infinity = find_field(*table, "max") && std::isinf(param.range.hi);  // max = math.huge allows it
     read_required(*table, what, param.required);
     if (const Value* choices = find_field(*table, "choices")) read_value(param, *choices, param.choices);
     if (const Value* fallback = find_field(*table, "default")) param.fallback = *fallback;

@@ -16,12 +16,12 @@
 namespace rapid {
 namespace {
 
-constexpr char definitions[] = "rapid.definitions";  // in each state's registry: kernels by type name
+constexpr char definitions[] = "rapid.definitions";  // registry key in each state: kernels by type name
 
-// The functions that a definition may have; it has one of them.
+// Functions of which a definition has exactly one.
 constexpr std::string_view roles[] = {"points", "action", "detail", "expand"};
 
-// That of the definition at `index`; empty where it has none, or several.
+// Returns the role of the definition at `index`; empty if it has none, or several.
 std::string_view role_of(lua_State* L, int index)
 {
     std::string_view role;
@@ -137,7 +137,7 @@ int define_node_type(State& state)
         type.defined_in = where(state).file;
         host.registry.add(std::move(type));
     }
-    // The kernel; a type without one (expand) is known by a mark.
+    // A type without a kernel (expand) is marked as known.
     luaL_newmetatable(L, definitions);
     if (role.empty() || role == "expand")
         lua_pushboolean(L, 1);

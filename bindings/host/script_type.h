@@ -9,13 +9,13 @@ class State;
 struct NodeType;
 
 // Native functions of lua/rapid.lua.
-int define_node_type(State& state);    // rapid.node{...}: adds the type (main state) and keeps its kernel
-int complete_arguments(State& state);  // (type, arguments): the arguments, checked, with the defaults filled in
+int define_node_type(State& state);    // rapid.node{...}: adds the type (main state) and stores its kernel
+int complete_arguments(State& state);  // (type, arguments): returns the checked arguments with defaults filled in
 
-// Whether a parameter of the type names a group that its kernel changes.
+// Returns true if a parameter of the type names a group that its kernel changes.
 bool names_groups(const NodeType& type);
 
-// Pushes the kernel of a type that rapid.node has defined in this state; nil where it has none.
+// Pushes the kernel of a type that rapid.node has defined in this state, or nil if it has none.
 void push_kernel_of_type(State& state, const std::string& type);
 
 }  // namespace rapid

@@ -1,7 +1,7 @@
-// A graph file that has been run: its graph, its parameters, and the scripts that its nodes call.
+// A graph file that has run: its graph, its parameters, and the scripts that its nodes call.
 //
-// The file runs once in the session's main state, in the restricted environment; worker threads get states of their own
-// when they first run a kernel. A session is used from one thread; its kernels run in all.
+// The file runs once in the session's main state, in the restricted environment. Worker threads get their own states
+// when they first run a kernel. A session is used from one thread; its kernels run on all threads.
 #pragma once
 
 #include <cstddef>
@@ -21,53 +21,56 @@
 
 namespace rapid {
 
-// The sequence in which kernels go over the points. Any but Forward is for `rapid check --races`, on one thread.
+// The sequence in which kernels visit the points. Sequences other than Forward are for `rapid check --races`, on one
+// thread.
 struct KernelOrder {
     enum Sequence {
-        Forward,    // in chunks, on all threads, each of which has a state of its own
+        Forward,    // in chunks, on all threads, each with a state of its own
         Reversed,   // one by one, from the last point to the first, in one state
-        TwoStates,  // one by one, in two states by turns
+        TwoStates,  // one by one, alternating between two states
     };
     Sequence sequence = Forward;
-    std::string node;  // if not empty, of this node's kernel alone
+    std::string node;  // if not empty, only this node's kernel
 };
 
 struct Offers;  // offers.h
 
 struct SessionOptions {
     std::map<std::string, std::string> set;            // NAME or NODE.PARAM, and the value
-    double script_timeout = 600;                       // s in scripts, for each frame and for loading
+    double script_timeout = 600;                       // seconds of script, for each frame and for loading
     std::size_t script_memory = std::size_t{1} << 30;  // bytes of Lua memory for each state
-    bool may_write = false;                            // whether levelset:write acts; in a run only
-    bool quiet = false;                                // print says nothing
-    bool keeps_state = false;                          // what a snapshot can't hold is refused, and code() is there
+    bool may_write = false;                            // true if levelset:write writes; in a run only
+    bool quiet = false;                                // print does nothing
+    bool keeps_state = false;                          // refuses functions that no snapshot can hold; code() works
     KernelOrder kernel_order;
-    // Of a study file: the knobs of the scene that becomes its graph. Empty: there is no graph, and only study() is
-    // called.
+    // The knobs of a study's scene, which becomes the graph. If they are empty there is no graph, and only study() may
+    // be called.
     std::optional<Knobs> knobs;
-    // Called from the watchdog's thread when a script overruns, with the message; it must not return to the script.
+    // Called from the watchdog's thread with the message when a script overruns. It must not return to the script.
     std::function<void(const std::string& message)> on_timeout;
-    // If set, told of each file before it is read, and of each place where a module or node was looked for.
+    // If set, called with each file before it is read, and with each path at which a module or node was looked for.
     std::function<void(const std::filesystem::path& file)> on_read;
-    // The graph as text, in place of the file's, whose name it has then in messages.
+    // The graph's text, used instead of the file's. Messages still name the file.
     std::optional<std::string> text;
-    // Where modules and nodes in Lua are looked for: what find_module gives first, then the graph's folder, then these.
+    // Search paths of Lua modules and nodes. find_module comes first, then the graph's folder, then these.
     std::vector<std::filesystem::path> paths;
     std::function<std::optional<std::string>(const std::string& name)> find_module;
-    // If set, gives the path of a file that the scene names; empty: as usual.
+    // If set, returns the path of a file that the scene names; an empty result means the usual path.
     std::function<std::string(const std::string& path)> find_file;
-    std::shared_ptr<const Offers> offers;  // of the program that embeds Rapid; may be null
-    // If set, what scripts print goes there, not to standard output.
+    std::shared_ptr<const Offers> offers;  // of the embedding program; may be null
+    // If set, receives the output of scripts instead of standard output.
     std::function<void(const std::string& text)> on_print;
-    // A script that overruns, or that interrupt() stops, is an Error; else on_timeout ends the process.
+    // If true, a script that overruns, or that interrupt() stops, throws an error; otherwise on_timeout ends the
+    // process.
     bool interruptible = false;
-    // With it, what stops its scripts, from the first line of the file on; null: one of its own, which interrupt()
-    // asks.
+    // The interruption that stops its scripts, from the first line of the file on. Null: one of its own, used by
+    // interrupt().
     std::shared_ptr<Interruption> interruption;
-    // If set, told of each trace that LuaJIT began to compile and gave up: "FILE:LINE: why". From any thread.
-    // With it kernels go to that compiler, and are no programs of lanes.
+    // If set, called with each trace that LuaJIT began to compile and gave up, "FILE:LINE: why", from any thread.
+    // Kernels then go to that compiler and are not turned into programs of lanes.
     std::function<void(const std::string& message)> on_trace_abort;
-    // If set, told of each kernel that is no program of lanes (lua/lanes.lua): "FILE:LINE: why". From any thread.
+    // If set, called with each kernel that cannot be a program of lanes (lua/lanes.lua), "FILE:LINE: why", from any
+    // thread.
     std::function<void(const std::string& message)> on_no_lanes;
 };
 
@@ -75,8 +78,8 @@ class ScriptHost;
 
 class Session {
 public:
-    // Runs the file. Error: it can't be read; an error of Lua or Rapid in it, with file and line; an unknown or
-    // ill-typed name in options.set, with the nearest.
+    // Runs the file. Throws Error if it cannot be read, if it has an error of Lua or Rapid (with file and line),
+    // or if a name in options.set is unknown (with the nearest name) or has a value of the wrong type.
     Session(const std::filesystem::path& file, SessionOptions options);
     ~Session();
 
@@ -87,35 +90,35 @@ public:
         std::string name, doc;
         Value value, fallback;
     };
-    // In the order in which the file declares them.
+    // The parameters in the order in which the file declares them.
     const std::vector<Parameter>& parameters() const;
 
-    // From now on this is the thread that uses the session, between two calls of which it may change.
+    // Makes this the thread that uses the session. It may change between two calls.
     void use_from_this_thread();
 
-    // Stops the scripts that run now, in all threads, and all that would run later, with this error. From any thread;
-    // in an interruptible session.
+    // Stops the running scripts in all threads and refuses later ones with this error. Callable from any thread, in an
+    // interruptible session.
     void interrupt(const Error& why);
     bool is_interrupted() const;
-    // With keeps_state, by file: a hash of each of its functions, and the line in which it begins; the body's first.
-    // Equal for programs that do the same, whatever their comments and their lines.
+    // With keeps_state, hashes of each function by file, with the lines in which they begin; the body's comes first.
+    // Equal for programs that differ only in comments and line numbers.
     struct FunctionCode {
         int line;
         std::uint64_t hash;
     };
     const std::map<std::string, std::vector<FunctionCode>>& code() const;
 
-    // Of the file's makers, such as that a mesh has holes, since they were last taken: functions of the frame make
-    // objects, too.
+    // Returns the warnings of the file's makers since the last call, such as that a mesh has holes. Functions of the
+    // frame make objects, too.
     std::vector<std::string> take_warnings();
 
-    // Of a study file: its description; its closed form, with ids from 0 in order, for a row of these knobs; and its
-    // own measure of error, of points that are matched place by place. Error: what the script raised or returned.
+    // Methods of a study file: its description; its closed form for a row of these knobs, with ids from 0 in order; and
+    // its own measure of error, for points matched by index. They throw the errors that the script raises or returns.
     Study study() const;
     PointSet study_reference(const Frame& frame, const Knobs& knobs) const;
     double study_error(const PointSet& points, const PointSet& reference) const;
 
-    // The node types that need no graph: the native ones and those of the shipped Lua nodes.
+    // Returns the node types that need no graph: the native ones and the shipped Lua nodes.
     static Registry all_node_types();
 
 private:

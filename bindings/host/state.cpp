@@ -29,8 +29,8 @@ std::string read_text(const std::filesystem::path& path)
     return std::move(*text);
 }
 
-// Lua looks for modules in the current folder first, which may be that of a scene of others: what the host requires is
-// found below fixed folders alone.
+// Removes the current folder from the search path. Lua looks there first, and it may contain untrusted scenes: the host
+// loads its modules from fixed folders only.
 void leave_out_current_folder(lua_State* L)
 {
     lua_getglobal(L, "package");
@@ -50,7 +50,7 @@ void leave_out_current_folder(lua_State* L)
     lua_pop(L, 1);
 }
 
-// LuaJIT's description of its bytecode, in one of the folders of package.path; empty if it is in none of them.
+// Returns LuaJIT's description of its bytecode, from one of the folders of package.path; empty if none has it.
 std::filesystem::path bytecode_description(lua_State* L)
 {
     lua_getglobal(L, "package");
@@ -67,7 +67,7 @@ std::filesystem::path bytecode_description(lua_State* L)
     return {};
 }
 
-// Lets require(name) run the file.
+// Makes require(name) run the file.
 void preload(lua_State* L, const std::string& name, const std::filesystem::path& file)
 {
     lua_getglobal(L, "package");
@@ -92,9 +92,9 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
     std::rethrow_exception(error);
 }
 
-// Where memory runs out behind its first block, LuaJIT closes what it has of the state, takes it for granted that this
-// is more, and ends by a signal. So it is left by a jump, over functions of C alone, and the part, some kilobytes, is
-// lost.
+// Makes the state. If memory runs out after its first block, LuaJIT closes the incomplete state as if it were complete,
+// and crashes. The failing allocation therefore leaves by a jump, over C functions only, and the partial state, some
+// kilobytes, is leaked.
 void State::make()
 {
     std::jmp_buf place;
@@ -103,8 +103,8 @@ void State::make()
     making_ = nullptr;
 }
 
-// In a protected call, since Lua's own error (out of memory) is no C++ exception: one that was caught as such could not
-// be thrown again.
+// Runs in a protected call, since Lua's own error (out of memory) is not a C++ exception: catching it as one would make
+// it impossible to rethrow.
 std::exception_ptr State::set_up()
 {
     struct SetUp {
@@ -138,11 +138,11 @@ std::exception_ptr State::set_up()
 
 State::~State() { close(); }
 
-// LuaJIT cannot close a state that a jump has left, nor one without its library ffi: the memory of those is lost.
+// LuaJIT cannot close a state that a jump has left, nor one without its ffi library: their memory is leaked.
 void State::close()
 {
     if (is_broken_ || !has_libraries_) return;
-    protected_ = true;  // Lua calls finalizers so, and nothing else of it allocates
+    protected_ = true;  // Lua calls finalizers protected, and nothing else in it allocates
     lua_close(L_);
 }
 
@@ -154,12 +154,12 @@ State& State::of(lua_State* L)
     return *state;
 }
 
-// Lua's memory of one state is limited while scripts run: a request beyond it is Lua's own out-of-memory error. The
+// Lua's memory per state is limited while scripts run: a request beyond the limit is Lua's own out-of-memory error. The
 // host's own requests between them are not limited.
 //
-// Outside of a protected call Lua's error would end the process without a word. Memory that runs out there is a C++
-// exception, which leaves Lua at the place where its own would. Within compiled code LuaJIT raises it from the wrong
-// place: the call is left by a jump.
+// Outside of a protected call Lua's error would end the process silently. Running out of memory there throws a C++
+// exception, which leaves Lua where its own error would. Within compiled code LuaJIT raises the error from the wrong
+// position, so the call is left by a jump.
 void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t new_size)
 {
     State& state = *static_cast<State*>(self);
@@ -171,7 +171,7 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
     const bool is_beyond_limit = state.limited_ && new_size > old_size &&
                                  state.memory_ + (new_size - old_size) > state.host_.options().script_memory;
     void* moved = is_beyond_limit ? nullptr : std::realloc(block, new_size);
-    if (!moved && block && new_size <= old_size) moved = block;  // Lua takes it for granted that a block can shrink
+    if (!moved && block && new_size <= old_size) moved = block;  // Lua assumes that a block can shrink
     if (moved)
         state.memory_ += new_size - old_size;
     else
@@ -198,7 +198,7 @@ void State::open_libraries()
           "lanes",      "kernel",   "detail",        "numeric", "shape",    "ramp",         "power_operator",
           "protected",  "sandbox",  "shared_state",  "study",   "text",     "rapid"})
         preload(L_, name, folder / (std::string(name) + ".lua"));
-    // Its own loader takes a file that memory is refused for as one that is not there.
+    // Its own loader reports a file as missing if memory runs out.
     if (const auto file = bytecode_description(L_); !file.empty()) preload(L_, "jit.vmdef", file);
 }
 
@@ -221,7 +221,7 @@ void State::run_host_file()
 
 void State::call(int arguments, int results)
 {
-    const int base = lua_gettop(L_) - arguments;  // of the function
+    const int base = lua_gettop(L_) - arguments;  // index of the function
     lua_pushcfunction(L_, describe_error);
     lua_insert(L_, base);
     const int status = [&] {
@@ -237,7 +237,7 @@ void State::call(int arguments, int results)
     if (status != 0) throw take_error(L_, status);
 }
 
-// The status of lua_pcall.
+// Returns the status of lua_pcall.
 int State::protected_call(int arguments, int results, int handler)
 {
     if (is_broken_) fail_broken();

@@ -1,8 +1,8 @@
-// One LuaJIT state that has run the graph file: the session's main state, or a worker's.
+// A LuaJIT state that has run the graph file: the session's main state, or a worker's.
 //
 // The graph's code sees the restricted environment of lua/sandbox.lua and objects without addresses. A worker's state
-// runs the same file for its kernels alone: every constructor returns what the main state's call made, by the order of
-// calls, so that no mesh is read and no level set built twice.
+// runs the same file only for its kernels: every constructor returns the object of the main state's call, by the order
+// of calls, so that no mesh is read and no level set built twice.
 #pragma once
 
 #include <csetjmp>
@@ -35,12 +35,12 @@ public:
 
     static State& of(lua_State* L);
 
-    // The running coroutine, or the main thread of the state.
+    // Returns the running coroutine, or the main thread of the state.
     lua_State* lua() const { return L_; }
     ScriptHost& host() const { return host_; }
     bool is_main() const { return main_; }
 
-    // Calls the function below its `arguments` on the stack. Error: the one that it raised, at the nearest line of
+    // Calls the function below its `arguments` on the stack. Throws the error that it raised, at the nearest line of
     // graph code; the stack is then as before the function was pushed.
     void call(int arguments, int results);
 
@@ -50,19 +50,19 @@ public:
     // interruption, if the text contains theirs.
     ErrorKind kind_of(const std::string& text) const;
 
-    // Where a call within another one was left by a jump: leaves the other one, too, as Lua can't return into it. To be
-    // called by functions that Lua has called, behind their objects of C++.
+    // If a nested call was left by a jump, leaves the outer call, too, since Lua cannot return into it. Functions that
+    // Lua has called must call this after their C++ objects are destroyed.
     void leave_if_broken() const;
 
     // Pushes an entry point of lua/host.lua.
     void push_entry(const char* name);
     // Pushes the function of a kernel, by its number.
     void push_kernel(std::size_t kernel);
-    // Whether the graph's body has run.
+    // Returns true if the graph's body has run.
     bool is_loaded() const { return loaded_; }
     void set_loaded();
 
-    // While a kernel works on points, graph code makes nothing.
+    // While a kernel runs, graph code may not make objects.
     bool runs_kernel() const { return runs_kernel_; }
     class InKernel {
     public:
@@ -73,7 +73,7 @@ public:
         State& state_;
     };
 
-    // Makes L the running coroutine: it has a stack of its own, where the arguments of a native function are.
+    // Makes L the running coroutine, whose own stack holds the arguments of a native function.
     class InCoroutine {
     public:
         InCoroutine(State& state, lua_State* L) : state_(state), before_(state.L_) { state_.L_ = L; }
@@ -85,40 +85,40 @@ public:
         lua_State* before_;
     };
 
-    // Keeps the function at the top of the stack as the next kernel, and takes it off.
+    // Pops the function at the top of the stack, and stores it as the next kernel.
     std::size_t add_kernel();
     std::size_t kernel_count() const { return kernel_references_.size(); }
 
-    // The number of the next constructor call.
+    // number of the next constructor call
     std::size_t next_made = 0;
 
-    // Carries a kernel over points in this state (lua/kernel.lua), for columns of one layout: functions in the
-    // registry, and the chunk that they see, with pointers to columns behind it.
+    // Runs a kernel over points in this state (lua/kernel.lua), for columns of one layout: functions in the registry,
+    // and the chunk that they see, followed by pointers to columns.
     struct Runner {
         std::string layout;
         int run = 0, set_params = 0;
         rapid_chunk* chunk = nullptr;
-        std::uint64_t pass = 0;  // whose parameters it has been given
-        int translate = 0;       // makes the kernel a program of lanes; once it has parameters
+        std::uint64_t pass = 0;  // the pass whose parameters it has
+        int translate = 0;       // makes the kernel a program of lanes, once it has parameters
         std::unique_ptr<KernelLanes> lanes;
     };
     std::map<std::size_t, std::vector<Runner>> runners;  // by kernel
 
-    // Number of the running :detail function; it changes when that ends (lua/detail.lua).
+    // Number of the running :detail function. It changes when that function ends (lua/detail.lua).
     std::int32_t detail_serial = 0;
 
-    // The call that ends the body of the running file, `return ...:solve {}`: it leaves no frame on the stack that
-    // would tell its place. Line 0: none.
+    // The tail call that ends the body of the running file, `return ...:solve {}`. It leaves no stack frame that would
+    // show its position. Line 0 means none.
     Location tail_call;
 
     // Bytes of Lua memory in use.
     std::size_t memory() const { return memory_; }
-    // What a script is told that needs more than it may have.
+    // Returns the message for a script that exceeds its memory limit.
     std::string memory_limit_text() const;
 
 private:
     Error beyond_limit() const;
-    // While Lua runs in a protected call, its errors have somewhere to go.
+    // Marks a protected call of Lua, in which its errors can be caught.
     class Protected {
     public:
         explicit Protected(State& state) : state_(state), before_(std::exchange(state.protected_, true)) {}
@@ -132,9 +132,9 @@ private:
     static void* allocate(void* self, void* block, std::size_t old_size, std::size_t new_size);
     int protected_call(int arguments, int results, int handler);
     [[noreturn]] void fail_broken() const;
-    // Has LuaJIT make the state; none where there is no memory.
+    // Makes the LuaJIT state; leaves none if memory runs out.
     void make();
-    // Fills a new state; the error, where there is one.
+    // Fills a new state. Returns the error, if any.
     std::exception_ptr set_up();
     void close();
     void open_libraries();
@@ -144,14 +144,14 @@ private:
     bool main_;
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
-    bool limited_ = false;        // to options().script_memory, now
-    bool has_libraries_ = false;  // those of LuaJIT itself
+    bool limited_ = false;        // to options().script_memory, at present
+    bool has_libraries_ = false;  // LuaJIT's own libraries
     bool is_broken_ = false;      // compiled code was left by a jump
-    bool is_at_limit_ = false;    // memory was last refused as the script asked for more than it may have
+    bool is_at_limit_ = false;    // memory was last refused because the script exceeded its limit
     bool protected_ = false;      // now
     std::string passed_;          // the text of the last Error that was passed, unless it was a fault
     ErrorKind passed_kind_ = ErrorKind::Fault;
-    std::jmp_buf* making_ = nullptr;  // while LuaJIT makes the state: where to go without memory
+    std::jmp_buf* making_ = nullptr;  // jump target while LuaJIT makes the state, if memory runs out
     Interruption::Slot slot_;
     lua_State* L_ = nullptr;
     int entries_ = 0;

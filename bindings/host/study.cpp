@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// The numbers of one value, as lua/study.lua takes them.
+// Appends the numbers of one value, as lua/study.lua takes them.
 void append(lua_State* L, int& place, float value)
 {
     lua_pushnumber(L, static_cast<double>(value));
@@ -40,7 +40,7 @@ void append(lua_State* L, int& place, Token text)
     lua_rawseti(L, -2, ++place);
 }
 
-// { { name, numbers a value, flat numbers }, ... }
+// Pushes { { name, numbers per value, flat numbers }, ... }.
 void push_columns(lua_State* L, const PointSet& points)
 {
     lua_newtable(L);
@@ -64,7 +64,7 @@ void push_columns(lua_State* L, const PointSet& points)
     }
 }
 
-// lua/study.lua has checked it: the fields are there, and of their types.
+// Returns the study. lua/study.lua has checked that the fields exist and have the right types.
 Study study_of(const Table& asked)
 {
     const auto table = [&](const char* name) { return asked.named.at(name).table(); };

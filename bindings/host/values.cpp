@@ -16,9 +16,9 @@ namespace rapid {
 namespace {
 
 constexpr char object_metatable[] = "rapid.object";
-constexpr int cdata_type = 10;  // LUA_TCDATA, which lua.h does not name
+constexpr int cdata_type = 10;  // LUA_TCDATA, which lua.h does not define
 
-// The entries of the table at `index` that its list does not hold.
+// Reads the entries of the table at `index` that are not in its list.
 void read_entries(State& state, int index, Table& table)
 {
     lua_State* L = state.lua();
@@ -45,7 +45,7 @@ Value to_table(State& state, int index)
 {
     lua_State* L = state.lua();
     auto table = std::make_shared<Table>();
-    // The length of a table of keys, {[2] = a, [14] = b}, may be any of them that has none behind it.
+    // The length of a table of keys, {[2] = a, [14] = b}, may be any index that is followed by nil.
     lua_rawgeti(L, index, 1);
     const std::size_t length = lua_isnil(L, -1) ? 0 : lua_objlen(L, index);
     lua_pop(L, 1);
@@ -59,7 +59,7 @@ Value to_table(State& state, int index)
     return Value(std::shared_ptr<const Table>(std::move(table)));
 }
 
-// Nil for any other cdata.
+// Returns nil for any other cdata.
 Value to_vec3(State& state, int index)
 {
     lua_State* L = state.lua();
@@ -72,7 +72,7 @@ Value to_vec3(State& state, int index)
     return is_vec3 ? Value(v) : Value();
 }
 
-// Nil for a userdata that is no object of the runtime's.
+// Returns nil for a userdata that is not an object of the runtime.
 Value to_object_value(State& state, int index)
 {
     const ObjectPtr object = to_object(state, index);
@@ -100,7 +100,7 @@ void push_table(State& state, const Table& table)
     }
 }
 
-// As the function that lua/ramp.lua makes of its keys.
+// Pushes the function that lua/ramp.lua makes from the keys.
 void push_ramp(State& state, const Ramp& ramp)
 {
     lua_State* L = state.lua();
@@ -114,7 +114,7 @@ void push_ramp(State& state, const Ramp& ramp)
     state.call(1, 1);
 }
 
-// What is wrong with something that has no value. A frame tells so by its text.
+// Returns the error for a Lua value without a runtime form. A frame is recognized by its text.
 std::string no_value(lua_State* L, int index)
 {
     if (lua_type(L, index) == cdata_type && luaL_callmeta(L, index, "__tostring")) {
@@ -204,7 +204,7 @@ void push(State& state, std::map<std::string, Value> entries) { push_table(state
 void push_object(State& state, const ObjectPtr& object)
 {
     lua_State* L = state.lua();
-    if (!object) return lua_pushnil(L);  // of a sequence that has none at a frame
+    if (!object) return lua_pushnil(L);  // of a sequence without an object at this frame
     hold(L, *object);
     new (lua_newuserdata(L, sizeof(ObjectPtr))) ObjectPtr(object);
     luaL_getmetatable(L, object_metatable);
@@ -218,7 +218,7 @@ void register_objects(lua_State* L)
     lua_pushcfunction(L, [](lua_State* of_object) -> int {
         ObjectPtr& object = *static_cast<ObjectPtr*>(lua_touserdata(of_object, 1));
         release(of_object, *object);
-        object.reset();  // a handle that comes back holds nothing
+        object.reset();  // a resurrected handle holds nothing
         return 0;
     });
     lua_setfield(L, -2, "__gc");

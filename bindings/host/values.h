@@ -1,4 +1,4 @@
-// Values between Lua and the runtime: numbers, texts, vec3, tables, objects and functions of the frame.
+// Converts values between Lua and the runtime: numbers, strings, vec3, tables, objects and functions of the frame.
 #pragma once
 
 #include "runtime/graph/value.h"
@@ -9,21 +9,22 @@ namespace rapid {
 
 class State;
 
-// The value at `index`. A function becomes a FrameFunction, in the main state only. Error: a value that has no form in
-// the runtime.
+// Returns the value at `index`. A function becomes a FrameFunction, in the main state only. Throws Error if the
+// value has no form in the runtime.
 Value to_value(State& state, int index);
-// Null where the value is no object of the runtime's.
+// Returns null if the value is not an object of the runtime.
 ObjectPtr to_object(State& state, int index);
 
 void push(State& state, const Value& value);
-// A table of these entries by name.
+// Pushes a table with these entries by name.
 void push(State& state, std::map<std::string, Value> entries);
 void push_object(State& state, const ObjectPtr& object);
 
-// Makes the metatable of objects in a new state. Its fields are set by set_object_methods().
+// Makes the metatable of objects in a new state. set_object_methods() sets its fields.
 void register_objects(lua_State* L);
 
-// native.set_index(index, product, call): sets what reading a field of an object, multiplying two, and calling one do.
+// native.set_index(index, product, call): sets the metamethods of objects: reading a field, multiplying two, calling
+// one.
 int set_object_methods(State& state);
 
 }  // namespace rapid

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// At most what a clock can hold, which is longer than any run.
+// Returns the duration, capped at the clock's range, which exceeds any run.
 std::chrono::steady_clock::duration duration_of(double seconds)
 {
     return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
@@ -34,7 +34,7 @@ Watchdog::~Watchdog()
     thread_.join();
 }
 
-// The watchdog is not woken: it never sleeps for as long as a section may take.
+// The watchdog need not be woken: it always sleeps for less than a section may take.
 Watchdog::Section::Section(Watchdog& watchdog, std::string what) : watchdog_(watchdog)
 {
     const std::lock_guard lock(watchdog.mutex_);
@@ -48,11 +48,11 @@ Watchdog::Section::Section(Watchdog& watchdog, std::string what) : watchdog_(wat
 Watchdog::Section::~Section()
 {
     const std::lock_guard lock(watchdog_.mutex_);
-    watchdog_.running_.pop_back();  // sections end in the reverse order; whose name is taken off does not matter
+    watchdog_.running_.pop_back();  // sections end in reverse order; it does not matter whose name is removed
 }
 
-// The thread looks about often: when it comes much later than it meant to, the process was stopped (SIGSTOP, a machine
-// that slept), and no script ran meanwhile.
+// The thread wakes up often. If it wakes much later than intended, the process was suspended (SIGSTOP, a sleeping
+// machine), and no script ran in the meantime.
 void Watchdog::watch()
 {
     const auto step = std::min<std::chrono::steady_clock::duration>(std::chrono::seconds(1), duration_of(limit_ / 4));

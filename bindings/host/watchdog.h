@@ -1,5 +1,4 @@
-// The watchdog of --script-timeout: a thread of its own that sees when a script overruns, which may be in compiled
-// code.
+// The watchdog of --script-timeout: a thread that detects when a script overruns, even in compiled code.
 #pragma once
 
 #include <chrono>
@@ -17,12 +16,12 @@ public:
     enum Then { EndProcess, GoOn };
     using Late = std::function<Then(const std::string& message)>;
 
-    // limit: s, that a section may take. on_late: called from the watchdog's thread, again and again while the section
-    // lasts. Where it says so the process ends, with the message on standard error.
+    // limit: seconds that a section may take. on_late: called from the watchdog's thread, repeatedly while a late
+    // section lasts. If it returns EndProcess, the process ends with the message on standard error.
     Watchdog(double limit, Late on_late);
     ~Watchdog();
 
-    // A stretch of script whose time counts. Sections that run together have as much time as if each ran alone.
+    // A stretch of script whose time counts. Concurrent sections each get as much time as if they ran alone.
     class Section {
     public:
         Section(Watchdog& watchdog, std::string what);

@@ -1,4 +1,4 @@
-// rapid.camera: from where pictures are taken.
+// rapid.camera: the camera of pictures.
 #include "bindings/host/maker.h"
 #include "runtime/operators/picture.h"
 

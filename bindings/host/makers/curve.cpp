@@ -1,4 +1,4 @@
-// rapid.curve: lines from place to place, at rest or moving.
+// rapid.curve: polylines, at rest or moving.
 #include <fmt/format.h>
 
 #include <deque>
@@ -39,7 +39,7 @@ struct CurveFrom {
 };
 RAPID_MAKER(CurveFrom);
 
-// A file for each frame, all with as many points on as many lines.
+// Curves with a file for each frame, all with the same number of points and lines.
 class CurveFiles final : public CurveFrames {
 public:
     CurveFiles(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order, bool closed)
@@ -75,7 +75,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t most_kept = 8;  // as of the files of a mesh
+    static constexpr std::size_t most_kept = 8;  // the same as for files of a mesh
 
     CurvesPtr read(int frame) const
     {

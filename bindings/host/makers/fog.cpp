@@ -1,4 +1,4 @@
-// rapid.fog: volumes of a density.
+// rapid.fog: density volumes.
 #include "bindings/host/maker.h"
 #include "bindings/host/makers/grid_files.h"
 #include "bindings/host/makers/points_of_grid.h"

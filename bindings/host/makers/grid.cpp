@@ -82,11 +82,11 @@ struct WriteGrids {
 };
 RAPID_MAKER(WriteGrids);
 
-// The parameter `at`: the values of the function at each node, which lua/rapid.lua has asked for.
+// The parameter `at`: the values of the function at each node, evaluated by lua/rapid.lua.
 struct PlaceFunction {
     static constexpr std::string_view param_type = "function of a place";
 
-    std::vector<double> values;  // three a node, z fastest
+    std::vector<double> values;  // three per node, z fastest
 };
 
 void read_value(const Param& param, const Value& value, PlaceFunction& function)

@@ -1,4 +1,4 @@
-// The files of a sequence of grids, as makers are given them.
+// Files of a sequence of grids, as makers take them.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// The parameters of what may be read from a sequence of .vdb files; T derives from it.
+// Parameters of a maker that can read a sequence of .vdb files; T derives from it.
 struct GridFiles : SequenceOptions {
     std::string path, grid;
 
@@ -25,10 +25,11 @@ struct GridFiles : SequenceOptions {
     }
 
     bool is_sequence(const MakeContext& context) const;
-    // Of a sequence. Error: there is no such file.
+    // Returns the files of a sequence. Throws Error if there are none.
     SequenceFiles files(MakeContext& context) const;
 
-    // The grid, or the sequence of grids, that read(path, grid) reads. The first file is read at once, for its errors.
+    // Returns the grid, or the sequence of grids, that read(path, grid) reads. The first file is read at once to report
+    // its errors.
     template <class G, class Read>
     ObjectPtr make_with(MakeContext& context, const Read& read) const
     {

@@ -20,7 +20,7 @@
 namespace rapid {
 namespace {
 
-// The parameters of every level set.
+// Parameters of every level set.
 struct Grid {
     double voxel, half_width;
 
@@ -50,7 +50,7 @@ void read_value(const Param& param, const Value& value, AnyMesh& mesh)
     if (!(mesh.moving = value.object<AnimatedMesh>())) rapid::read_value(param, value, mesh.still);
 }
 
-// What has been made of a mesh with these options, and is in use.
+// A level set in use that was made from a mesh with these options.
 struct MadeFromMesh {
     std::weak_ptr<const Object> mesh, result;
 };
@@ -67,7 +67,7 @@ struct FromMesh : Grid {
         Grid::declare(declaration);
         return declaration;
     }
-    // The same mesh with the same options is one level set, however often it is asked for.
+    // Returns one level set for the same mesh and options, however often it is requested.
     ObjectPtr make(MakeContext& context) const
     {
         static std::mutex mutex;
@@ -269,7 +269,7 @@ struct ReadLevelSet : GridFiles {
 };
 RAPID_MAKER(ReadLevelSet);
 
-// What a sequence is called with a frame for.
+// The call of a sequence with a frame.
 struct LevelSetOfFrame {
     std::shared_ptr<const LevelSetSequence> levelset;
     double frame;
@@ -282,7 +282,7 @@ struct LevelSetOfFrame {
             .param(&LevelSetOfFrame::frame, "frame", Value(), any_number(), "", "its number")
             .required();
     }
-    // Null at a frame that has none: a function of the frame then returns nil.
+    // Returns null at a frame without a level set: a function of the frame then returns nil.
     ObjectPtr make(MakeContext&) const { return levelset->at(static_cast<std::int64_t>(std::ceil(frame))); }
 };
 RAPID_MAKER(LevelSetOfFrame);

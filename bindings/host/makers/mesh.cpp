@@ -1,4 +1,4 @@
-// rapid.mesh: meshes that are read or made.
+// rapid.mesh: meshes that are read or generated.
 #include "runtime/shapes/mesh/mesh.h"
 
 #include <fmt/format.h>
@@ -129,7 +129,7 @@ struct TorusMesh {
 };
 RAPID_MAKER(TorusMesh);
 
-// Values at vertices by name: numbers, or vec3 where the first is one.
+// Returns values at vertices by name: numbers, or vec3 if the first is one.
 std::map<std::string, Mesh::VertexValues> vertex_values(const std::map<std::string, Value>& lists, std::size_t vertices)
 {
     std::map<std::string, Mesh::VertexValues> values;

@@ -1,4 +1,4 @@
-// rapid.translate, rapid.rotate, rapid.scale, their products, and moved objects.
+// rapid.translate, rapid.rotate, rapid.scale, their products, and transformed objects.
 #include "runtime/shapes/motion/motion.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// rapid.points: point sets that are read or made.
+// rapid.points: point sets that are read or generated.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// Ids count from 0 in order.
+// Numbers the points with ids from 0 in order.
 ObjectPtr numbered(PointSet points)
 {
     auto object = std::make_shared<PointsObject>();
@@ -25,7 +25,7 @@ ObjectPtr numbered(PointSet points)
 
 struct ReadPoints : SequenceOptions {
     std::string path;
-    std::optional<double> frame;  // of a sequence, as lua/rapid.lua asks for it
+    std::optional<double> frame;  // the frame of a sequence, requested by lua/rapid.lua
 
     static Maker declare()
     {
@@ -46,7 +46,7 @@ struct ReadPoints : SequenceOptions {
         const FramePattern pattern((context.folder / path).string());
         const auto files = existing_files(pattern);
         if (const auto file = file_at(pattern, files, *frame)) return read(context.resolve(file->string()), context);
-        // No points, but the attributes that they have at other frames.
+        // A frame without points still has the attributes of the other frames.
         auto none = std::make_shared<PointsObject>();
         const ObjectPtr first = read(context.resolve(files.begin()->second.string()), context);
         none->points = static_cast<const PointsObject&>(*first).points.select({});
@@ -54,7 +54,7 @@ struct ReadPoints : SequenceOptions {
     }
 
 private:
-    // The file's ids say which points are the same in another file; without any the places do.
+    // Reads points. The file's ids identify the same points in other files; without ids their order does.
     static ObjectPtr read(const std::filesystem::path& file, MakeContext& context)
     {
         const LeftOut left_out;
@@ -68,7 +68,7 @@ private:
         return object;
     }
 
-    // Whether each point has an id of its own.
+    // Returns true if every point has a unique id.
     static bool has_ids(const PointSet& points)
     {
         std::vector<std::int64_t> ids(points.size());
@@ -92,7 +92,7 @@ struct GridPoints {
     }
     ObjectPtr make(MakeContext&) const
     {
-        // An edge shorter than the spacing is one layer; a ratio just below a whole number is that number.
+        // An edge shorter than the spacing gives one layer. A ratio just below a whole number is rounded up to it.
         const auto along = [this](int axis) { return std::max(1.0, std::floor(size[axis] / spacing * (1 + 1e-9))); };
         if (!(size.minCoeff() >= 0))
             throw Error(fmt::format("size = {}: each edge must be at least 0", describe(Value(size))));

@@ -1,4 +1,4 @@
-// Points that a grid is made of, as makers are given them.
+// Points from which a grid is made, as makers take them.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// The parameters of what is made of points; T derives from it.
+// Parameters of a grid that is made from points; T derives from it.
 struct PointsOfGrid {
     std::shared_ptr<const PointsObject> points;
     double voxel;
@@ -33,7 +33,7 @@ struct PointsOfGrid {
                    "what a point counts: the sum of density times volume is that of the weights");
     }
 
-    // Refers to this; the columns that it holds are kept until it is destroyed.
+    // Returns a view that refers to this object, which must outlive it.
     SpreadPoints spread() const
     {
         const PointSet& set = points->points;

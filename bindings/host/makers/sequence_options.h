@@ -1,4 +1,4 @@
-// The parameters of makers that read a sequence of files: what goes beyond its ends, and when it begins.
+// Parameters of makers that read a sequence of files: the behaviour beyond its ends, and its beginning.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-// The files of a pattern, by frame. Error: there are none.
+// Returns the files of a pattern, by frame. Throws Error if there are none.
 inline std::map<int, std::filesystem::path> existing_files(const FramePattern& pattern)
 {
     auto files = pattern.existing();
@@ -21,7 +21,7 @@ inline std::map<int, std::filesystem::path> existing_files(const FramePattern& p
 }
 
 struct SequenceOptions {
-    std::string before, after;  // empty: not given
+    std::string before, after;  // empty if not given
     std::optional<double> offset;
 
     template <class T>
@@ -42,7 +42,7 @@ struct SequenceOptions {
         return maker;
     }
 
-    // Error: an offset that is not whole; any of them for one file.
+    // Throws Error if the offset is not whole, or if any of them is given for a single file.
     void check(const std::string& path, bool is_sequence) const
     {
         if (offset && *offset != std::floor(*offset))
@@ -56,7 +56,7 @@ struct SequenceOptions {
                                 name, path));
     }
 
-    // The file of a frame; nothing where there is none. Error: a file is missing between others.
+    // Returns the file of a frame, or nothing if it has none. Throws Error if a file is missing between others.
     std::optional<std::filesystem::path> file_at(const FramePattern& pattern,
                                                  const std::map<int, std::filesystem::path>& files, double frame) const
     {

@@ -1,4 +1,4 @@
-// rapid.shape: a maker for each analytic shape that the library declares.
+// rapid.shape: a maker for each analytic shape in the library.
 #include <fmt/format.h>
 
 #include "bindings/host/maker.h"

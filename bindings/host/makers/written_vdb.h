@@ -1,4 +1,4 @@
-// The name of a .vdb file that a script writes.
+// Checks the name of a .vdb file that a script writes.
 #pragma once
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-// Error: another extension; a script writes no other files than these, over those of the user.
+// Throws Error for another extension: a script must not overwrite other files of the user.
 inline void require_vdb(const std::string& path)
 {
     if (!path.ends_with(".vdb"))

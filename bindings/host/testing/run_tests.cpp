@@ -19,7 +19,7 @@
 namespace rapid {
 namespace {
 
-// The context of the functions that Lua calls.
+// Context of the functions that Lua calls.
 struct Host {
     const TestOptions& options;
     const std::function<void(const TestEvent&)>& tell;
@@ -55,7 +55,7 @@ struct SceneRun {
     bool watch_traces = false;  // only on request: the JIT's events are not safe in every run
 };
 
-// The arguments (path, options) of lua/testing/rapid.lua, which has checked them.
+// Reads the arguments (path, options) of lua/testing/rapid.lua, which has checked them.
 SceneRun read_run(lua_State* L)
 {
     const Host& host = host_of(L);
@@ -79,7 +79,7 @@ SceneRun read_run(lua_State* L)
     return run;
 }
 
-// Runs the scene and returns its warnings, each once. Frames from run.first on go to `keep`.
+// Runs the scene and returns its distinct warnings. Passes frames from run.first on to `keep`.
 std::vector<std::string> run_scene(const SceneRun& run, const std::function<void(FrameResult&)>& keep)
 {
     Threads threads(run.threads);
@@ -117,8 +117,8 @@ void push_list(lua_State* L, const std::vector<std::string>& texts)
     }
 }
 
-// native.run(path, options): point sets by output and frame; the warnings, in order; the traces that LuaJIT gave up;
-// and the kernels that are no programs of lanes.
+// native.run(path, options): returns point sets by output and frame; the warnings, in order; the traces that LuaJIT
+// gave up; and the kernels that are not programs of lanes.
 int run(lua_State* L)
 {
     std::string error;
@@ -163,11 +163,11 @@ int run(lua_State* L)
         error = raised.what();
     }
     lua_pushlstring(L, error.data(), error.size());
-    error = {};  // lua_error() may not return through destructors
+    error = {};  // lua_error() must not skip destructors
     return lua_error(L);
 }
 
-// tell(kind, name, message)
+// tell(kind, name, message): reports an event.
 int tell(lua_State* L)
 {
     constexpr const char* kinds[] = {"started", "passed", "failed", "skipped", "broken", nullptr};
@@ -183,7 +183,7 @@ void push_function(lua_State* L, Host& host, const char* name, lua_CFunction fun
     lua_setfield(L, -2, name);
 }
 
-// Rapid's own modules come first.
+// Puts Rapid's own modules first.
 void set_path(lua_State* L)
 {
     lua_getglobal(L, "package");

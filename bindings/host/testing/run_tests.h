@@ -1,5 +1,5 @@
 // Script-level tests: a file in busted's language, run in an unrestricted LuaJIT state with the module `rapid` of
-// lua/testing. Scenes run in sessions of their own, in this process.
+// lua/testing. Scenes run in their own sessions, in this process.
 #pragma once
 
 #include <filesystem>
@@ -14,21 +14,21 @@ struct TestEvent {
         Passed,
         Failed,
         Skipped,
-        Broken,  // the file can't be read or run, so its tests are not known
+        Broken,  // the file cannot be read or run, so its tests are unknown
     } kind;
-    std::string name;     // of the test, with its describe blocks
+    std::string name;     // name of the test, with its describe blocks
     std::string message;  // of Failed and Broken: FILE:LINE: the fault, possibly more lines
 };
 
 struct TestOptions {
-    std::string filter;   // a Lua pattern that a test's name must match; empty: all
-    int already_run = 0;  // tests at the beginning of the file to skip
-    int threads = 0;      // of scenes that do not set it; 0: all
+    std::string filter;   // a Lua pattern for names of tests; empty: all
+    int already_run = 0;  // number of tests at the beginning of the file to skip
+    int threads = 0;      // for scenes that do not set it; 0: all
     // Called from the watchdog's thread when a scene's script overruns, before it is stopped.
     std::function<void(const std::string& message)> on_timeout;
 };
 
-// Runs the tests of a file, and tells each event as it happens.
+// Runs the tests of a file, and reports each event as it happens.
 void run_test_file(const std::filesystem::path& file, const TestOptions& options,
                    const std::function<void(const TestEvent&)>& tell);
 

@@ -18,17 +18,17 @@
 namespace rapid {
 namespace {
 
-// Checks of whole point sets, for assertions: each returns the first fault as a text, or nothing.
+// Checks of whole point sets, for assertions. Each returns the first fault as text, or nothing.
 
-// The points of a scene's frame, as a test has them.
+// The points of a scene's frame, as a test sees them.
 
 struct TestedPoints {
     PointSet set;
     std::string source;                                    // for messages: "frame 48", "frame 48, output sparks"
-    std::unordered_map<std::int64_t, std::size_t> places;  // by id; made when first asked for
+    std::unordered_map<std::int64_t, std::size_t> places;  // index by id; built on first use
 };
 
-// A value as its numbers: 1, 3 (vec3), 4 (quaternion, x y z w) or none (a text).
+// A value as numbers: 1, 3 (vec3), 4 (quaternion, x y z w) or none (a string).
 struct Numbers {
     int count = 1;
     double x[4] = {};
@@ -62,7 +62,7 @@ std::string point_text(const TestedPoints& points, std::size_t place)
     return fmt::format("{}, point {} (id {})", points.source, place + 1, points.set.id()[place]);
 }
 
-// The first difference in the bits of two columns of one type, as a text.
+// Returns the first bitwise difference of two columns of one type, as text.
 std::optional<std::string> first_difference(const TestedPoints& a, const std::string& name, const AnyColumn& column_a,
                                             const AnyColumn& column_b)
 {
@@ -78,7 +78,7 @@ std::optional<std::string> first_difference(const TestedPoints& a, const std::st
         column_a);
 }
 
-// Of sizes and names.
+// Returns the first difference of sizes and names.
 std::optional<std::string> first_difference_in_shape(const TestedPoints& a, const TestedPoints& b)
 {
     if (a.set.size() != b.set.size())
@@ -92,7 +92,7 @@ std::optional<std::string> first_difference_in_shape(const TestedPoints& a, cons
     return std::nullopt;
 }
 
-// A value that is neither finite nor the life of a point that never dies.
+// Returns a value that is neither finite nor the life of a point that never dies.
 std::optional<std::string> first_not_finite(const TestedPoints& points)
 {
     for (const auto& [name, any] : points.set.columns()) {
@@ -193,7 +193,7 @@ int names(lua_State* L) { return push_list_of_names(L, points_at(L, 1).set.colum
 
 int group_names(lua_State* L) { return push_list_of_names(L, points_at(L, 1).set.group_names()); }
 
-// value(points, place from 1, name): the numbers of the value, or its text.
+// value(points, index from 1, name): returns the numbers of the value, or its string.
 int value(lua_State* L)
 {
     const TestedPoints& points = points_at(L, 1);
@@ -213,7 +213,7 @@ const Column<std::uint8_t>& group_of(const TestedPoints& points, const std::stri
         fmt::format("{} has no group \"{}\"{}", points.source, name, did_you_mean(name, points.set.group_names())));
 }
 
-// within(points, place from 1, group)
+// within(points, index from 1, group): returns true if the point is in the group.
 int within(lua_State* L)
 {
     const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
@@ -221,7 +221,7 @@ int within(lua_State* L)
     return 1;
 }
 
-// place_of(points, id): from 1; nil where no point has the id.
+// place_of(points, id): returns the index from 1, or nil if no point has the id.
 int place_of(lua_State* L)
 {
     TestedPoints& points = points_at(L, 1);
@@ -246,14 +246,14 @@ int group(lua_State* L)
     return 1;
 }
 
-// A NaN among them makes the result NaN: no comparison with it holds, so no test overlooks it.
+// A NaN among the values makes the result NaN: comparisons with it are false, so no test overlooks it.
 double folded(const std::string& what, double so_far, double x)
 {
     if (std::isnan(x) || std::isnan(so_far)) return std::numeric_limits<double>::quiet_NaN();
     return what == "min" ? std::min(so_far, x) : what == "max" ? std::max(so_far, x) : so_far + x;
 }
 
-// reduce(points, name, "min" | "max" | "mean"), for each number of the values. Without points: inf, -inf and NaN.
+// reduce(points, name, "min" | "max" | "mean"): reduces each component. Without points: inf, -inf and NaN.
 int reduce(lua_State* L)
 {
     const std::string what = checked_text_at(L, 3), name = checked_text_at(L, 2);
@@ -284,10 +284,10 @@ int push_fault(lua_State* L, const std::optional<std::string>& fault)
     return 1;
 }
 
-// not_finite(points): the first value that is not finite, or nil.
+// not_finite(points): returns the first value that is not finite, or nil.
 int not_finite(lua_State* L) { return push_fault(L, first_not_finite(points_at(L, 1))); }
 
-// difference(a, b): the first difference in their bits, or nil.
+// difference(a, b): returns the first bitwise difference, or nil.
 int difference(lua_State* L) { return push_fault(L, first_difference(points_at(L, 1), points_at(L, 2))); }
 
 int collect(lua_State* L)

@@ -1,4 +1,4 @@
-// Graphs as a graph file makes them, of the node types of nodes.cpp.
+// Builds graphs like those of a graph file, from the node types of nodes.cpp.
 #pragma once
 
 #include <map>
@@ -12,10 +12,10 @@
 
 namespace rapid::test {
 
-// How often each node was evaluated, by its name; of which, at the first frame by start().
+// Number of evaluations of each node, by name, and of those at the first frame by start().
 inline std::map<std::string, int> evaluations, starts;
 
-// The line of a node in its file is its place among all, from 1. Clears the counts.
+// The line of a node in its file is its index among all nodes, from 1. Clears the counts.
 class GraphUnderTest {
 public:
     GraphUnderTest()
@@ -53,7 +53,7 @@ private:
     std::map<std::string, int> count_;
 };
 
-// A parameter as a function of the frame.
+// Returns a parameter that is a function of the frame.
 template <class F>
 Value of_frame(F f)
 {
@@ -65,7 +65,7 @@ Value of_frame(F f)
     return std::shared_ptr<const FrameFunction>(std::make_shared<Function>(std::move(f)));
 }
 
-// What a failed call says, with file, line and node; empty where it did not fail.
+// Returns the message of a failed call, with file, line and node; empty if it did not fail.
 template <class F>
 std::string error_of(const F& f)
 {

@@ -1,4 +1,4 @@
-// Node types for the tests of plan and evaluation, one of each kind: the real ones are above this layer.
+// Node types for the tests of plan and evaluation, one of each kind, because the real ones are above this layer.
 #include <cmath>
 #include <new>
 
@@ -7,7 +7,7 @@
 namespace rapid::test {
 namespace {
 
-// One point at the origin, handed on as the simulation's state.
+// Creates one point at the origin, passed on as the simulation's state.
 struct Source {
     double fps = 24;
     int start_frame = 1, seed = 0, subframes = 1;
@@ -44,7 +44,7 @@ struct Source {
 };
 RAPID_NODE(Source);
 
-// Moves points, and says so.
+// Moves points, and counts its evaluations.
 struct Shift {
     Vec3d by;
     std::string group;
@@ -66,7 +66,7 @@ struct Shift {
 };
 RAPID_NODE(Shift);
 
-// As Shift, but counted as changing from frame to frame whatever its arguments are.
+// Like Shift, but counted as changing from frame to frame with any arguments.
 struct Jitter {
     static NodeType declare() { return node<Jitter>("jitter", "Changes each frame.").varies(); }
     void edit(PointSet&, const Evaluation& now) const { ++evaluations[now.node]; }
@@ -129,7 +129,7 @@ struct Undeclared {
 };
 RAPID_NODE(Undeclared);
 
-// Bears nothing, but would write lives and birth times; and puts points into a group one by one.
+// Emits nothing, but declares lives and birth times, and puts points into a group one by one.
 struct Bear {
     double life = 1;
     std::string joins;
@@ -152,7 +152,7 @@ struct Bear {
 };
 RAPID_NODE(Bear);
 
-// Writes an attribute of each point, as a kernel does, and asks whether it is in a group.
+// Writes an attribute of each point, like a kernel, and reads a group.
 struct Assign {
     std::string to, within;
     bool all = false;
@@ -180,7 +180,7 @@ struct Push {
 };
 RAPID_NODE(Push);
 
-// Posts the points back, and tells how many dynamics reached it.
+// Feeds the points back, and reports the number of dynamics that reached it.
 struct Post {
     static NodeType declare() { return node<Post>("post", "Feeds back.").kind(NodeKind::Solve).takes("life"); }
 
@@ -205,7 +205,7 @@ struct Post {
 };
 RAPID_NODE(Post);
 
-// The first input, where the second has been evaluated too.
+// Returns the first input after the second has also been evaluated.
 struct Both {
     static NodeType declare() { return node<Both>("both", "The first of two.").kind(NodeKind::Merge); }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
@@ -234,7 +234,7 @@ struct Fail {
 };
 RAPID_NODE(Fail);
 
-// What `:write` is to the plan: a node whose only effect is elsewhere.
+// Looks like `:write` to the plan: a node whose only effect is elsewhere.
 struct Write {
     static NodeType declare() { return node<Write>("write", "Writes."); }
     void edit(PointSet& points, const Evaluation& now) const

@@ -1,10 +1,10 @@
--- A node that needs an attribute which only a later node makes: rapid check says so, and a run fails in no frame.
+-- A node that needs an attribute made only by a later node: rapid check reports it, and a run fails before any frame.
 local scene = require "testing.scene"
 
 local read = ':points("read", function(p) p.v = vec3(p.heat, 0, 0) end) '
 local create = "rapid.create { points = two } "
 
--- The message of the check, which is that of the run.
+-- Returns the message of the check, which equals that of the run.
 local function refused(text)
   local checked = scene.command("check", "return " .. text)
   assert.equal(2, checked.status, checked.stderr)

@@ -25,7 +25,7 @@ TEST_CASE("what solve posts is what create yields in the next frame", "[evaluate
         CHECK(evaluator.next_frame() == frame);
         const FrameResult result = evaluator.advance();
         CHECK(result.frame == frame);
-        // Between create and solve nothing runs at the first frame; nodes behind solve change the output alone.
+        // Between create and solve nothing runs at the first frame; nodes after solve change only the output.
         CHECK(result.outputs.at("main").P()[0] == Vec3f(static_cast<float>(frame - 3), 5, 0));
         CHECK(result.fps.at("main") == 10);
         CHECK(result.time.at("main") == (frame - 3) / 10.0);
@@ -139,7 +139,7 @@ TEST_CASE("functions are asked at each frame, with its number, time and length",
                                                            })}});
     const Plan plan(scene.returning(moving), {});
     Evaluator evaluator(plan);
-    asked.clear();  // the plan has asked for the first frame
+    asked.clear();  // the plan has called it for the first frame
     for (int frame = 1; frame <= 3; ++frame) {
         CHECK(evaluator.advance().outputs.at("main").P()[0].x() == static_cast<float>(frame));
         CHECK(asked.back().number == frame);

@@ -33,7 +33,7 @@ Param number(Range range = any_number())
 
 const FrameClock clock24{24, 1, 1};
 
-// Its value in the step that ends at frame 1 + step.
+// Returns its value in the step that ends at frame 1 + step.
 double at(std::function<double(double)> f, std::int64_t step, double part, bool finer = false,
           Range range = any_number())
 {

@@ -146,7 +146,7 @@ TEST_CASE("a point parameter is a constant or each point's attribute", "[param]"
     CHECK(read<PerPoint<Vec3f>>(list({1.0, 2.0, 3.0})).constant == Vec3f(1, 2, 3));
     CHECK(read<PerPoint<Vec3f>>(AttributeRef{"wind"}).attribute == "wind");
 
-    // A field that held an attribute holds a constant once it is given one.
+    // A field that held an attribute holds a constant after a number is read.
     PerPoint<float> field = PerPoint<float>::of("bounce");
     read_value(param<PerPoint<float>>(), 2.0, field);
     CHECK((field.attribute.empty() && field.constant == 2));

@@ -26,7 +26,7 @@ const PlannedNode& planned(const Plan& plan, const std::string& name)
     return *found;
 }
 
-// Names of nodes, in their order.
+// Returns the names of nodes, in order.
 std::vector<std::string> names_of(const Plan& plan, const std::vector<std::size_t>& places)
 {
     std::vector<std::string> names;
@@ -49,7 +49,7 @@ std::set<std::string> kept(const Plan& plan, std::size_t simulation = 0)
     return names;
 }
 
-// What outputs ask for: these names, and nothing else.
+// Returns options with which outputs request only these names.
 PlanOptions asking_for(std::vector<std::string> names)
 {
     PlanOptions options;
@@ -117,7 +117,7 @@ TEST_CASE("each node comes once, after its inputs, and knows how many take its r
 
     CHECK(names_of(plan) == std::vector<std::string>{"source1", "left", "right", "both1"});
     CHECK(planned(plan, "source1").consumers == 2);
-    CHECK(planned(plan, "left").consumers == 2);  // both1, and the output
+    CHECK(planned(plan, "left").consumers == 2);  // both1 and the output
     CHECK(planned(plan, "right").consumers == 1);
     CHECK(planned(plan, "both1").consumers == 1);
     CHECK(planned(plan, "both1").inputs == std::vector<std::size_t>{2, 1});
@@ -411,10 +411,10 @@ TEST_CASE("what the result of a merge has, all points that come into it keep", "
         CHECK(attribute(plan, name, 1).kept);
         CHECK(attribute(plan, name, 1).kept_for_merge);
     }
-    // The points of the other output itself have no mass in their files.
+    // The points of the other output have no mass in their files.
     CHECK(plan.unasked_columns(plan.outputs.at("both")).empty());
     CHECK(plan.unasked_columns(plan.outputs.at("other")) == NameSet{"mass"});
-    // Merged into points that do not have it, an attribute is left behind.
+    // An attribute is dropped if it is merged into points without it.
     const Plan back(scene.returning(scene.node("both", {other, heavy})), asking_for({}));
     CHECK_FALSE(attribute(back, "mass", back.nodes[back.outputs.at("main")].simulation).kept_for_merge);
 }
@@ -431,7 +431,7 @@ TEST_CASE("with keep_all nothing is left out, and nothing is evaluated once", "[
     CHECK(kept(plan).count("heat") == 1);
     CHECK(kept(plan).count("group:hot") == 1);
     for (const PlannedNode& node : plan.nodes) CHECK_FALSE(node.once);
-    // An output that names nothing still gets what the scene has, and no more.
+    // An output that names nothing still gets the attributes of the scene, and no others.
     CHECK(plan.names_of_scene() == NameSet{"P", "heat", "hot", "id", "v"});
 }
 

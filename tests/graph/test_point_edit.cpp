@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// What an edit does to a point; true removes it.
+// Edits a point; returns true to remove it.
 using Visit = std::function<bool(PointSet& points, std::size_t i)>;
 
 class Edit : public PointEdit {
@@ -58,7 +58,7 @@ private:
     bool removes_;
 };
 
-// Edits of 20,500 points, together.
+// Edits of 20,500 points, fused.
 struct Together {
     PointSet points;
     std::vector<Edit> edits;
@@ -129,7 +129,7 @@ TEST_CASE("a point that an edit removes is gone for those that follow, and in th
         return false;
     });
     scene.run();
-    REQUIRE(scene.points.size() == 6833);  // of those below 20,500, prime to 6
+    REQUIRE(scene.points.size() == 6833);  // those below 20,500 that are coprime to 6
     bool all = true;
     for (std::size_t i = 0; i < scene.points.size(); ++i) {
         const std::int64_t id = scene.points.id()[i];
@@ -157,7 +157,7 @@ TEST_CASE("the error of edits that go together is that of the first edit that fa
                                     static_cast<std::size_t>(GENERATE(1, 2, 7)));
     std::mt19937 random(3);
     for (int round = 0; round < 50; ++round) {
-        // Where each of four edits fails, in no particular order; the last of all does not.
+        // The indices at which each of four edits fails, in random order; the last edit never fails.
         std::vector<std::vector<std::size_t>> fails(4);
         for (auto& at : fails)
             for (int n = static_cast<int>(random() % 4); n > 0; --n) at.push_back(random() % 20500);

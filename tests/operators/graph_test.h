@@ -1,6 +1,6 @@
 // A small graph of native nodes, evaluated frame by frame.
 //
-// Its solve is "hold", which feeds the points back as they are: what is seen is what the other nodes did.
+// Its solve is "hold", which feeds the points back unchanged, so that only the other nodes have effects.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// One native node by itself: made from the registry, its arguments bound as a graph's are, evaluated on a flow.
+// One native node alone: made from the registry, with arguments bound like a graph's, evaluated on a flow.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ inline Value numbered(std::map<std::int64_t, Value> values)
     return std::shared_ptr<const Table>(table);
 }
 
-// A parameter as a function of the frame.
+// Returns a parameter that is a function of the frame.
 inline Value of_frame(std::function<Value(const Frame&)> f)
 {
     struct Function : FrameFunction {
@@ -61,7 +61,7 @@ inline std::shared_ptr<Simulation> simulation(double fps = 24, std::int64_t star
     return made;
 }
 
-// Points at these places, with ids from 0.
+// Returns points at these positions, with ids from 0.
 inline PointSet points_at(std::initializer_list<InitialisedVec3f> places) { return points(places); }
 inline PointSet points_at(const std::vector<Vec3f>& places) { return points(places); }
 
@@ -83,7 +83,7 @@ std::vector<T> values_of(const PointSet& points, std::string_view name)
 
 inline std::vector<std::int64_t> ids_of(const PointSet& points) { return values_of<std::int64_t>(points, "id"); }
 
-// What a failed call says; empty where it did not fail.
+// Returns the message of a failed call; empty if it did not fail.
 inline std::string error_of(const std::function<void()>& f)
 {
     try {
@@ -109,7 +109,7 @@ public:
         op_->check();
     }
 
-    // The node's result at this frame, from these inputs.
+    // Returns the node's result at this frame from these inputs.
     Flow evaluate(std::int64_t frame, std::vector<Flow> inputs)
     {
         return call(frame, [&](const Evaluation& now) { return op_->evaluate(inputs, now); });
@@ -119,14 +119,14 @@ public:
         return call(simulation_->start, [&](const Evaluation& now) { return op_->start(inputs, now); });
     }
 
-    // The same for a node of one input, of points of its own simulation.
+    // The same for a node with one input, for points of its own simulation.
     PointSet operator()(std::int64_t frame, PointSet points = {})
     {
         return evaluate(frame, {Flow{std::move(points), {}, simulation_}}).points;
     }
     PointSet at_start(PointSet points = {}) { return start({Flow{std::move(points), {}, simulation_}}).points; }
 
-    // functions: the parameters that are given as functions of the frame.
+    // functions: parameters that are given as functions of the frame.
     Uses uses(std::set<std::string> functions = {}) const
     {
         Uses uses = node_.type->uses;

@@ -1,4 +1,4 @@
-// A `where` of tests, and the points that it is asked about.
+// A `where` for tests, and points to evaluate it on.
 #pragma once
 
 #include "runtime/graph/point_function.h"
@@ -6,7 +6,7 @@
 
 namespace rapid::test {
 
-// True of points whose P.x is above a limit. Fails where it is asked about a point at x = 100.
+// True for points whose P.x is above a limit. Fails if evaluated for a point at x = 100.
 class RightOf : public PointFunction {
 public:
     explicit RightOf(float limit) : limit_(limit) {}
@@ -42,7 +42,7 @@ private:
 
 inline Value right_of(float limit) { return ObjectPtr(std::make_shared<RightOf>(limit)); }
 
-// At x = 0, 1, 2.
+// Returns points at x = 0, 1, 2.
 inline PointSet three_points() { return points_at({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}); }
 
 }  // namespace rapid::test

@@ -1,7 +1,7 @@
--- clump: what has touched holds together until it is torn apart.
+-- clump: points that have touched hold together until they are torn apart.
 local scene = require "testing.scene"
 
--- The lower of two points, the upper of which is pinned, after two seconds of gravity on 1 kg.
+-- Returns the lower of two points, the upper of which is pinned, after two seconds of gravity on 1 kg.
 local function hanging(distance, strength)
   local points = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, -%g, 0}}, pscale = {0.1, 0.1} } }
@@ -17,7 +17,7 @@ describe("clump", function()
   end)
 
   it("lets a weight above its strength go, which then falls freely", function()
-    assert.near(-0.2 - 9.81 * 2, hanging(0.2, 8), 0.5) -- 2 s less the sub-steps in which the bond bore its strength
+    assert.near(-0.2 - 9.81 * 2, hanging(0.2, 8), 0.5) -- 2 s minus the substeps in which the bond carried its strength
   end)
 
   it("does not stick points that do not touch", function()

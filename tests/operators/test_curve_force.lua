@@ -19,7 +19,7 @@ describe("curve_force", function()
       local p = after(25, [[
 :curve_force { curve = {{-9, 0, 0}, {0, 0, 0}, {20, 0, 0}}, speed = 2, pull = 25, drag = 6 }]],
         { P = "{0, 0.5, -1}", substeps = substeps })
-      -- Across exact at any step. Along it the place that draws is held for a sub-step: of second order.
+      -- Exact at any step across the curve. Along it, the attracting position is held for a substep: second order.
       assert.near(0.5 * y, p.P.y, 2e-6)
       assert.near(-y, p.P.z, 2e-6)
       local error = math.abs(p.P.x - 2 * (1 - (1 - fallen) / 6))
@@ -42,7 +42,7 @@ describe("curve_force", function()
     local chain = (":curve_force { curve = {%s}, closed = true, speed = 1.5, pull = 4000, drag = 60 }")
       :format(table.concat(points, ", "))
     local p = after(97, chain, { P = "{1, 0, 0}", v = "{0, 0, 1.5}", substeps = 16 })
-    -- At rest in the turning frame: the pull bears v²/r = 2.25 m/s², 0.56 mm outside of it.
+    -- At rest in the turning frame: the pull balances v²/r = 2.25 m/s², 0.56 mm outside.
     assert.near(1 + 2.25 / 4000, p.P:length(), 6e-4)
     assert.near(1.5, p.v:length(), 0.006)
     assert.near(1.5 * 4 % (2 * math.pi), math.atan2(p.P.z, p.P.x) % (2 * math.pi), 0.05)
@@ -53,7 +53,7 @@ describe("curve_force", function()
     assert.near({0, 0, 0}, after(2, chain, { P = "{0.5, 0.5, 0}" }).v, 0)
     assert.near({0, 0, 0}, after(2, chain, { P = "{-0.01, 0.1, 0}" }).v, 0)
     assert.near({0, 0, 0}, after(2, chain, { P = "{1.01, 0.1, 0}" }).v, 0)
-    -- At a fifth of a metre the part is (1 - 0.16)²; a step of 1/24 s from rest.
+    -- The weight at a fifth of a metre is (1 - 0.16)²; a step of 1/24 s from rest.
     local k = 8 * 0.84 ^ 2
     assert.near(3 * (1 - math.exp(-k / 24)), after(2, chain, { P = "{0.5, 0.2, 0}" }).v.x, 1e-6)
   end)
@@ -69,7 +69,8 @@ describe("curve_force", function()
       assert.near(a.P, b.P, 1e-6)
       assert.near(a.v, b.v, 1e-5)
     end
-    -- y'' = 30 (sin 6t - y), from rest at 0: with w² = 30 the forced swing is 30/(30 - 36) (sin 6t - 6/w sin wt).
+    -- y'' = 30 (sin 6t - y), from rest at 0: with w² = 30 the forced oscillation is 30/(30 - 36) (sin 6t - 6/w sin
+    -- wt).
     local w = math.sqrt(30)
     local exact = 30 / (30 - 36) * (math.sin(6) - 6 / w * math.sin(w))
     assert.near(exact, after(25, force, { substeps = 32 }).P.y, 1e-3)
@@ -114,9 +115,9 @@ return rapid.create { fps = 24 }
       assert.is_true(first or (P.x == 0 and P.y >= 5 and P.y <= 8))
       if first then on_first = on_first + 1 end
     end
-    assert.is_true(on_first > 150 and on_first < 250) -- both are as long
+    assert.is_true(on_first > 150 and on_first < 250) -- both are equally long
 
-    -- What is written of the lines of an .obj comes back as lines from a .bgeo.
+    -- Lines of an .obj are written as lines of a .bgeo.
     scene.folder:write("path.obj", "v 0 0 0\nv 2 0 0\nv 0 5 0\nv 0 9 0\nl 1 2\nl 3 4\n")
     assert.equal(0, scene.command("run", [[
 return rapid.create { fps = 24, points = rapid.points.read "path.obj" } :solve {}]], "-f 1-1 -o path.bgeo").status)

@@ -47,7 +47,7 @@ rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }
       { frames = {8, 8} })[8]
     assert.equal(700, #points)
     for i = 1, #points do
-      -- Without forces it goes on with 24 m/s up and 2 m/s along.
+      -- Without forces it continues with 24 m/s up and 2 m/s along.
       local age = 7 / 24 - points[i].birthtime
       assert.near(24 * points[i].birthtime + 24 * age, points[i].P.y, 2e-5)
       assert.near({2, 24, 0}, points[i].v, 1e-5)
@@ -56,8 +56,8 @@ rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }
   end)
 
   it("follow the spline of a function of the frame, as on a mesh of the same vertices", function()
-    -- In the frames with a frame on both sides the cubic is off by (3/24)^4 / 384 of the sine and what its tangents
-    -- give: (3/24)^3 / 18 or so.
+    -- In frames with neighbours on both sides, the cubic has an error of (3/24)^4 / 384 of the sine, plus that of its
+    -- tangents: about (3/24)^3 / 18.
     local points = scene.run(birth_scene(moving), { frames = {40, 40} })[40]
     local beads = {}
     for i = 1, #points do
@@ -105,12 +105,12 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
   end
 
   it("drives points along it at its own velocity", function()
-    -- The line rises at 1.5 m/s, as the point does: across it nothing acts, and along it a drag to 2 m/s.
+    -- The line rises at 1.5 m/s, like the point: nothing acts across it, and along it a drag towards 2 m/s.
     local p = after([[:curve_force { speed = 2, pull = 25, drag = 6, curve = rapid.curve.from {
       points = {{-9, 0, 0}, {0, 0, 0}, {20, 0, 0}} }:transform(function(frame)
         return rapid.translate(0, 1.5 * frame.time, 0) end) }]],
       { P = "{0, 0, 0}", v = "{0, 1.5, 0}", substeps = 16 })
-    -- But for the places of the line in single precision: 1e-7 m a frame.
+    -- Tolerance for the positions of the line in single precision: 1e-7 m per frame.
     assert.near(1.5, p.P.y, 5e-6)
     assert.near(2 * (1 - (1 - math.exp(-6)) / 6), p.P.x, 2e-5)
     assert.near({2 * (1 - math.exp(-6)), 1.5, 0}, p.v, 1e-4) -- of second order in the sub-step
@@ -126,7 +126,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
   end)
 
   it("keeps points on a ring that turns and moves away", function()
-    -- At rest on the ring, which turns at 1 rad/s about y and goes along x at 3 m/s.
+    -- At rest on the ring, which turns at 1 rad/s about y and moves along x at 3 m/s.
     local p = after([[:curve_force { speed = 0, pull = 4000, drag = 60, curve = rapid.curve.from {
       closed = true, points = function()
         local list = {}
@@ -142,7 +142,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
   end)
 
   it("takes each line of a file for a curve of its own", function()
-    -- Between the end of the first and the beginning of the second there is nothing to be drawn to.
+    -- Nothing attracts points between the end of the first curve and the beginning of the second.
     scene.folder:write("two.obj", "v 0 0 0\nv 1 0 0\nv 5 0 0\nv 6 0 0\nl 1 2\nl 3 4\n")
     local p = after(":curve_force { curve = rapid.curve.read 'two.obj', radius = 1 }", { P = "{3, 0.1, 0}" })
     assert.near({3, 0.1, 0}, p.P, 1e-7)

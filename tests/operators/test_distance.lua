@@ -1,4 +1,4 @@
--- distance and pin, as scenes use them: pairs by place and by nearness, rest, breaking, what holds; and wrong input.
+-- distance and pin in scenes: pairs by index and by proximity, rest, breaking, pinning; and wrong input.
 local csv_rows = require "tests.csv_rows"
 local scene = require "testing.scene"
 
@@ -115,7 +115,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = places } }
       return result[12]:min("P").y, result[16]:min("P").y
     end
     local rods = lowest(0, 16)
-    assert.near(-1.03, rods, 0.02) -- almost as far as it falls freely
+    assert.near(-1.03, rods, 0.02) -- almost as far as in free fall
     for _, compliance in ipairs { 1e-8, 1e-7, 1e-6, 1e-5 } do
       assert.near(rods, lowest(compliance, 4), 0.03, ("%g"):format(compliance))
       local _, coarse = lowest(compliance, 16)
@@ -133,7 +133,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
   end)
 
   it("breaks what is stretched by more than its strain, and for good", function()
-    -- A weight on a spring: drawn out by 2 compliance m g at the lowest point of its swing.
+    -- A weight on a spring: stretched by 2 compliance m g at the lowest point of its oscillation.
     local stretched = 2 * 0.01 * 9.81
     local function lowest(strain)
       local least = 0
@@ -149,8 +149,8 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
     assert.truthy(lowest(0.5 * stretched) < -10)
   end)
 
-  -- A weight on a rod of length L, let go where the rod is level: at the angle φ below, v² = 2 g L sin φ, and the rod
-  -- pulls with 3 m g sin φ.
+  -- A weight on a rod of length L, released while the rod is level: at the angle φ below, v² = 2 g L sin φ, and the
+  -- rod pulls with 3 m g sin φ.
   local function swinging(arguments)
     return ([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.5, 0, 0}}, mass = {1, 10} } }

@@ -36,7 +36,7 @@ double chi_square(const std::vector<double>& uniform, int bins)
     return sum;
 }
 
-// Values in [0, 1) that are uniform, as far as 40 bins can tell: within 5 deviations.
+// Returns true if values in [0, 1) are uniform within 5 deviations, as measured with 40 bins.
 bool is_uniform(const std::vector<double>& values)
 {
     for (const double value : values)
@@ -208,7 +208,7 @@ TEST_CASE("a point with an age above the frame's length is born at its beginning
     columns.add(*known_attribute("birthtime"));
     NodeTest emit("emit", {{"source", one_point()}, {"count", 2.0}, {"age", 0.5}});
     const PointSet born = emit(25, columns);
-    CHECK_FALSE(born.has("dt"));  // a whole frame, as all others
+    CHECK_FALSE(born.has("dt"));  // a whole frame, like all others
     for (const float age : values_of<float>(born, "age")) CHECK(age + h == Approx(0.5));
     for (const float time : values_of<float>(born, "birthtime")) CHECK(time == Approx(1 - 0.5));
 }
@@ -328,7 +328,7 @@ TEST_CASE("births depend on the seed and the node's name, not on the frame or on
     CHECK(places(3, "a", 2) != places(4, "a", 2));
     CHECK(places(3, "a", 2) != places(3, "b", 2));
 
-    // 100 births in one frame are those of ten frames of 10.
+    // 100 births in one frame equal those of ten frames of 10.
     NodeTest tenth("emit", with(arguments, {{"count", 10.0}}), simulation(24, 1, 3), "a");
     std::vector<Vec3f> in_ten;
     for (std::int64_t frame = 2; frame < 12; ++frame)
@@ -442,7 +442,7 @@ TEST_CASE("newborn points interpolate a mesh's attributes by barycentric weights
     NodeTest emit("emit", {{"source", ObjectPtr(mesh)}, {"count", 1000.0}});
     const PointSet born = emit(2);
 
-    // A linear function of the corners is that function of the place, whatever the weights.
+    // A linear function of the corners equals that function of the position, for any weights.
     float largest_error = 0;
     for (std::size_t i = 0; i < born.size(); ++i) {
         const Vec3f& P = born.P()[i];
@@ -465,7 +465,7 @@ TEST_CASE("from = \"points\" of a mesh emits at its vertices, along their normal
     double straightest = 1;
     for (std::size_t i = 0; i < born.size(); ++i)
         straightest = std::min<double>(straightest, born.v()[i].dot(born.P()[i]) / 2);
-    CHECK(straightest > 0.99);  // of a sphere of 16 divisions
+    CHECK(straightest > 0.99);  // for a sphere with 16 divisions
 }
 
 TEST_CASE("from = \"volume\" of a mesh emits inside it", "[emit]")
@@ -509,7 +509,7 @@ TEST_CASE("emit declares what it makes, so that the columns exist from the first
     for (const AttributeSpec& spec : uses.makes) made[spec.name] = spec.fallback;
     CHECK(made.size() == 3);
     CHECK(std::get<float>(made.at("heat")) == 0);
-    CHECK(std::get<float>(made.at("mass")) == 1);  // what points that emit did not make weigh
+    CHECK(std::get<float>(made.at("mass")) == 1);  // the mass of points that emit did not create
     CHECK(std::get<Vec3f>(made.at("N")) == Vec3f::Zero());
     CHECK(uses.makes_groups == std::vector<std::string>{"hot"});
     CHECK(std::count(uses.gives.begin(), uses.gives.end(), "life") == 1);

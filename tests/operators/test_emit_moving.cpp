@@ -34,7 +34,7 @@ MotionPtr places(std::function<Vec3d(const Frame&)> place)
     return std::make_shared<Formula>([place = std::move(place)](const Frame& frame) { return Pose{place(frame)}; });
 }
 
-// A mesh as good as a point.
+// A mesh that is practically a point.
 MeshPtr speck() { return make_mesh({{0, 0, 0}, {1e-6f, 0, 0}, {0, 0, 1e-6f}}, {{0, 1, 2}}); }
 constexpr double speck_size = 2e-6;
 
@@ -43,7 +43,7 @@ Value moved(const MeshPtr& mesh, const MotionPtr& motion)
     return ObjectPtr(std::make_shared<AnimatedMesh>(mesh, motion));
 }
 
-// A mesh whose files are written for it: its vertices are those of `rest` times the factor of the frame.
+// A mesh with generated files: its vertices are those of `rest` times the factor of the frame.
 struct GrowingMesh {
     TemporaryFolder folder;
     std::shared_ptr<const AnimatedMesh> mesh;
@@ -69,7 +69,7 @@ struct GrowingMesh {
 
 TEST_CASE("an emitter on a circle emits an even stream without a seam between frames", "[emit]")
 {
-    const double radius = 2, turn = 0.3, rate = 977;  // rad a frame
+    const double radius = 2, turn = 0.3, rate = 977;  // rad per frame
     const auto circle = [=](double time) {
         const double at = turn * time * fps;
         return Vec3d(radius * std::cos(at), radius * std::sin(at), 0);
@@ -123,7 +123,7 @@ TEST_CASE(
             slip = std::max(slip, (born.v()[i].cast<double>() - 0.5 * (v + t * a)).norm());
         }
     }
-    CHECK(off < speck_size + 4e-6);  // of single precision at 30 m
+    CHECK(off < speck_size + 4e-6);  // due to single precision at 30 m
     CHECK(slip < 1e-5);
 }
 
@@ -186,17 +186,17 @@ TEST_CASE("nothing is born along a jump, which is reported; cut says so, or that
     CHECK_THAT(found.second[0],
                Contains("the source jumps by 50.1 m to frame 9, 501 times as far as in the frames around"));
 
-    // The stream itself has no gap: 1/100 m from birth to birth, but for the jump.
+    // The stream itself has no gap: 1/100 m between births, except for the jump.
     double widest = 0;
     for (std::size_t i = 1; i < found.first.size(); ++i)
         if (found.first[i] - found.first[i - 1] < 40)
             widest = std::max(widest, std::abs(found.first[i] - found.first[i - 1] - 0.01));
-    CHECK(widest < 2 * 3.9e-6 + speck_size);  // two places rounded at 51 m
+    CHECK(widest < 2 * 3.9e-6 + speck_size);  // two positions rounded at 51 m
 }
 
 TEST_CASE("a deforming mesh carries births along the paths of its faces, with their velocity and normals", "[emit]")
 {
-    // Grows by a tenth of its size at frame 0 each frame.
+    // Grows by a tenth of its size at frame 0 per frame.
     const MeshPtr ball = make_sphere(1, 12, Vec3d::Zero());
     const GrowingMesh growing(*ball, 1, 12, [](int frame) { return 1 + 0.1 * frame; });
     const std::string from = GENERATE("surface", "points", "volume");
@@ -207,17 +207,17 @@ TEST_CASE("a deforming mesh carries births along the paths of its faces, with th
     for (std::size_t i = 0; i < born.size(); ++i) {
         const Vec3d P = born.P()[i].cast<double>();
         const double size = 1 + 0.1 * (5 + double(i + 1) / 400);
-        // Each place of a body that grows evenly moves at its own part of the way.
+        // Each position of a uniformly growing body moves in proportion to its distance.
         slip = std::max(slip, (born.v()[i].cast<double>() - P * (0.1 / size) * fps).norm());
         outside = std::max(outside, P.norm() / size);
         inside = std::min(inside, P.norm() / size);
     }
     CHECK(slip < 2e-5);
     CHECK(outside < 1 + 1e-6);
-    if (from != "volume") CHECK(inside > 0.9);  // of a sphere of 12 divisions
+    if (from != "volume") CHECK(inside > 0.9);  // for a sphere with 12 divisions
     if (from == "volume") CHECK(inside < 0.5);
 
-    // After its last file it rests.
+    // It is at rest after its last file.
     const PointSet later = emit(20);
     CHECK(later.v()[7] == Vec3f::Zero());
 }

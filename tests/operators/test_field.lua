@@ -1,4 +1,4 @@
--- :field against closed forms: fields that are linear in the place, which a grid holds exactly.
+-- :field against closed forms: fields that are linear in position, which a grid represents exactly.
 local scene = require "testing.scene"
 
 local function after(frames, head, chain, P, substeps)

@@ -1,4 +1,4 @@
--- Forces against closed forms, at one sub-step a frame of 1/24 s unless a test says otherwise.
+-- Forces against closed forms, at one substep per frame of 1/24 s unless a test states otherwise.
 local scene = require "testing.scene"
 
 -- One point from P with velocity v under the nodes of `chain`, after a second.
@@ -9,7 +9,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{%s}}, v = {{%
     { frames = {25, 25} })[25][1]
 end
 
--- As near as rounding the state to single precision once a frame allows.
+-- Tolerance: rounding of the state to single precision once per frame.
 local function within(expected, value, places)
   local size = math.max(math.abs(expected.x), math.abs(expected.y), math.abs(expected.z), places or 0, 1e-6)
   assert.near({expected.x, expected.y, expected.z}, value, 24 * 2 ^ -23 * size)
@@ -105,7 +105,7 @@ describe("a spring", function()
         x = 1 + 2 * (fast * math.exp(slow) - slow * math.exp(fast)) / (fast - slow)
         y = (math.exp(slow) - math.exp(fast)) / (slow - fast)
       end
-      -- Rounding the state once a frame shifts a stiff oscillator's phase: by ulp(v)/w each time.
+      -- Rounding the state once per frame shifts a stiff oscillator's phase: by ulp(v)/w each time.
       assert.near({x, y, 0}, p.P, 1e-4)
     end
   end)
@@ -134,7 +134,7 @@ end)
 
 describe("attraction", function()
   it("by the inverse square is Kepler's ellipse, of second order", function()
-    -- From the far end of an ellipse once around.
+    -- One revolution from the far end of an ellipse.
     local speed = math.sqrt(0.5)
     local a = 1 / (2 / 2 - speed ^ 2)
     local function off(substeps)
@@ -222,7 +222,7 @@ return rapid.create { fps = 24,
     points = rapid.points.from { P = {{0, 0, 0}, {0, 1, 0}}, v = {{3, 0, 0}, {0, 0, 0}} } }
   :gravity {} :drag { linear = 4 } :collide { shape = rapid.shape.plane {}, bounce = 0.3 } :solve {}]],
       { frames = {240, 240} })[240]
-    assert.near({3 / 4, 0, 0}, points[1].P, 0.01) -- what the drag lets it go, without friction
+    assert.near({3 / 4, 0, 0}, points[1].P, 0.01) -- the drag's distance, without friction
     assert.equal(0, points[2].P.y)
     assert.equal(0, points[2].v.y)
   end)

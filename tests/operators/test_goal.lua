@@ -102,7 +102,7 @@ return rapid.create { fps = 20 }
   end)
 end)
 
--- Nine points to six places, of which those of frame 4 are there at 0.3 s.
+-- Nine points to six positions, with the positions of frame 4 at 0.3 s.
 local function to_points(by, more)
   return scene.run(([[
 local P, Q = {}, {}
@@ -219,7 +219,7 @@ return rapid.create { fps = 10, points = two }
         assert.near(1, math.max(x, y, z), 1e-5)
         if P.y > 1 - 1e-5 then on = on + 1 end
       end
-      -- A sixth of 216, and at most four standard deviations off.
+      -- A sixth of 216, within four standard deviations.
       assert.near(#points / 6, on, 4 * math.sqrt(#points * 5 / 36))
     end
   end)
@@ -254,7 +254,7 @@ return rapid.create { fps = 10, points = two }
           assert.near({x, P.y + 0.2 * (f - 1), z}, Q, 2e-4)
         end
       end
-      for i = 1, #result[6] do -- who is there goes with it, at its speed
+      for i = 1, #result[6] do -- points that have arrived move with the target, at its velocity
         assert.near((result[6][i].P - result[5][i].P) * 10, result[6][i].v, 1e-4)
         assert.near({0, 0, 0}, result[5][i].v, 1e-4)
       end

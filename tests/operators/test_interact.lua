@@ -1,4 +1,4 @@
--- :interact in a chain: two points between which the closed form is simple; its equations are tested in tests/solver.
+-- :interact in a chain: two points with a simple closed form; tests/solver covers its equations.
 local scene = require "testing.scene"
 
 local function two(frames, parameters, extra)
@@ -13,7 +13,7 @@ describe("interact", function()
     local points = two(13, "alignment = 1.5")
     assert.near({1 + math.exp(-2 * 1.5 * 0.5), 0, 0}, points[1].v, 2e-6)
     assert.near({1 - math.exp(-2 * 1.5 * 0.5), 0, 0}, points[2].v, 2e-6)
-    assert.near(1, points[1].P.x + points[2].P.x, 2e-6) -- the mean went on at 1 m/s
+    assert.near(1, points[1].P.x + points[2].P.x, 2e-6) -- the mean continued at 1 m/s
   end)
 
   it("is among the points of its group", function()
@@ -66,7 +66,8 @@ return rapid.create { fps = 4, points = rapid.points.from { P = {{-0.3, 0, 0}, {
     assert.near(4, off(8) / off(16), 0.5)
   end)
 
-  -- At each of the two kicks of a frame the one that heeds the other loses half of what 1 - e^(-2 k t) is of the rest.
+  -- At each of the two kicks of a frame, the point that heeds the other loses half of the fraction 1 - e^(-2 k t) of
+  -- the difference.
   it("is heeded by those alone that see it", function()
     local points = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}}, v = {{2, 0, 0}, {1, 0, 0}} } }
@@ -82,7 +83,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
   :interact { radius = 10, separation = 1e-3]] .. parameters .. "} :solve {}", { frames = {2, 2} })[2]
       return points[1].v.x, points[2].v.x, points[3].v.x
     end
-    -- Weights 0.9, 0.8 and 0.7: with one neighbour the share is 1.
+    -- Weights 0.9, 0.8 and 0.7: the share with one neighbour is 1.
     local a, b, c = speeds ", most = 1"
     assert.near(-0.9e-3 / 24, a, 1e-8)
     assert.near(0.9e-3 / 24, b, 1e-8)
@@ -94,7 +95,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
   end)
 
   it("turns those aside that would meet, before they do", function()
-    -- The nearest approach is 0.1 m, in a second: at the first kick 0.8 · 0.75 of the avoidance acts.
+    -- The nearest approach is 0.1 m, in a second: the first kick has 0.8 · 0.75 of the avoidance.
     local points = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {2, 0.1, 0}},
     v = {{1, 0, 0}, {-1, 0, 0}} } }
@@ -102,7 +103,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {2,
     local kicks = 0.8 * (0.75 + 1 - 23 / 24 / 4) / 48 * 1e-3
     assert.near({1, -kicks, 0}, points[1].v, 1e-8)
     assert.near({-1, kicks, 0}, points[2].v, 1e-8)
-    -- Head-on they choose opposite sides, and pass.
+    -- On a head-on course they choose opposite sides, and pass.
     local result = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {4, 0, 0}}, v = {{1, 0, 0}, {-1, 0, 0}} } }
   :interact { radius = 10, avoidance = 4, foresight = 3, clearance = 0.5 } :solve { substeps = 2 }]],
@@ -125,7 +126,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {4,
 
   it("finds neighbours within any radius, however small beside the scene", function()
     for _, radius in ipairs { 1e-9, 1e-6, 1, 1e6 } do
-      -- Two that approach within it, and one a hundred million times as far.
+      -- Two that approach within the radius, and one a hundred million times as far.
       local points = scene.run(([[
 local r = %g
 return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {r / 2, 0, 0}, {1e8 * r, 0, 0}},

@@ -1,4 +1,4 @@
--- Level sets from sequences of files: between two files a surface is where straight lines in time put it.
+-- Level sets from sequences of files: between two files, surfaces follow straight lines in time.
 local amount = require "tests.amount"
 local scene = require "testing.scene"
 
@@ -23,7 +23,7 @@ write_balls("grow", 1, 9, 1, grown, function() return 0 end)
 write_balls("gaps", 1, 9, 4, grown, function() return 0 end)
 write_balls("move", 1, 9, 1, function() return 0.3 end, gone)
 
--- Eight points around the ball, or as many as there are directions.
+-- Eight points around the ball, or one per direction.
 local function run(shape, P, chain, frame, options)
   options = options or {}
   return scene.run(([[
@@ -34,9 +34,9 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s},
 end
 
 local bounce = ":collide { shape = ball, bounce = %g, friction = 0 }"
--- How far a level set of a ball is off: the sag of a straight line over a voxel, a few times over.
+-- Error of a ball's level set: a few times the sag of a straight line over a voxel.
 local sag = 3 * voxel * voxel / (8 * 0.3)
--- And its normal: it turns by this much over a voxel.
+-- Error of its normal: its turn over a voxel.
 local turn = voxel / 0.3
 
 describe("a level set that grows in a sequence of files", function()
@@ -50,7 +50,7 @@ describe("a level set that grows in a sequence of files", function()
           local restitution, substeps = how[1], how[2]
           local p = run(name .. ".####.vdb", ("{%.9g, %.9g, %.9g}"):format(x, y, z), bounce:format(restitution), 8,
             { substeps = substeps })[8][1]
-          -- Met at 0.1 m / growth; from there on with (1 + restitution) times the speed of the surface.
+          -- Met at 0.1 m / growth; afterwards it moves with (1 + restitution) times the speed of the surface.
           local time = 7 / 24 - 0.1 / growth
           local away = (1 + restitution) * growth
           assert.near(away, p.v:length(), turn * away)

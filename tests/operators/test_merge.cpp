@@ -8,7 +8,7 @@ using namespace test;
 
 namespace {
 
-// A flow of a simulation whose next birth gets the id `next_id`.
+// Returns a flow of a simulation whose next birth gets the id `next_id`.
 Flow flow_of(const std::shared_ptr<Simulation>& in, PointSet points, std::int64_t next_id)
 {
     in->next_id = next_id;
@@ -52,7 +52,7 @@ TEST_CASE("points of another simulation get new ids, and keep them from frame to
     here->next_id = 3;
     CHECK(ids_at(2, {0, 1, 2}, {0, 1}) == Ids{0, 1, 2, 3, 4});
 
-    // One birth here takes 5; there 2 and 3 are born, and 0 is dead.
+    // One birth here takes 5; there, 2 and 3 are born and 0 is dead.
     here->next_id = 6;
     CHECK(ids_at(3, {0, 1, 2, 5}, {1, 2, 3}) == Ids{0, 1, 2, 5, 4, 6, 7});
     CHECK(ids_at(4, {0, 1, 2, 5}, {3}) == Ids{0, 1, 2, 5, 7});

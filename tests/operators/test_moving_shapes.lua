@@ -1,10 +1,10 @@
--- Shapes that move and deform, for forces, pins and nodes in Lua: at the moment of each frame and sub-step.
+-- Moving and deforming shapes for forces, pins and nodes in Lua, evaluated at the time of each frame and substep.
 local scene = require "testing.scene"
 local command = require "testing.command"
 
 local fps, rise = 24, 0.01
 
--- A square at the height rise (frame - 1)², which splines through the frames keep between them.
+-- A square at the height rise (frame - 1)², which splines through the frames reproduce.
 for frame = 1, 30 do
   local y = rise * (frame - 1) ^ 2
   scene.folder:write(("plate.%04d.obj"):format(frame),
@@ -46,7 +46,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0.3, 0, 0}} }
     for _, substeps in ipairs { 1, 2, 8 } do assert.near(0, error_of(substeps), 2e-6) end
   end)
 
-  -- The ball goes along x and speeds up; energy as it is seen from it, with the weight that this gives a point.
+  -- The ball moves along x and accelerates. The energy is relative to it, with the resulting inertial force.
   it("gives a point that goes around a ball no energy, at any stiffness, wherever the ball goes", function()
     for _, k in ipairs { 1e2, 1e4, 1e6, 1e8 } do
       for _, case in ipairs { {0.5, 0}, {-3, 0}, {1, 2} } do
@@ -73,23 +73,23 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 40, 0}, {5
   :spring { target = plate, stiffness = 1e6, damping = 200 } :solve { substeps = 32 }]], { frames = {1, 20} })
     for _, frame in ipairs { 5, 12, 20 } do
       local time = (frame - 1) / fps
-      -- Behind by what the damping holds back.
+      -- Lags by the effect of the damping.
       local behind = 2 * rise * fps ^ 2 * time * 200 / 1e6
       for i = 1, 2 do assert.near(height(time) - behind, result[frame][i].P.y, 0.2 * behind + 1e-4) end
-      assert.truthy(math.abs(result[frame][2].P.x) < 2 + 1e-4) -- it was beside the square
+      assert.truthy(math.abs(result[frame][2].P.x) < 2 + 1e-4) -- it was next to the square
     end
   end)
 end)
 
 describe("attract", function()
-  -- With falloff 0 the acceleration has one size: its direction tells where the surface is.
+  -- With falloff 0 the acceleration has constant magnitude, so its direction shows the position of the surface.
   it("draws to a shape where that is at the time", function()
     local result = scene.run([[
 local ball = rapid.shape.sphere { radius = 0.1 }:transform { [1] = rapid.translate(-1, 0, 0),
   [13] = rapid.translate(1, 0, 0) }
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}} } }
   :attract { shape = ball, strength = 1e-3, falloff = 0 } :solve { substeps = 8 }]], { frames = {13, 13} })
-    -- The ball passes symmetrically: ∫ cos over the way, with x = -1 + 4t, along y: 1e-3 asinh(1) / 2 downward.
+    -- The ball passes symmetrically: ∫ cos over the path, with x = -1 + 4t, along y: 1e-3 asinh(1) / 2 downward.
     local v = result[13][1].v
     assert.near(0, v.x, 2e-6)
     assert.near(-1e-3 * math.log(1 + math.sqrt(2)) / 2, v.y, 2e-6)
@@ -105,7 +105,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.5, 0}} }
   end)
 end)
 
--- Nodes in Lua that ask a shape at the end of the frame, and at each sub-step.
+-- Nodes in Lua that query a shape at the end of the frame, and at each substep.
 scene.folder:write("measure.lua", [[
 local rapid = require "rapid"
 return rapid.node {
@@ -178,7 +178,7 @@ end)
 
 describe("a pin", function()
   it("keeps points to their place over the faces of a mesh, at each sub-step", function()
-    -- The second corner of one triangle goes sideways while the whole turns about z.
+    -- The second corner of one triangle moves sideways while the triangle turns about z.
     local function corners(frame)
       local t, list = frame - 1, {}
       for _, P in ipairs { {0, 0, 0}, {1 + 0.1 * t, 0, 0}, {0, 0, -1} } do
@@ -228,7 +228,7 @@ return { on = on, beside = beside }]], { frames = {1, 10} })
   end)
 end)
 
--- A body of 3,334 vertices, caught from a dancer; the folder lies beside the checkout where there is one.
+-- A body of 3,334 vertices, captured from a dancer, in a folder next to the checkout if it exists.
 describe("the jumper", function()
   local folder = command.shell("cd ../shared/assets/jumper && pwd").stdout:match "%S+"
 

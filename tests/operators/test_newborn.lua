@@ -1,4 +1,4 @@
--- Attributes that the initial points bring: points that are born without them have the default of a known name.
+-- Attributes of initial points: points born without them get the default of a known name.
 local scene = require "testing.scene"
 
 describe("newborn points among initial ones with attributes of their own", function()
@@ -7,7 +7,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
     pscale = {0.1, 0.2}, life = {5, 6}, hitpath = {7, 8}, Cd = {{1, 0, 0}, {0, 1, 0}}, heat = {4, 4} } }
   :emit { source = rapid.points.from { P = {{0, 5, 0}} }, impulse = { [2] = 1 }, birth = "end" }]]
 
-  -- Without nodes that would refuse a mass that is wrong.
+  -- Without nodes that would reject a wrong mass.
   it("have the defaults of known names, zero of others, and white", function()
     local points = scene.run(born, { frames = {2, 2} })
     local p = points[2][3]
@@ -26,7 +26,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
   end)
 end)
 
--- Lua may take any of these keys that has none behind it for the length of the table.
+-- Lua may take any of these keys without a successor for the length of the table.
 describe("numbered keys that do not begin with 1", function()
   it("are keys, whatever Lua counts of them", function()
     for _, keys in ipairs { "[2] = 1, [14] = 2, [26] = 3", "[2] = 1, [3] = 4, [4] = 5", "[8] = 1, [16] = 2" } do

@@ -2,7 +2,7 @@
 
 namespace rapid {
 
-// Fields of nodes have no initialisers: the default is in the declaration alone.
+// Fields of nodes have no initialisers: the default is only in the declaration.
 TEST_CASE("every parameter of a node has a default, is required, or has a field that can be empty", "[registry]")
 {
     const Registry registry;

@@ -1,5 +1,5 @@
--- :picture and rapid.camera: what they refuse, and that they change no point. What they make of a picture:
--- tests/command/test_run.lua.
+-- :picture and rapid.camera: the input that they refuse, and that they change no point. Their effect on pictures is
+-- tested in tests/command/test_run.lua.
 local scene = require "testing.scene"
 
 local function message(says)

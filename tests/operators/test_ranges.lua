@@ -1,4 +1,4 @@
--- Attributes that stand for parameters: refused as constants are, with the node, the point and the frame.
+-- Attributes used as parameters: refused like constants, with the node, the point and the frame.
 local scene = require "testing.scene"
 
 local function message(chain, columns, frames)

@@ -8,7 +8,7 @@ local function run(text, arguments)
   return result
 end
 
--- What a text computes of files: the numbers that it puts into `found`.
+-- Returns the numbers that a text computes from files and puts into `found`.
 local function found(text, count)
   local columns = {}
   for k = 1, count do columns[k] = ("f%d = {found[%d]}"):format(k, k) end
@@ -31,7 +31,7 @@ describe(":rasterize", function()
   it("writes the weights of points as a density, and the mean of their velocities, frame by frame", function()
     run(drift:format "", "-f 1-3")
     for frame = 1, 3 do
-      -- At the node, before Solve: the points of a frame are those of the end of the last one.
+      -- At the node, before Solve: the points of a frame are those from the end of the previous one.
       local t = math.max(0, frame - 2) / 24
       local numbers = found(([[
 local fog = rapid.fog.read("smoke.%04d.vdb", { grid = "density" })
@@ -44,7 +44,7 @@ end end end
 local near, far = flow:sample(vec3(0, 0.1, -0.2)), flow:sample(vec3(1.2, 0.1, 0.4))
 found = { sum * 0.001, px * 0.001, near.x, near.z, far.x, far.z }]]):format(frame, frame), 6)
       assert.near(4, numbers[1], 1e-5)
-      -- The places of the voxels, weighed, are those of the points but for a part of a voxel.
+      -- The weighted positions of the voxels are those of the points within a fraction of a voxel.
       assert.near(0.03 + 2 * t + 3 * 1.2, numbers[2], 0.02)
       assert.near(2, numbers[3], 1e-6)
       assert.near(0, numbers[4], 1e-6)
@@ -123,8 +123,8 @@ found = { sum }]], 1)[1]
     local voxel, small, own, larger = density(1), density(2), density(3), density(4)
     -- A radius of 0.3 in single precision is a little above the voxel.
     for k = 1, 2 do assert.near(voxel[k], small[k], 1e-6 * voxel[k]) end
-    assert.equal(small[1], own[1]) -- of the point whose pscale is 0.25
-    assert.truthy(math.abs(small[2] - own[2]) > 1e-3 * small[2]) -- of that whose pscale is 0.4
+    assert.equal(small[1], own[1]) -- the point whose pscale is 0.25
+    assert.truthy(math.abs(small[2] - own[2]) > 1e-3 * small[2]) -- the point whose pscale is 0.4
     assert.truthy(math.abs(small[1] - larger[1]) > 1e-3 * small[1])
   end)
 

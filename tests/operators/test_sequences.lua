@@ -1,4 +1,4 @@
--- Sequences of files: what goes beyond their ends, and when they begin.
+-- Sequences of files: behaviour beyond their ends, and before they begin.
 local scene = require "testing.scene"
 
 -- A flat square at the height y(file), files `first` to `last`.
@@ -10,7 +10,7 @@ local function write_squares(name, first, last, y)
   end
 end
 
--- The file that stands for a frame, by counting.
+-- Returns the file for a frame, by counting.
 local function file_of(frame, first, last, how, offset)
   local file = frame - offset
   if file >= first and file <= last then return file end
@@ -39,7 +39,7 @@ return rapid.create { fps = 24 }
           for frame = 2, 16 do
             local how = { before = before, after = after }
             local file = file_of(frame, 3, 6, how, offset)
-            -- What is not there at both ends of a frame bears nothing in it.
+            -- A source that is missing at either end of a frame emits nothing in it.
             if not file_of(frame - 1, 3, 6, how, offset) then file = nil end
             local points = result[frame]
             assert.equal(file and 3 or 0, #points, ("%s %s %d frame %d"):format(before, after, offset, frame))
@@ -51,7 +51,7 @@ return rapid.create { fps = 24 }
   end)
 
   it("is one motion over its ends where it goes round: births follow the spline", function()
-    -- A sine of 8 files goes on where it begins again.
+    -- A sine of 8 files continues smoothly into its repetition.
     write_squares("wave", 1, 8, function(file) return math.sin(2 * math.pi * file / 8) end)
     write_squares("long", 1, 32, function(file) return math.sin(2 * math.pi * file / 8) end)
     local function run(read)
@@ -86,7 +86,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}} }
     local held, gone = height "hold", height "none"
     assert.near(0, held[24][1].P.y, 1e-4)
     assert.near(0, gone[12][1].P.y, 1e-4)
-    -- It falls from the frame on in which the box is no more.
+    -- It falls from the frame on in which the box has disappeared.
     local t = 12 / 24
     assert.near(-0.5 * 9.81 * t * t, gone[24][1].P.y, 1e-4)
   end)
@@ -113,7 +113,7 @@ return rapid.create { points = two } :solve {}]]):format(file, file), "-f 1 --qu
       assert.equal(0, made.status, made.stderr)
     end
     for _, how in ipairs { { "hold", "repeat" }, { "mirror", "none" }, { "none", "mirror" } } do
-      -- Points at x = 1 to 9 die in the ball that is there.
+      -- Points at x = 1 to 9 die in the current ball.
       local result = scene.run(([[
 local ball = rapid.levelset.read("ball.####.vdb", { before = %q, after = %q, offset = 1 })
 return rapid.create { fps = 24 }
@@ -165,7 +165,7 @@ return rapid.create { fps = 24 }
 return rapid.create { fps = 24 }
   :emit { source = rapid.points.read "set.####.csv", rate = 4800, birth = "even", inherit_velocity = 0 }
   :solve {}]], { frames = {5, 5} })[5]
-    -- Half of them of each point, at any place between the files 1 and 5.
+    -- Half of the births belong to each point, at any position between the files 1 and 5.
     assert.equal(800, #points)
     for _, y in ipairs { 0, 1 } do
       local lowest, highest = 99, -99

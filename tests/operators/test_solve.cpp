@@ -12,7 +12,7 @@ using test::points_at;
 
 constexpr double frame_length = 1.0 / 24;
 
-// Points on their way into a Solve, with what a simulation's gravity adds.
+// Returns points at the input of a Solve, with a simulation's gravity.
 Flow falling(PointSet points, const std::shared_ptr<Simulation>& simulation)
 {
     NodeTest gravity("gravity", {});
@@ -101,10 +101,10 @@ TEST_CASE("columns that are not shared are not copied from frame to frame", "[so
     Flow flow = solve.evaluate(2, {falling(points_at({{0, 10, 0}, {0, 20, 0}}), simulation)});
     const Vec3f* P = flow.points.P().read().data;
     const Vec3f* v = flow.points.v().read().data;
-    flow = {};  // as a frame's result is let go
+    flow = {};  // like a released result of a frame
     for (int f = 3; f < 6; ++f) {
-        PointSet state = std::move(simulation->state);  // as Create does
-        std::vector<Flow> inputs(1);                    // a list in braces would hold a second one
+        PointSet state = std::move(simulation->state);  // like Create
+        std::vector<Flow> inputs(1);                    // an initializer list would hold a second copy
         inputs[0] = falling(std::move(state), simulation);
         flow = solve.evaluate(f, std::move(inputs));
         CHECK(flow.points.P().read().data == P);
@@ -126,12 +126,12 @@ TEST_CASE("the band of a level set is as wide as the largest radius needs", "[so
         Flow flow = collide.evaluate(f, {falling(points, simulation)});
         points = solve.evaluate(f, {std::move(flow)}).points;
     }
-    // A level set of voxels of 5 cm is off by (5 cm)²/(8 · 1.4 m).
+    // A level set with voxels of 5 cm has an error of (5 cm)²/(8 · 1.4 m).
     for (std::size_t i = 0; i < 2; ++i) CHECK(points.P()[i].norm() == Approx(1.4).margin(5e-4));
     CHECK(solve.figures.penetration_max < 1e-6);
 }
 
-// Says that it acts by impulses between points, and multiplies the velocity of one: in the sub-steps, or after them.
+// Claims to act by impulses between points, but multiplies the velocity of one: in the substeps, or after them.
 class Leak : public Constraint, public Coupling {
 public:
     double in_substeps = 1, after = 1;
@@ -162,7 +162,7 @@ TEST_CASE("energy or momentum that nothing accounts for is a warning with its si
         solve.evaluate(2, {std::move(flow)});
         return solve.warnings;
     };
-    // Each of the two has half of the momentum, and of the energy.
+    // Each of the two has half of the momentum and of the energy.
     CHECK(warnings(1, 1).empty());
     CHECK(
         warnings(0.99, 1) ==

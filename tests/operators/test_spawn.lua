@@ -1,9 +1,9 @@
--- spawn: births from the points of another chain, at places and moments that have closed forms.
+-- spawn: births from the points of another chain, at positions and times with closed forms.
 local scene = require "testing.scene"
 
 local g = 9.81
 
--- Parents that fall freely, and what they bear, which stays where it is born unless `after` moves it.
+-- Parents that fall freely, and their children, which stay in place unless `after` moves them.
 local function family(parents, emit, options)
   options = options or {}
   return scene.run(([[
@@ -50,7 +50,7 @@ describe("births from points of another chain", function()
     end
     local chi2 = 0
     for part = 1, 20 do chi2 = chi2 + (counts[part] - 500) ^ 2 / 500 end
-    assert.is_true(chi2 < 43.8) -- of 19 degrees of freedom, exceeded once in a thousand
+    assert.is_true(chi2 < 43.8) -- 19 degrees of freedom, exceeded once in a thousand
   end)
 
   it("have no beads at any speed: gaps of a stream are equal", function()
@@ -63,7 +63,7 @@ describe("births from points of another chain", function()
 
   it("move on for the time that is left, with the parent's velocity", function()
     local result = family(one, 'rate = 37, birth = "even"', { after = ":gravity {}" })
-    for i = 1, #result[13] do -- each of them is where the parent is
+    for i = 1, #result[13] do -- each of them is at the position of its parent
       assert.near(result:output "parents"[13][1].P, result[13][i].P, 6e-6)
       assert.near(result:output "parents"[13][1].v, result[13][i].v, 6e-6)
       assert.near(0.5 - i / 37, result[13][i].age, 1e-6)
@@ -77,7 +77,7 @@ describe("births from points of another chain", function()
     local fall = math.sqrt(2 / g)
     for i = 1, #points do
       local t = i / 500
-      local since = (t + fall) % (2 * fall) - fall -- of the last top
+      local since = (t + fall) % (2 * fall) - fall -- since the last apex
       assert.near(vec3(t, 1 - 0.5 * g * since * since, 0), points[i].P, 1e-5)
     end
   end)
@@ -203,7 +203,7 @@ describe("births at an event", function()
     local tube = [[:collide { shape = rapid.shape.plane { normal = {1, 0, 0} }, bounce = 0.5 }
       :collide { shape = rapid.shape.plane { normal = {-1, 0, 0}, offset = -1 }, bounce = 0.5 }]]
     local options = { before = tube, frames = 2 }
-    local start = "P = {{0.5, 0, 0}}, v = {{192, 0, 0}}" -- 8 m a frame
+    local start = "P = {{0.5, 0, 0}}, v = {{192, 0, 0}}" -- 8 m per frame
     local speeds, times, t = {192, 96, 48}, {}, 0.5 / 192
     for k = 1, 3 do times[k], t = t, t + 1 / (192 * 0.5 ^ k) end
     local points = born('on = "hit", inherit_velocity = 0', options, start)
@@ -233,7 +233,7 @@ describe("births at an event", function()
 
     points = born('on = "death", inherit_velocity = 0', { substeps = 48,
       before = ":gravity {} :action('kill', function(p) if p.P.x > 0.6 then p:kill() end end)" })
-    assert.near(0.2, points[1].birthtime, 1.01 / 24 / 48) -- an action acts once a sub-step
+    assert.near(0.2, points[1].birthtime, 1.01 / 24 / 48) -- an action acts once per substep
     assert.near(3 * points[1].birthtime, points[1].P.x, 1e-5)
   end)
 
@@ -268,7 +268,7 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
 
   it("a comparison of hittotal: at the contact itself, along its normal", function()
     local ground = ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.5, record = %s }"
-    local first = fall + 2 * 0.5 * g * fall / g -- of the second bounce
+    local first = fall + 2 * 0.5 * g * fall / g -- time of the second bounce
     for record, moments in pairs { ["true"] = { fall, first, first + fall / 2 }, ["5"] = { fall } } do
       for n = 1, 3 do
         local points = born(('on = "hittotal >= %d", count = 2, inherit_velocity = 0, speed = 1'):format(n),
@@ -336,7 +336,7 @@ return born:gravity {} :points("read", function(p) local _ = p.birthtime + p.par
     for frame = 3, 8 do
       local points = result[frame]
       assert.equal(1 + 2 * (frame - 2), #points)
-      for i = 2, #points do -- as late as they come, each flies with its parent
+      for i = 2, #points do -- no matter when it is born, each flies with its parent
         assert.near((i - 1) / 48, points[i].birthtime, 1e-6)
         assert.near(points[1].P, points[i].P, 3e-6)
       end

@@ -1,4 +1,4 @@
--- :trail: where each point was, by id, through births and deaths.
+-- :trail: earlier positions of each point, by id, through births and deaths.
 local scene = require "testing.scene"
 
 local text = [[
@@ -24,7 +24,7 @@ describe(":trail", function()
         for place = 1, 5 do
           local before = frame - place >= 1 and result[frame - place]:by_id(p.id)
           if before and place < p.trailnum then assert.equal(before.P, p["trail" .. place]) end
-          -- The place after the last of the frames before is that of the birth.
+          -- The position after the last one of earlier frames is that of the birth.
           if before then assert.is_true(p.trailnum >= math.min(5, place + 1)) end
         end
         if p.trailnum == 5 then long = long + 1 end
@@ -61,7 +61,7 @@ describe(":trail", function()
   end)
 end)
 
--- The trail of a point is where it was in the frames before, as the result itself has them.
+-- The trail of a point equals its positions in earlier frames of the same result.
 local function assert_trails_of(result, first, last, places)
   local long = 0
   for frame = first, last do

@@ -1,4 +1,4 @@
--- transfer: attributes of the nearest place of a mesh.
+-- transfer: attributes of the nearest position on a mesh.
 local scene = require "testing.scene"
 
 local ply = [[
@@ -97,7 +97,7 @@ describe("transfer", function()
 end)
 
 describe("closest", function()
-  -- The square of above, asked by a kernel.
+  -- The square from above, queried by a kernel.
   local function asked(kernel, options, points, square)
     scene.folder:write("square.ply", ply)
     return scene.run(([[

@@ -1,20 +1,20 @@
--- Fogs and grids of vectors: made of points, written, read as sequences, as sources, masks and forces.
+-- Fogs and vector grids: made from points, written, read as sequences, used as sources, masks and forces.
 local scene = require "testing.scene"
 
--- Runs a text whose only purpose are the files that it writes.
+-- Runs a text whose only purpose is to write files.
 local function write(text)
   local result = scene.command("run", text .. " return rapid.create { points = two } :solve {}", "-f 1")
   assert.equal(0, result.status, result.stderr)
 end
 
--- A box of 4 m, in which the vector is (frame, 0, 0); a file for each fourth frame.
+-- A box of 4 m with the vector (frame, 0, 0); a file for every fourth frame.
 write [[
 for frame = 1, 9, 4 do
   rapid.grid.from { size = {4, 4, 4}, voxel = 1, at = function() return vec3(frame, 0, 0) end }
     :write(("v.%04d.vdb"):format(frame))
 end]]
 
--- Fogs of 3 and of 1, apart from each other.
+-- Fogs of density 3 and 1, separate from each other.
 write [[
 local function block(x, weight) return rapid.fog.from_points(
   rapid.points.grid { size = {1, 1, 1}, spacing = 0.1, center = {x, 0, 0} }, { voxel = 0.1, weight = weight }) end
@@ -46,7 +46,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{-1.5, 0, 0}} 
     local function velocity(options, frame)
       return after(frame, options, ":field { grid = grid, mode = 'velocity', drag = 1e6 }").v.x
     end
-    -- The velocity is that in the middle of the step, half a frame before.
+    -- The velocity is that at the middle of the step, half a frame earlier.
     assert.near(3.5, velocity("", 4), 1e-3)
     assert.near(9, velocity("", 14), 1e-3)
     assert.near(3.5, velocity("after = 'repeat'", 13), 1e-3)
@@ -63,7 +63,7 @@ local rapid = require "rapid"
 return rapid.node { name = "drift", doc = "Reads a flow.", makes = { seen = {0, 0, 0} },
   params = { flow = { "grid", required = true, doc = "of velocities" } },
   action = function(p, _, params) p.seen = p.seen + params.flow:sample(p.P) end }]])
-    -- Frame 3, from 2 to 3, in four sub-steps: their middles.
+    -- Frame 3 covers 2 to 3, in four substeps, sampled at their middles.
     local p = after(3, "", ":points('r', function(p) p.seen = vec3(0, 0, 0) end) :drift { flow = grid }", 4)
     assert.near({2.125 + 2.375 + 2.625 + 2.875, 0, 0}, p.seen, 1e-5)
   end)
@@ -101,7 +101,7 @@ end)
 
 describe("a fog of points", function()
   it("is a mask for kernels and predicates: its density is that of the points", function()
-    -- A lattice at each voxel, each of the weight of a voxel: a density of 1 within, 0 farther out than the radius.
+    -- A lattice point at each voxel, with the weight of a voxel: a density of 1 within, 0 beyond the radius.
     local result = scene.run([[
 local fog = rapid.fog.from_points(rapid.points.grid { size = {2, 2, 2}, spacing = 0.1, center = {0.05, 0.05, 0.05} },
   { voxel = 0.1, radius = 0.25, weight = 0.001 })
@@ -117,7 +117,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {0.31, -0.42,
     assert.is_false(points[3]:within "inside")
   end)
 
-  -- Of many points: a loop over three may end while its trace is recorded.
+  -- Uses many points, because a loop over three may end while its trace is recorded.
   it("is asked in compiled kernels and predicates", function()
     local result = scene.run([[
 local lattice = rapid.points.grid { size = {2, 2, 2}, spacing = 0.1 }
@@ -145,9 +145,9 @@ local grid, fog = rapid.grid.read "both.vdb", rapid.fog.read("both.vdb", { grid 
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0.5, 0, -0.6}} } } :attribute { d = 0 }
   :field { grid = grid, mode = "velocity", drag = 1e4 }
   :points("read", function(p) p.d = fog:sample(p.P) end) :solve { substeps = 16 }]], { frames = {25, 25} })[25][1]
-    -- A turn of 1 rad about z in the second, and 1 m along it. The mean over a lattice is the linear flow itself.
+    -- A turn of 1 rad about z in one second, and 1 m along it. The mean over a lattice is the linear flow itself.
     assert.near({0.5 * math.cos(1), -0.5 * math.sin(1), 0.4}, p.P, 2e-3)
-    assert.near(1000, p.d, 0.1) -- a point in each litre
+    assert.near(1000, p.d, 0.1) -- one point per litre
   end)
 end)
 

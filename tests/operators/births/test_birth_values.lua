@@ -1,4 +1,4 @@
--- attributes and speed at birth: between two, on a ramp, in whole numbers; each with random numbers of its own.
+-- attributes and speed at birth: between two, on a ramp, integers; each with separate random numbers.
 local scene = require "testing.scene"
 
 local function born(attributes, more)

@@ -40,11 +40,12 @@ TEST_CASE("a turned vector keeps its length, and 1 - cos of its turn is the part
         for (std::size_t i = 0; i < before.size(); ++i) {
             INFO(half_angle << ", " << i);
             CHECK(after[i].norm() == Approx(before[i].norm()).epsilon(1e-14));
-            // |a - b|² = 2 (1 - cos) of unit vectors, which keeps the digits of a small turn.
+            // |a - b|² = 2 (1 - cos) for unit vectors, which keeps the digits of a small turn.
             const double fall = 0.5 * (after[i] / before[i].norm() - before[i].normalized()).squaredNorm();
             CHECK(fall ==
                   Approx(depth * draws[i][cone_draw]).epsilon(1e-14).margin(1e-15 * std::sqrt(depth) + 1e-16 * depth));
-            // The way to turn: about the vector, by turn_draw of a whole turn, from the axis of x towards that of y.
+            // The direction of the turn: around the vector, by turn_draw of a whole turn, from the x axis towards the
+            // y axis.
             const Vec3d d = before[i].normalized();
             const double sign = std::copysign(1.0, d.z()), a = -1 / (sign + d.z());
             const Vec3d e1(1 + sign * d.x() * d.x() * a, sign * d.x() * d.y() * a, -sign * d.x());

@@ -1,4 +1,4 @@
--- birth = function(p, frame): what it gives newborn points, once each.
+-- birth = function(p, frame): the values that it gives newborn points, once each.
 local scene = require "testing.scene"
 
 local function run(more, options)
@@ -21,7 +21,7 @@ describe("a function of the newborn", function()
       local frame = i <= 500 and 2 or 3
       assert.near(p.P.x + 10 * frame, p.heat, 1e-5)
       assert.near(2, p.Cd.y, 1e-6)
-      -- It moves for its own part of the frame of birth, and then whole frames.
+      -- It moves for its own part of the birth frame, and then for whole frames.
       assert.near(2 * (p.Cd.z + (3 - frame) / 24), p.P.y, 1e-6)
       dts[#dts + 1] = p.Cd.z
     end

@@ -7,7 +7,7 @@
 namespace rapid {
 namespace {
 
-// A number as whoever writes it means it: 0.29 is 29/100, whatever double is nearest.
+// A number as its author means it: 0.29 is 29/100, whatever the nearest double is.
 struct Fraction {
     std::int64_t over, under;
     double value() const { return static_cast<double>(over) / static_cast<double>(under); }
@@ -38,7 +38,7 @@ TEST_CASE("a constant rate has emitted floor(rate time) points by the end of eve
 
 TEST_CASE("a rate that changes each frame emits the floor of its integral", "[emit]")
 {
-    // Rates are multiples of 1/8 and a frame is 1/16 s, so the integral is a whole number of 128ths.
+    // Rates are multiples of 1/8 and a frame is 1/16 s, so the integral is an integer number of 128ths.
     BirthClock clock(1);
     std::int64_t integral = 0;
     std::uint64_t borne = 0;
@@ -54,7 +54,7 @@ TEST_CASE("a rate that changes each frame emits the floor of its integral", "[em
 
 TEST_CASE("no birth is lost over 100,000 changes of a rate of tenths of a birth per frame", "[emit]")
 {
-    // 0.1 and 0.2 of a birth a frame have no exact double; 0.3 a pair of frames.
+    // 0.1 and 0.2 births per frame have no exact double; 0.3 per pair of frames.
     BirthClock clock(1);
     std::uint64_t borne = 0;
     bool all_right = true;
@@ -84,7 +84,7 @@ TEST_CASE("births of a constant rate are evenly spaced across the frames' ends",
             in_their_frames &= born > static_cast<double>(n - 1) / fps - 1e-9 / rate && born <= end;
         }
     }
-    CHECK(largest_error < 1e-13);  // 20 s in doubles: 4e-15 each, some of them
+    CHECK(largest_error < 1e-13);  // 20 s in doubles: 4e-15 each, accumulated
     CHECK(in_their_frames);
 }
 

@@ -37,7 +37,7 @@ describe("emit by a density", function()
   it("draws places on faces in proportion to it, and points have it as an attribute", function()
     local points = run('rapid.mesh.read "square.ply"', 'count = 20000, density = "heat"')
     assert.equal(20000, #points)
-    -- Of the density 2x the mean is 2/3, with a variance of 1/18.
+    -- A density of 2x has the mean 2/3 and a variance of 1/18.
     assert.near(2 / 3, mean(points, function(p) return p.P.x end), 5 * math.sqrt(1 / 18 / 20000))
     for i = 1, 100 do assert.near(points[i].P.x, points[i].heat, 1e-6) end
     local uniform = run('rapid.mesh.read "square.ply"', "count = 20000")
@@ -49,7 +49,7 @@ describe("emit by a density", function()
     for i = 1, #vertices do assert.near(1, vertices[i].P.x, 0) end
     local points = run("rapid.points.from { P = {{1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, w = {0, 1, 3} }",
       'count = 20000, density = "w"')
-    -- Of 2 and 3 with the chances 1/4 and 3/4.
+    -- The values 2 and 3 with probabilities 1/4 and 3/4.
     assert.near(2.75, mean(points, function(p) return p.P.x end), 5 * math.sqrt(3 / 16 / 20000))
   end)
 

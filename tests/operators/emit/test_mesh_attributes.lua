@@ -1,8 +1,8 @@
--- Attributes and groups of meshes from files, for what is born on them and what is near them.
+-- Attributes and groups of meshes from files, for points born on them or near them.
 local scene = require "testing.scene"
 
--- Two squares side by side in the plane y = 0, x from 0 to 1 and 1 to 2. Texture coordinates have a seam at x = 1:
--- u goes from 0 to 1 on either.
+-- Two adjacent squares in the plane y = 0, x from 0 to 1 and 1 to 2. Texture coordinates have a seam at x = 1: u goes
+-- from 0 to 1 on both.
 local obj = [[
 v 0 0 0 1 0 0
 v 1 0 0 1 0 0
@@ -113,10 +113,10 @@ describe("what is born on a mesh of a PLY file", function()
     local right = 0
     for i = 1, #wet do if wet[i].P.x > 1 then right = right + 1 end end
     assert.near(0.75 * 3000, right, 5 * math.sqrt(3000 * 0.75 * 0.25))
-    -- The density is the same all over a face.
+    -- The density is constant on a face.
     assert.near(0.5, wet:mean("P").z, 5 * math.sqrt(1 / 12 / 3000))
     assert.is_true(born("squares.ply", 'source_group = "right"')[2]:min("P").x >= 1)
-    -- Both: linear on the group's faces alone; of a density x from 1 to 2 the mean is 14/9.
+    -- Both: linear on the group's faces only; for a density x from 1 to 2 the mean is 14/9.
     local both = born("squares.ply", 'source_group = "right", density = "heat"')[2]
     assert.near(14 / 9, both:mean("P").x, 5 * math.sqrt(0.08 / 3000))
   end)
@@ -171,8 +171,8 @@ end)
 describe("attributes that a glTF file names by itself", function()
   local ffi = require "ffi"
 
-  -- A triangle with _HEAT, as floats or as normalized bytes, and _Way; in a buffer that is a file, in the text, or in a
-  -- binary file.
+  -- A triangle with _HEAT, as floats or as normalized bytes, and _Way; the buffer is a separate file, inline text, or
+  -- part of a binary file.
   local function document(uri, heat)
     return ([[{
       "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],

@@ -25,7 +25,7 @@ describe("points that are a function of the frame", function()
       'rate = 480, birth = "even", inherit_velocity = 0')[13]
     for i = 1, #points do
       local t = i / 480
-      -- The first way is a chord, with a sagitta of a h²/8.
+      -- The first path is a chord, with a sagitta of a h²/8.
       assert.near({3 * t, 5 * t * t, 0}, points[i].P, i > 20 and 1e-6 or 10 / 24 ^ 2 / 8 + 1e-6)
     end
   end)
@@ -78,7 +78,7 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
     assert.equal(240, #points)
     for i = 40, #points do -- the first interval has a one-sided beginning
       local angle = 2 * math.pi * i / 480
-      -- The spline of a circle with 24 places: (2π/24)⁴/384, and its tangents.
+      -- Error of the spline of a circle with 24 positions: (2π/24)⁴/384, plus that of its tangents.
       assert.near({math.cos(angle), math.sin(angle), 0}, points[i].P, 2e-3)
     end
   end)

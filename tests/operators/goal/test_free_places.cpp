@@ -12,7 +12,7 @@ namespace {
 std::vector<Vec3d> random_places(std::size_t n, unsigned seed)
 {
     std::mt19937 random(seed);
-    std::uniform_int_distribution<int> coordinate(-9, 9);  // many are as near as others
+    std::uniform_int_distribution<int> coordinate(-9, 9);  // creates many ties
     std::vector<Vec3d> places;
     for (std::size_t k = 0; k < n; ++k) places.emplace_back(coordinate(random), coordinate(random), coordinate(random));
     return places;

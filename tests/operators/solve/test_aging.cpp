@@ -11,7 +11,7 @@ using test::NodeTest;
 
 constexpr double frame_rates[] = {24, 25, 30, 60, 120, 24000.0 / 1001, 30000.0 / 1001, 7.3, 1};
 
-// The distance from a float to the next.
+// Returns the distance from a float to the next.
 double step_at(float value) { return static_cast<double>(std::nextafter(value, 1e30f)) - static_cast<double>(value); }
 
 TEST_CASE("an age of whole frames is their count by the rate, rounded once", "[aging]")
@@ -21,7 +21,7 @@ TEST_CASE("an age of whole frames is their count by the rate, rounded once", "[a
         float age = 0;
         for (int frame = 1; frame <= 100000; ++frame) {
             age = aging.after_frame(age);
-            if (age != static_cast<float>(frame / fps)) {  // a million checks would take longer than all else
+            if (age != static_cast<float>(frame / fps)) {  // a million CHECKs would take longer than everything else
                 CAPTURE(fps, frame);
                 REQUIRE(age == static_cast<float>(frame / fps));
             }
@@ -55,7 +55,7 @@ TEST_CASE("an age grows from anywhere, below 0 and beyond what frames can count"
     CHECK(Aging(1e12).after_frame(0) == 1e12f);
 }
 
-// Points of which the first has a life of one frame, the second of two, ...; returns how many died in each frame.
+// Simulates points of which the first lives one frame, the second two, ...; returns the deaths in each frame.
 std::vector<std::uint64_t> deaths(double fps, std::size_t frames, float age, bool own_dt)
 {
     std::vector<float> lives;
@@ -66,7 +66,7 @@ std::vector<std::uint64_t> deaths(double fps, std::size_t frames, float age, boo
     NodeTest solve("solve", {}, test::simulation(fps));
     std::vector<std::uint64_t> died;
     for (std::size_t f = 1; f <= frames; ++f) {
-        if (own_dt) points.add({"dt", static_cast<float>(1 / fps)});  // as an emitter's newborn bring it
+        if (own_dt) points.add({"dt", static_cast<float>(1 / fps)});  // like an emitter's newborn points
         solve.figures.died = 0;
         points = solve(static_cast<std::int64_t>(f) + 1, std::move(points));
         died.push_back(solve.figures.died);
@@ -85,7 +85,7 @@ TEST_CASE("a life of n frames ends with the n-th, for n from 1 to 2,000", "[agin
 
 TEST_CASE("a point born within a frame has outlived n frames' life in its n-th frame after that", "[aging]")
 {
-    // Half a frame old: (k + 1/2) h >= n h first for k = n.
+    // Points start half a frame old: (k + 1/2) h >= n h first holds for k = n.
     CHECK(deaths(24, 2000, 0.5f / 24, false) == std::vector<std::uint64_t>(2000, 1));
 }
 

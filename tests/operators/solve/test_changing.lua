@@ -1,11 +1,11 @@
--- Parameters that are functions of the frame are functions of time within it: against the closed form or an integration
--- of its own, and the error that is told of them.
+-- Parameters that are functions of the frame act as functions of time within it. Compared with closed forms or an
+-- independent integration, including the reported error.
 local scene = require "testing.scene"
 local json = require "dkjson"
 
-local last = 25 -- a second
+local last = 25 -- one second
 
--- The error of the last frame, and its points.
+-- Returns the error of the last frame, and its points.
 local function run(nodes, frames, points_text)
   frames = frames or last
   local text = ("return rapid.create { fps = 24, points = %s } "):format(points_text or "two") .. nodes
@@ -15,7 +15,7 @@ local function run(nodes, frames, points_text)
   return told.error, scene.run(text, { frames = {frames, frames} })[frames], told
 end
 
--- x'' = f(x, v, t) of one point after a second, by Runge and Kutta.
+-- Returns the solution of x'' = f(x, v, t) for one point after a second, by Runge-Kutta.
 local function integrated(f, x, v)
   local n = 4000
   local dt = 1 / n
@@ -38,7 +38,7 @@ end
 describe("a force's function of the frame is one of time:", function()
   local sine = "math.sin(2 * math.pi * f.time)"
   local function omega(t) return math.sin(2 * math.pi * t) end
-  -- Nodes, and the acceleration along x of the point that begins at rest at 0.
+  -- Nodes, and the acceleration along x of the point that starts at rest at 0.
   local scenes = {
     ["a spring's target"] = { (":spring { stiffness = 60, target = function(f) return {2 * %s, 1, 0} end }")
       :format(sine), function(x, _, t) return 60 * (2 * omega(t) - x) end },
@@ -137,7 +137,7 @@ describe("a pin's place that is a function of the frame is one of time:", functi
         local _, points = run(nodes, frame)
         local t = (frame - 1) / 24
         assert.near({2 * math.sin(2 * math.pi * t), 1, 0}, points[1].P, 1e-6)
-        -- The cubic through four frames, of a sine of 24: order 3 in the velocity.
+        -- The cubic through four frames, for a sine of 24 frames: order 3 in the velocity.
         assert.near(4 * math.pi * math.cos(2 * math.pi * t), points[1].v.x, 0.06)
       end
     end

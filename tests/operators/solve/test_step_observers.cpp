@@ -11,7 +11,7 @@ namespace {
 
 using test::NodeTest;
 
-// Points at these distances from an attractor, on their way into a Solve that tells of each.
+// Points at these distances from an attractor, fed into a Solve with per-point figures.
 struct Orbit {
     std::shared_ptr<Simulation> simulation = test::simulation();
     NodeTest pull{"attract", {{"strength", Value(20.0)}}};
@@ -75,7 +75,7 @@ TEST_CASE("with a tolerance each point tells the sub-steps that it took, in orde
     CHECK(near >= 4 * far);
     CHECK(orbit.solve.figures.substeps == near);
 
-    // The same alone: what others take says nothing of a point.
+    // The same point alone: the substeps of others do not matter.
     Orbit alone({{"tolerance", Value(1e-5)}});
     CHECK(test::values_of<std::int32_t>(alone.step(at_distances({50.0f})), "substeps").front() == taken[1]);
 }
@@ -107,8 +107,8 @@ TEST_CASE("the state does not keep the figures, and a scene's own attributes sta
     CHECK_FALSE(untold.step(at_distances({1})).has("error"));
 }
 
-// The points after four steps among attractors, neighbours and, with a radius, contacts; some die of age. With all
-// observers that a step can have, or with those alone that it always has.
+// Returns the points after four steps among attractors, neighbours and, with a radius, contacts; some die of age. Uses
+// all observers that a step can have, or only the permanent ones.
 PointSet after_steps(const test::Arguments& arguments, double radius_of_contacts, bool is_observed)
 {
     const auto simulation = test::simulation();
@@ -148,7 +148,7 @@ TEST_CASE("observers find out about a step and leave its points as they are", "[
     same({{"substeps", Value(3.0)}}, 0.1);
 }
 
-// Kills points that are farther out than the limit.
+// Kills points beyond the limit.
 class Border : public Action {
 public:
     std::unique_ptr<ActionPass> begin(PointSet&) const override { return std::make_unique<Pass>(); }

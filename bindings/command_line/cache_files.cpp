@@ -9,7 +9,7 @@ namespace rapid {
 
 CacheFiles find_cache(const std::string& text)
 {
-    std::error_code none;  // of a name that can't be one
+    std::error_code none;  // for invalid names
     // A file whose name looks like a pattern takes precedence.
     if (std::filesystem::is_directory(text, none))
         throw Error("is a folder; name a file, or a sequence such as cache.####.vdb").at({text, 0});

@@ -1,4 +1,4 @@
-// A cache by the name that a user gives: one file, or the pattern of a sequence of files.
+// A cache named by the user: one file, or the pattern of a sequence of files.
 #pragma once
 
 #include <filesystem>
@@ -16,10 +16,10 @@ struct CacheFiles {
     std::map<int, std::filesystem::path> frames;  // a single file has the number 0
 };
 
-// Error: no such file, or it is a folder.
+// Throws Error if the file does not exist, or is a folder.
 CacheFiles find_cache(const std::string& text);
 
-// What a sandboxed process reads of them: a file, or the folder of a sequence. A name that is not there is left to
+// Returns the files that a sandboxed process reads: a file, or the folder of a sequence. Missing names are left to
 // find_cache().
 SandboxAccess access_to_caches(const std::vector<std::string>& texts);
 

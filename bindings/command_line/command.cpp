@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// Static in a function, so that it exists before the first registration, in whichever file that is.
+// Static in a function, so that it exists before the first registration, in any file.
 std::vector<std::unique_ptr<Command> (*)()>& command_makers()
 {
     static std::vector<std::unique_ptr<Command> (*)()> all;
@@ -66,7 +66,7 @@ void print_error(const SceneError& error, bool verbose)
 void print_warning(const std::string& warning)
 {
     std::fflush(stdout);
-    constexpr std::size_t most = 4000;  // bytes, as of an error
+    constexpr std::size_t most = 4000;  // bytes, as for an error
     const std::string text = fmt::format("warning: {}\n", printable(shortened(warning, most)));
     std::fwrite(text.data(), 1, text.size(), stderr);
 }

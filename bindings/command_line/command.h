@@ -1,7 +1,7 @@
-// A command of `rapid`: one file in this folder, which registers itself; nothing else names it.
+// A command of `rapid`: one file in this folder, which registers itself; no other file names it.
 //
 // Exit statuses: 0 done; 1 an error while a frame ran, a failed test, a difference; 2 an error before the first frame,
-// which is any Error that rises out of run().
+// which is any Error thrown by run().
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ public:
     virtual int run(const CommonOptions& common) = 0;
 };
 
-// In order of name.
+// Returns the commands, ordered by name.
 std::vector<std::unique_ptr<Command>> make_commands();
 
 struct CommandRegistration {
@@ -47,18 +47,19 @@ struct CommandRegistration {
     static const ::rapid::CommandRegistration registration_of_##Type( \
         []() -> std::unique_ptr<::rapid::Command> { return std::make_unique<Type>(); })
 
-// Writes to standard output. Unlike fmt::print it does not throw when the reader has gone; main() reports a failure to
-// write.
+// Writes to standard output. Unlike fmt::print it does not throw if the reader has closed the pipe; main() reports a
+// failure to write.
 void print(std::string_view text);
-// Writes the error to standard error, and with --verbose its trace. Above a progress bar, if there is one.
+// Writes the error to standard error, and its trace with --verbose. Clears a progress bar, if there is one.
 void print_error(const Error& error, bool verbose);
 void print_error(const SceneError& error, bool verbose);
 void print_warning(const std::string& warning);
 
-// For limits that are reached in the middle of something, from any thread: prints the message and ends the process.
+// Returns a handler for limits reached in the middle of an operation, from any thread: it prints the message and ends
+// the process.
 std::function<void(const std::string& message)> end_at_limit(const CommonOptions& common);
 
-// Parse values of options. Errors quote the value and say which would be right.
+// Parse values of options. Errors quote the value and name valid ones.
 std::int64_t read_whole(const std::string& option, const std::string& text, std::int64_t least);
 std::uint64_t read_seed(const std::string& text);
 double read_positive(const std::string& option, const std::string& text);

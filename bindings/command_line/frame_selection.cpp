@@ -17,7 +17,7 @@ RunFrames read_frames(const std::string& text)
     const char* at = text.data();
     const char* const end = at + text.size();
     const auto number = [&] {
-        std::int32_t value = 0;  // as far as file formats and names go
+        std::int32_t value = 0;  // the range of file formats and names
         const auto parsed = std::from_chars(at, end, value);
         if (parsed.ec == std::errc::result_out_of_range) throw wrong("a frame's number must fit 32 bits");
         if (parsed.ec != std::errc()) throw wrong("a number is missing");

@@ -1,4 +1,4 @@
-// The frames of -f.
+// Parses the frames of -f.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@
 
 namespace rapid {
 
-// Without -f: two seconds at 24 frames a second.
+// Default without -f: two seconds at 24 frames a second.
 constexpr std::int64_t default_frames = 48;
 
-// 1-48, 1-48x2, 12. All frames from the scene's first one are computed; these are written. Error: the text is not of
-// this form.
+// Parses 1-48, 1-48x2, 12. All frames from the scene's first one are computed; these are written. Throws Error if the
+// text does not have this form.
 RunFrames read_frames(const std::string& text);
 
-// One frame, for another option. Error: the text is not a whole number of 32 bits.
+// Parses one frame, for another option. Throws Error unless the text is a whole number of 32 bits.
 std::int64_t read_frame(const std::string& option, const std::string& text);
 
-// Declares -f. doc: which frames they are, and how many are taken without it.
+// Declares -f. doc: the meaning of the frames, and the default.
 void declare_frames(Options& options, std::optional<RunFrames>& frames, const std::string& doc);
 
 }  // namespace rapid

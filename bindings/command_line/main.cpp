@@ -34,7 +34,7 @@ CLI::App* find_subcommand(CLI::App& app, const std::string& name)
     return nullptr;
 }
 
-// Whether an argument is an option, of any command, that takes a value from the next one.
+// Returns true if an argument is an option, of any command, that takes its value from the next one.
 bool takes_value(CLI::App& app, const std::string& argument)
 {
     if (!argument.starts_with('-')) return false;
@@ -44,8 +44,8 @@ bool takes_value(CLI::App& app, const std::string& argument)
     return false;
 }
 
-// The place of the command's name: the first argument that is one, and that is not an option's value. Options may stand
-// before the name as well.
+// Returns the index of the command's name: the first argument that is a command and not an option's value. Options may
+// also precede the name.
 std::size_t find_command(CLI::App& app, const Arguments& arguments)
 {
     for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i)
@@ -68,7 +68,7 @@ Error no_command(CLI::App& app, const Arguments& arguments)
     return Error(fmt::format("no command; it must be one of {}", fmt::join(names, ", ")));
 }
 
-// Arguments that no option took.
+// Refuses arguments that no option took.
 void refuse_rest(const CLI::App& command)
 {
     for (const std::string& argument : command.remaining()) {
@@ -82,7 +82,7 @@ void refuse_rest(const CLI::App& command)
     }
 }
 
-// Of a file or folder, as a variable of the shell that is not set leaves it.
+// Refuses empty names of files or folders, as an unset variable of the shell leaves them.
 void refuse_empty_names(const CLI::App& command)
 {
     for (const CLI::Option* option : command.get_options()) {
@@ -97,21 +97,21 @@ void refuse_empty_names(const CLI::App& command)
 
 int finish(int status)
 {
-    // A reader that has gone (`rapid nodes | head`) wanted no more.
+    // A closed pipe (`rapid nodes | head`) is not an error.
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
     if (errno == EPIPE) return status;
     print_error(Error(fmt::format("standard output can't be written: {}", std::strerror(errno))), false);
     return status == status_done ? status_failed : status;
 }
 
-// The options that every command takes.
+// Declares the options that every command takes.
 void declare_common(CLI::App& command, CommonOptions& common)
 {
     command
         .add_option_function<std::string>(
             "--threads",
             [&](const std::string& text) {
-                constexpr int most = 4096;  // a typing error, not a machine
+                constexpr int most = 4096;  // more is a typing error
                 const std::int64_t threads = read_whole("--threads", text, 0);
                 if (threads > most) throw Error(fmt::format("--threads = {}; it must be at most {}", text, most));
                 common.threads = static_cast<int>(threads);
@@ -128,8 +128,8 @@ void declare_common(CLI::App& command, CommonOptions& common)
     command.allow_extras();
 }
 
-// Reads the arguments into the options of the command that they name. Returns the exit status where that is the end: of
-// --help and --version, and of a usage error.
+// Reads the arguments into the options of the command that they name. Returns the exit status if the process ends
+// there: for --help and --version, and for a usage error.
 std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
 {
     std::string who = "rapid";
@@ -168,7 +168,7 @@ int become(const Program& program, const Arguments& arguments)
     }
 }
 
-// Whether nothing that was given to the command is to blame: a library failed, or the system has no memory.
+// Returns true if nothing given to the command is to blame: a library failed, or memory ran out.
 bool is_of_system(const SceneError& error)
 {
     const bool is_plain = error.file.empty() && error.node.empty() && error.message == "out of memory";
@@ -193,13 +193,13 @@ int run_command(Command& command, const CommonOptions& common)
         return is_of_system(exception.error()) ? status_failed : status_refused;
     } catch (const std::bad_alloc&) {
         print_error(Error("out of memory"), false);
-    } catch (const std::exception& error) {  // of a library: its text is all that is known
+    } catch (const std::exception& error) {  // from a library: its text is all that is known
         print_error(Error(error.what()), false);
     }
     return status_failed;
 }
 
-// What the library's messages call its settings here.
+// Sets the names under which the library's messages refer to settings.
 void name_options()
 {
     name_settings({{Setting::Memory, "--memory"},
@@ -229,10 +229,10 @@ int run(const Arguments& arguments)
     app.footer(
         "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
         "difference; 2 found before (usage, a mistake in the graph, a missing file).");
-    app.require_subcommand(0, 1);  // behind one the name of another is an argument: `rapid nodes merge`
+    app.require_subcommand(0, 1);  // after a command, another command's name is an argument: `rapid nodes merge`
     CommonOptions common;
     const std::vector<std::unique_ptr<Command>> commands = make_commands();
-    const bool is_rapid = commands.size() > 1;  // or a program, with its own
+    const bool is_rapid = commands.size() > 1;  // otherwise a program with one command of its own
     std::map<std::string, Command*> all;        // null: a program, which knows its options
     for (const auto& command : commands) all[command->name()] = command.get();
     if (is_rapid)
@@ -261,8 +261,8 @@ int run(const Arguments& arguments)
 
 namespace {
 
-// What ends a process from within libraries that can't pass an exception on: CLI11 and libstdc++ take memory in
-// functions that may not throw. Nothing here takes any.
+// Ends the process after an error within a library that cannot pass an exception on: CLI11 and libstdc++ allocate in
+// functions that may not throw. This function allocates nothing.
 void end_without_exception()
 {
     const char* text = "an exception could not be passed on, as a rule for want of memory\n";
@@ -271,7 +271,7 @@ void end_without_exception()
     } catch (const std::bad_alloc&) {
         text = "out of memory\n";
     } catch (...) {
-        __gnu_cxx::__verbose_terminate_handler();  // a fault of Rapid: it aborts
+        __gnu_cxx::__verbose_terminate_handler();  // a bug in Rapid: aborts
     }
     rapid::remove_unfinished_files();
     [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text, std::strlen(text));
@@ -283,14 +283,14 @@ void end_without_exception()
 int main(int argc, char** argv)
 {
     std::set_terminate(end_without_exception);
-    std::signal(SIGXFSZ, SIG_IGN);  // a file that grows beyond a limit is an error like any other
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that exceeds a limit is an ordinary error
     int status = rapid::status_failed;
     try {
         status = rapid::run({argv + 1, argv + argc});
-    } catch (const std::bad_alloc&) {  // to tell it as any other error takes memory
+    } catch (const std::bad_alloc&) {  // reporting it like other errors would allocate
         std::fputs("out of memory\n", stderr);
     }
-    // Libraries take memory to end (log4cplus, of OpenVDB), and end the process otherwise where there is none.
+    // Libraries (OpenVDB's log4cplus) allocate at exit, and end the process with an error if memory has run out.
     std::fflush(nullptr);
     std::_Exit(status);
 }

@@ -1,4 +1,4 @@
-// What --memory ends: a command that takes more than it may.
+// Enforces --memory: ends a command that exceeds it.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,8 @@
 
 namespace rapid {
 
-// For as long as it lives, what this thread runs ends with an Error of the node where the process takes more memory
-// than --memory gives it. file: the graph. end: called from another thread where that comes too late; it must not
-// return.
+// While it lives, work on this thread ends with an Error of the node if the process exceeds --memory. file: the graph.
+// end: called from another thread if that comes too late; it must not return.
 class MemoryLimit {
 public:
     MemoryLimit(const std::string& file, const std::function<void(const std::string& message)>& end)

@@ -1,5 +1,5 @@
-// The options and arguments of a command, to declare and to read. They hide the parser, CLI11: each file that includes
-// it compiles all of it, which takes three seconds.
+// The options and arguments of a command, to declare and to read. They hide the parser, CLI11, since each file that
+// includes it takes three seconds to compile.
 #pragma once
 
 #include <functional>
@@ -14,15 +14,15 @@ class Option;
 
 namespace rapid {
 
-// One option as it is being declared.
+// An option that is being declared.
 class Option {
 public:
     explicit Option(CLI::Option* option) : option_(option) {}
 
-    Option type_name(const std::string& name) const;  // what --help calls its value
+    Option type_name(const std::string& name) const;  // the name of its value in --help
     Option required() const;
-    Option one_value() const;  // each --NAME takes one value, though the option may be repeated
-    Option internal() const;   // --help does not tell it
+    Option one_value() const;  // each --NAME takes one value, even if the option may be repeated
+    Option internal() const;   // hidden from --help
     Option one_of(std::vector<std::string> values) const;
     Option excludes(const Option& other) const;
 
@@ -40,17 +40,17 @@ public:
     Option add_option(const std::string& names, std::vector<std::string>& values, const std::string& doc = "");
     Option add_option(const std::string& names, int& value, const std::string& doc = "");
     Option add_option(const std::string& names, std::optional<int>& value, const std::string& doc = "");
-    // What `read` throws is told as an error of usage.
+    // Reports exceptions of `read` as usage errors.
     Option add_option(const std::string& names, const std::function<void(const std::string& value)>& read,
                       const std::string& doc);
     Option add_repeated(const std::string& names,
                         const std::function<void(const std::vector<std::string>& values)>& read,
                         const std::string& doc);
 
-    // The values that were given to an option.
+    // Returns the values given to an option.
     std::vector<std::string> values_of(const std::string& name) const;
 
-    // The command with its arguments as they were given, but for the options `left_out`.
+    // Returns the command with its arguments as given, without the options `left_out`.
     std::vector<std::string> words(const std::vector<std::string>& left_out) const;
 
 private:

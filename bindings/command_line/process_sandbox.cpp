@@ -54,7 +54,7 @@ constexpr std::uint64_t write_rights = read_rights | LANDLOCK_ACCESS_FS_WRITE_FI
 constexpr std::uint64_t file_rights =
     LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | truncate_right;
 
-// All rights of the first version, and those of later ones that the kernel knows.
+// Returns all rights of the first version, and those of later ones that the kernel knows.
 std::uint64_t handled_rights(int version)
 {
     std::uint64_t rights = (1ULL << 13) - 1;
@@ -81,7 +81,7 @@ std::vector<std::filesystem::path> own_files()
     const Installation installation = Installation::find().value();
     std::vector<std::filesystem::path> files = {std::filesystem::read_symlink("/proc/self/exe"), installation.lua,
                                                 installation.library};
-    // Of the process no more than the memory that it has: its environment and its addresses are for nobody.
+    // Exposes only the process's memory usage. Its environment and address map stay unreadable.
     for (const char* path :
          {"/usr/lib", "/usr/local/lib", "/lib", "/lib64", "/etc/ld.so.cache", "/dev/null", "/proc/cpuinfo",
           "/proc/meminfo", "/proc/self/statm", "/proc/self/status", "/proc/self/cgroup"})
@@ -117,7 +117,7 @@ void restrict_system_calls(Processes processes, Connections connections = Connec
     if (status != 0) throw refused("seccomp refuses the filter", -status);
 }
 
-// Descriptors that whoever started the process has left open reach files that Landlock would not open.
+// Closes inherited descriptors, which could reach files that Landlock would not open.
 void close_inherited(int first)
 {
     if (close_range(static_cast<unsigned>(first), ~0U, CLOSE_RANGE_CLOEXEC) != 0)
@@ -126,8 +126,8 @@ void close_inherited(int first)
     if (nothing < 0 || dup2(nothing, STDIN_FILENO) < 0) throw refused("standard input can't be closed", errno);
 }
 
-// Root's privileges lift limits and reach all of the machine. What remains of them opens files of other users, of which
-// Landlock leaves those that it leaves to all.
+// Root's privileges lift limits and reach the whole machine. The remaining ones open files of other users, as far as
+// Landlock allows.
 void give_up_privileges()
 {
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
@@ -135,7 +135,7 @@ void give_up_privileges()
     if (syscall(SYS_capget, &header, own) != 0) throw refused("privileges can't be asked for", errno);
     for (__user_cap_data_struct& word : own) word.inheritable = 0;
     if (syscall(SYS_capset, &header, own) != 0) throw refused("privileges can't be given up", errno);
-    if (getuid() != 0 && geteuid() != 0) return;  // others have none once the process has restarted
+    if (getuid() != 0 && geteuid() != 0) return;  // others have none after the process has restarted
     for (unsigned long one = 0; prctl(PR_CAPBSET_READ, one, 0, 0, 0) >= 0; ++one) {
         const bool is_kept = one == CAP_DAC_OVERRIDE || one == CAP_DAC_READ_SEARCH || one == CAP_FOWNER;
         if (is_kept || prctl(PR_CAPBSET_READ, one, 0, 0, 0) == 0) continue;
@@ -143,8 +143,8 @@ void give_up_privileges()
     }
 }
 
-// What the loader, the C library and Rapid ask for. Of the rest the restarted process knows nothing: it may hold
-// secrets.
+// Returns the variables that the loader, the C library and Rapid need. The restarted process does not get the others,
+// which may hold secrets.
 std::vector<char*> own_environment()
 {
     std::vector<char*> own;
@@ -188,10 +188,11 @@ void complete_sandbox(Processes processes, Connections connections)
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
     limit(RLIMIT_CORE, 0);
-#ifndef RAPID_ADDRESS_SANITIZER  // which has mapped more
+#ifndef RAPID_ADDRESS_SANITIZER  // its mappings exceed the limit
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));
 #endif
-    // What a hostile file may take over has no rights but to read: whoever forks such a copy, it forks none.
+    // Processes that a hostile file might take over have no rights but to read. The process from which such copies are
+    // forked cannot fork others.
     confine_copies([] { restrict_system_calls(Processes::None); });
     if (processes == Processes::None) start_reader_process([] { restrict_system_calls(Processes::Copies); });
     restrict_system_calls(processes, connections);

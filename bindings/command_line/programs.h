@@ -1,8 +1,8 @@
-// Commands that are programs of their own: `rapid NAME` becomes libexec/rapid/NAME. Not everybody who runs a scene
-// needs them, so ./rapid builds one when it is first asked for.
+// Commands that are separate programs: `rapid NAME` becomes libexec/rapid/NAME. Not every user needs them, so ./rapid
+// builds one when it is first used.
 //
-// A program is a folder of bindings with a program.txt, the line that `rapid --help` has of it, and a Command of the
-// folder's name.
+// A program is a folder of bindings with a program.txt, its line in `rapid --help`, and a Command with the folder's
+// name.
 #pragma once
 
 #include <filesystem>
@@ -18,14 +18,14 @@ struct Program {
     const char* doc;
 };
 
-// In order of name.
+// Returns the programs, ordered by name.
 std::span<const Program> programs();
-const Program& program(std::string_view name);  // which there is
+const Program& program(std::string_view name);  // precondition: it exists
 
-// The file of `rapid`, for it and for its programs.
+// Returns the file of `rapid`, also in its programs.
 std::filesystem::path command_file();
 
-// Becomes the program, with the arguments of this process. Error: it can't be started.
+// Replaces this process with the program and these arguments. Throws Error if it cannot be started.
 [[noreturn]] void become_program(const Program& program, std::vector<std::string> arguments);
 
 }  // namespace rapid

@@ -11,7 +11,7 @@
 namespace rapid {
 namespace {
 
-// The limit of memory is that of opening: frames are watched by the scene, which knows the node.
+// The memory limit applies to opening; the scene itself watches frames, since it knows the node.
 Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
     const MemoryLimit limit(file, hooks.late);

@@ -1,4 +1,4 @@
-// The options that all commands share which open a scene, and how it is opened.
+// Options shared by all commands that open a scene, and the opening itself.
 #pragma once
 
 #include <cstdint>
@@ -22,14 +22,14 @@ public:
     // --script-timeout, --script-memory.
     const SceneOptions& options() const { return options_; }
 
-    // With the settings; what scripts print is printed, and so are warnings.
+    // Returns options with the settings; output of scripts and warnings are printed.
     SceneOptions scene_options() const;
-    // What becomes of a frame that does not end at the limit of memory when it is asked to.
+    // Action for a frame that does not end at the memory limit when requested.
     enum class AtLimit { GoesOn, EndsProcess };
-    // Opens the scene of a command that writes none of its files. A script that runs into its timeout ends the process,
-    // now or in a later frame. Error: the file or a --set is wrong.
+    // Opens the scene of a command that writes none of its files. A script that exceeds its timeout ends the process,
+    // now or in a later frame. Throws Error if the file or a --set is wrong.
     Scene open(const CommonOptions& common, AtLimit frame = AtLimit::GoesOn) const;
-    // Another one, with the same limits; --set is for the first one only.
+    // Opens another scene with the same limits; --set applies only to the first one.
     Scene open_other(const std::string& file, const CommonOptions& common) const;
 
 private:

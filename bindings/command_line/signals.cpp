@@ -26,7 +26,7 @@ sigset_t ending_signals()
 SignalThread::SignalThread(std::function<void(int signal)> end)
 {
     sigset_t ours = ending_signals();
-    sigaddset(&ours, SIGUSR1);  // the destructor's
+    sigaddset(&ours, SIGUSR1);  // for the destructor
     pthread_sigmask(SIG_BLOCK, &ours, nullptr);
     thread_ = std::thread([this, ours, end = std::move(end)] {
         while (!stopping_) {

@@ -1,5 +1,5 @@
-// Ends a run on Ctrl-C, Ctrl-\, SIGTERM or SIGHUP from an ordinary thread, which may take locks and write files; a
-// signal handler may not.
+// Ends a run on Ctrl-C, Ctrl-\, SIGTERM or SIGHUP from an ordinary thread, which may take locks and write files, unlike
+// a signal handler.
 #pragma once
 
 #include <atomic>
@@ -9,13 +9,13 @@
 
 namespace rapid {
 
-// SIGINT, SIGTERM, SIGHUP and SIGQUIT, without those that were ignored when the program started (nohup).
+// Returns SIGINT, SIGTERM, SIGHUP and SIGQUIT, without those that were ignored when the program started (nohup).
 sigset_t ending_signals();
 
 class SignalThread {
 public:
-    // `end` gets the signal and must not return. Make it before any other thread, as threads inherit the mask that
-    // blocks these signals. What was ignored stays ignored.
+    // `end` gets the signal and must not return. Construct this before any other thread, since threads inherit the mask
+    // that blocks these signals. Ignored signals stay ignored.
     explicit SignalThread(std::function<void(int signal)> end);
     ~SignalThread();
     SignalThread(const SignalThread&) = delete;

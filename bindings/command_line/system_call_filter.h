@@ -1,20 +1,20 @@
-// The system calls that a sandboxed process may make: a list of those that Rapid needs (seccomp). All others fail with
-// EPERM. A call by the numbers of another architecture (32 bits, x32) ends the process with SIGSYS.
+// The allowlist of system calls for a sandboxed process (seccomp). All others fail with EPERM. A call by the numbers of
+// another architecture (32 bits, x32) ends the process with SIGSYS.
 #pragma once
 
 namespace rapid {
 
 enum class Processes {
-    None,    // threads alone
-    Copies,  // it may fork, and wait for the copies, which have the same filter; it starts no other program
+    None,    // threads only
+    Copies,  // may fork, and wait for the copies, which have the same filter; starts no other program
 };
 
 enum class Connections {
     None,
-    Accepted,  // those that come in by a socket that listens already; the process makes no socket of its own
+    Accepted,  // accepts on a socket that already listens; cannot create sockets
 };
 
-// Returns a status of seccomp's: 0, or a negative errno. Holds all threads, and those that they start.
+// Installs the filter on all threads and their children. Returns a seccomp status: 0, or a negative errno.
 int load_system_call_filter(Processes processes, Connections connections = Connections::None);
 
 }  // namespace rapid

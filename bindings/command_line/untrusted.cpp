@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Plugins, as main() finds them, and folders of modules.
+// Adds plugins, as main() finds them, and folders of modules.
 void add_own_paths(SandboxAccess& access, const CommonOptions& common)
 {
     access.readable.insert(access.readable.end(), common.plugins.begin(), common.plugins.end());
@@ -26,7 +26,7 @@ void UntrustedOptions::declare(Options& options, const std::string& whose)
         "--untrusted", untrusted_,
         "keeps the process from all files but those that it is asked to read and write, from sockets and from "
         "other processes");
-    options.add_flag(sandboxed_option, sandboxed_).internal();  // the restarted process
+    options.add_flag(sandboxed_option, sandboxed_).internal();  // set in the restarted process
     options
         .add_option("--allow-read", allowed_,
                     fmt::format("a file or folder that an --untrusted {} may read, too", whose))
@@ -45,7 +45,7 @@ void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, con
         all.readable.insert(all.readable.end(), allowed_.begin(), allowed_.end());
         enter_sandbox(all);
     }
-    Installation::load_all().value();  // the limits of memory forbid it
+    Installation::load_all().value();  // the memory limits forbid it later
     complete_sandbox(processes, connections);
 }
 

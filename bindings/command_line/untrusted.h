@@ -1,4 +1,4 @@
-// --untrusted and --allow-read, of the commands that run a graph or read files.
+// Options --untrusted and --allow-read, of the commands that run a graph or read files.
 #pragma once
 
 #include <filesystem>
@@ -15,24 +15,24 @@ namespace rapid {
 class Confined {
 public:
     virtual ~Confined() = default;
-    // Sandboxes the process where an option asks for it; called before plugins are loaded, and before run().
+    // Sandboxes the process if an option requests it; called before plugins are loaded, and before run().
     virtual void confine(const CommonOptions& common) = 0;
-    // Whether this process loads plugins; not where others do the work.
+    // Returns false if other processes do the work, and this one loads no plugins.
     virtual bool takes_plugins() const { return true; }
 };
 
 class UntrustedOptions {
 public:
-    // whose: what --allow-read is for, "graph" or "file".
+    // whose: the subject of --allow-read, "graph" or "file".
     void declare(Options& options, const std::string& whose);
     bool asked() const { return untrusted_; }
 
-    // Sandboxes the process, if that is asked for. access: what the command itself reads and writes, besides
-    // --allow-read and plugins. Before plugins are loaded: their first code runs in the sandbox, too.
+    // Sandboxes the process if requested. access: the files that the command itself reads and writes, besides
+    // --allow-read and plugins. Call it before plugins are loaded: their initialisation runs in the sandbox, too.
     void confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
                  Processes processes = Processes::None, Connections connections = Connections::None) const;
 
-    // These options again, for a process of its own.
+    // Returns these options as arguments for another process.
     std::vector<std::string> words() const;
 
 private:
@@ -40,7 +40,7 @@ private:
     std::vector<std::string> allowed_;
 };
 
-// The folder that a file lies in.
+// Returns the folder of a file.
 std::filesystem::path folder_of(const std::filesystem::path& file);
 
 }  // namespace rapid

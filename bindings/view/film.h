@@ -1,4 +1,4 @@
-// A film of frames that a viewer has, by the renderer of `rapid run -o film.mp4`, drawn on a thread of its own.
+// A film of a viewer's frames, drawn by the renderer of `rapid run -o film.mp4` on a thread of its own.
 #pragma once
 
 #include <cstdint>
@@ -20,23 +20,23 @@ public:
     struct Wish {
         std::string extension;  // .mp4, .webm or .gif
         std::int64_t first = 1, last = 1;
-        std::string output;  // of the graph
+        std::string output;  // name of the output in the graph
         FilmOptions film;
         int threads = 1;
     };
-    // frame_of: from any thread; null where there is no such frame, which is an error. Error: no ffmpeg; a format or
-    // a size that can't be.
+    // frame_of: callable from any thread; null means that the frame does not exist, which is an error. Throws Error if
+    // there is no ffmpeg, or if the format or size is not possible.
     ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of);
-    // Ends it where it is.
+    // Stops the film.
     ~ViewFilm();
 
     struct Progress {
         std::int64_t done = 0, of = 0;  // frames
         bool has_ended = false;
-        std::string error;  // why there is no film; empty where there is none
+        std::string error;  // the reason if there is no film; otherwise empty
     };
     Progress progress() const;
-    // The film, once it has ended without an error.
+    // Returns the film after it has ended without an error.
     std::string take();
 
 private:
@@ -45,7 +45,7 @@ private:
 
     const Wish wish_;
     const std::function<ViewFramePtr(std::int64_t)> frame_of_;
-    std::optional<TemporaryFolder> folder_;  // until the film has been read
+    std::optional<TemporaryFolder> folder_;  // exists until the film has been read
     std::string file_;
     std::optional<SceneFilm> drawn_;
     Cancellation cancellation_;

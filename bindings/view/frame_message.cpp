@@ -19,15 +19,15 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Puts arrays behind one another, and their places into the header. They are written where they are sent from: a frame
-// of a million points has eight megabytes, and each copy of them takes milliseconds.
+// Concatenates arrays and writes their offsets into the header. They are written in the buffer that is sent: a frame of
+// a million points has eight megabytes, and each copy of them takes milliseconds.
 class Message {
 public:
     explicit Message(ordered_json header) : header_(std::move(header)) { header_["arrays"] = ordered_json::object(); }
 
     ordered_json& header() { return header_; }
 
-    // An array that fill(std::span<T>) writes, in finish().
+    // Adds an array that fill(std::span<T>) writes in finish().
     template <class T, class F>
     void add(const std::string& name, const char* type, std::size_t count, F fill)
     {
@@ -58,8 +58,8 @@ private:
     std::size_t size_ = 0;
 };
 
-// Whole numbers for values between low and high: from `first` to the largest of 16 bits. What is not a number, or
-// below, gets the least.
+// Maps values between low and high to whole numbers, from `first` to the largest of 16 bits. NaN and smaller values map
+// to `first`.
 struct WordScale {
     float low, factor, first = 0;
 
@@ -74,10 +74,10 @@ struct WordScale {
     }
 };
 
-// So many floats are taken at once: a whole number of vectors, and of triples.
+// Number of floats taken at once: a whole number of vectors, and of triples.
 constexpr std::size_t period = 48;
 
-// Of values that take turns, as x, y and z do, each one's least and largest; 0 and 0 where none is finite.
+// Returns the least and largest of interleaved values, such as x, y and z; 0 and 0 if none is finite.
 template <std::size_t turns>
 std::array<std::pair<float, float>, turns> ranges_of(std::span<const float> values)
 {
@@ -86,11 +86,10 @@ std::array<std::pair<float, float>, turns> ranges_of(std::span<const float> valu
     std::array<float, period> low, high;
     low.fill(infinity);
     high.fill(-infinity);
-    // Without branches, and each into a place of its own: the loop is vectorised, 11 times as fast for a million
-    // points.
+    // Without branches, and with separate accumulators: the loop is vectorised, 11 times as fast for a million points.
     const auto take = [&](const float* from, std::size_t count) {
         for (std::size_t j = 0; j < count; ++j) {
-            const bool is_finite = std::abs(from[j]) < infinity;  // files may have others
+            const bool is_finite = std::abs(from[j]) < infinity;  // files may contain others
             low[j] = is_finite && from[j] < low[j] ? from[j] : low[j];
             high[j] = is_finite && from[j] > high[j] ? from[j] : high[j];
         }
@@ -141,7 +140,7 @@ void add_positions(Message& message, const SceneFrame& points, const Places* pla
         const auto quantise = [&](const float* source, std::size_t begin, std::size_t n) {
             for (std::size_t j = 0; j < n; ++j) {
                 const float place = (source[j] - from[j]) * factor[j] + 0.5f;
-                const float bounded = place > 0 ? std::min(place, 65535.0f) : 0;  // not a number: 0
+                const float bounded = place > 0 ? std::min(place, 65535.0f) : 0;  // NaN becomes 0
                 to[begin + j] = static_cast<std::uint16_t>(static_cast<std::int32_t>(bounded));
             }
         };
@@ -173,7 +172,7 @@ void add_velocities(Message& message, const SceneFrame& points, const Places* pl
 void add_values(Message& message, const char* name, std::vector<float> values, bool is_flag = false)
 {
     auto [low, high] = ranges_of<1>(values)[0];
-    if (is_flag) {  // 0 and 1 keep their colours where all points are the same
+    if (is_flag) {  // 0 and 1 keep their colours even if all points are equal
         low = std::min(low, 0.0f);
         high = std::max(high, 1.0f);
     }
@@ -181,7 +180,7 @@ void add_values(Message& message, const char* name, std::vector<float> values, b
     std::size_t unknown = 0;
     for (const float value : values) unknown += std::isnan(value);
     message.header()["unknown"][name] = unknown;
-    // 0 is kept for those without a value, where there are some.
+    // 0 is reserved for points without a value, if there are any.
     const WordScale scale(low, high, unknown > 0 ? 1 : 0);
     const std::size_t count = values.size();
     message.add<std::uint16_t>(name, "u16", count, [=, values = std::move(values)](std::span<std::uint16_t> to) {
@@ -191,7 +190,7 @@ void add_values(Message& message, const char* name, std::vector<float> values, b
     });
 }
 
-// Linear light as pictures encode it (runtime/picture/tone.h): bytes at even steps of its root, finer than a byte.
+// Encodes linear light as pictures do (runtime/picture/tone.h): bytes at even steps of its root, finer than a byte.
 class DisplayBytes {
 public:
     DisplayBytes()
@@ -203,7 +202,7 @@ public:
     }
     std::uint8_t operator()(float light) const
     {
-        const float bounded = light > 0 ? std::min(light, most) : 0;  // not a number: 0
+        const float bounded = light > 0 ? std::min(light, most) : 0;  // NaN becomes 0
         return bytes_[static_cast<std::size_t>(static_cast<std::int32_t>(steps_a_unit * std::sqrt(bounded) + 0.5f))];
     }
 
@@ -233,7 +232,7 @@ void add_colours(Message& message, const SceneFrame& points, const FrameWish& wi
     add_values(message, "value", numbers_of(points, name, places), name.starts_with(group_mark) || name == "asleep");
 }
 
-// The place of each point's text among those of these points, in the order of the alphabet.
+// Returns the rank of each point's string among those of these points, in alphabetical order.
 std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
 {
     std::unordered_map<std::uint32_t, float> ranks;
@@ -247,7 +246,7 @@ std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
     return result;
 }
 
-// f of the components of each point.
+// Returns f of the components of each point.
 template <class T, class F>
 std::vector<float> numbers_of_each(const SceneColumn& column, const Places* places, const F& f)
 {
@@ -303,10 +302,10 @@ ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish)
     Places places;
     for (std::uint32_t i = 0; i < shown.count; ++i)
         if (!members || *members->at<std::uint8_t>(i)) places.push_back(i);
-    // By id, so that the same points are shown in every frame.
+    // Chosen by id, so that every frame shows the same points.
     const SceneColumn id = column_of(points, "id");
     while (places.size() > wish.most) {
-        if (shown.every > UINT64_MAX / 2) {  // files of others may have many points of one id
+        if (shown.every > UINT64_MAX / 2) {  // foreign files may have many points with the same id
             places.resize(wish.most);
             break;
         }

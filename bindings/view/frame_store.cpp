@@ -18,7 +18,7 @@ using Json = CheckedJson;
 constexpr std::size_t most_runs = 8;
 constexpr const char *frame_kind = "frame", *shapes_kind = "geometry", *snapshot_kind = "snapshot";
 
-// For the archive, which knows the file.
+// Throws the error; the archive knows the file.
 void check_written(const Result<Done>& written)
 {
     if (!written) throw Error(written.error().message);
@@ -102,7 +102,7 @@ ViewFramePtr FrameStore::find(std::int64_t number)
     auto frame = std::make_shared<ViewFrame>(*read);
     const std::lock_guard lock(mutex_);
     const auto found = frames_.find(number);
-    if (found == frames_.end() || found->second.run != run) return frame;  // another run has begun meanwhile
+    if (found == frames_.end() || found->second.run != run) return frame;  // another run has started in the meantime
     frame->statistics = found->second.statistics;
     frame->bytes = bytes_of(*frame);
     if (!found->second.frame && make_room(frame->bytes, run)) {
@@ -171,7 +171,7 @@ CachedRun::CachedRun(const fs::path& folder, std::string hash, Scene& scene) : h
         throw Error(fmt::format("--cache {}: {}", archive_.journal().string(), error.what()));
     }
     std::error_code none;
-    fs::last_write_time(folder, fs::file_time_type::clock::now(), none);  // used last
+    fs::last_write_time(folder, fs::file_time_type::clock::now(), none);  // marks the time of last use
     for (const auto& [number, known] : known_) {
         there_[number] = known.shapes;
         last_shapes_ = std::max(last_shapes_, known.shapes);
@@ -245,7 +245,7 @@ std::optional<SceneSnapshot> CachedRun::snapshot_before(std::int64_t frame) cons
 {
     const std::map<std::int64_t, fs::path> all = archive_.files(snapshot_kind);
     for (auto one = std::make_reverse_iterator(all.lower_bound(frame)); one != all.rend(); ++one)
-        // A damaged one is passed over: an earlier one will do.
+        // A damaged one is skipped; an earlier one serves as well.
         if (Result<SceneSnapshot> snapshot = SceneInside::load_snapshot(one->second, hash_))
             return std::move(*snapshot);
     return std::nullopt;

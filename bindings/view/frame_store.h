@@ -1,9 +1,9 @@
-// The frames that a viewer has: what a run publishes and the page asks for.
+// The frames of a viewer: a run publishes them, and the page requests them.
 //
-// Frames of the run before stay, as stale ones, until the new run's take their places: what is seen never vanishes.
-// A published frame never changes; its columns are shared with the run where they are the same. With `--cache` a run's
-// frames lie in a folder, too, which is named by its fingerprint: memory holds those that were used last, and a later
-// view of the same scene finds all of them. The runs used last are kept, and others removed.
+// Frames of the previous run stay as stale ones until those of the new run replace them, so that the picture never
+// vanishes. A published frame never changes; it shares unchanged columns with the run. With `--cache` a run's frames
+// are also stored in a folder named by the run's fingerprint: memory holds the most recently used ones, and a later
+// view of the same scene finds all of them. The folders of the most recent runs are kept, and others removed.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace rapid {
 
 struct ViewFrame {
     std::int64_t number;
-    std::uint64_t run;       // of which it is
+    std::uint64_t run;       // the run to which it belongs
     SceneFrame points;       // of all outputs
     std::string statistics;  // JSON, as in a statistics file
     SceneShapes shapes = {};
@@ -30,15 +30,15 @@ struct ViewFrame {
 };
 using ViewFramePtr = std::shared_ptr<const ViewFrame>;
 
-// Of the points, and of the shapes in part: meshes are mostly shared.
+// Counts the points and part of the shapes, since meshes are mostly shared.
 std::size_t bytes_of(const ViewFrame& frame);
 
 // The frames of one run in a folder. A record of its journal is JSON: "frame", "shapes" (the number of their file, 0
 // for none), "statistics", "warnings" and "read", the files that were read for the frame.
 class CachedRun {
 public:
-    // Finds the frames that are whole, and for which the scene reads the same files still. `hash` is that of the run's
-    // fingerprint. Throws Error if the folder can't be made or read.
+    // Finds the complete frames for which the scene still reads the same files. `hash` is that of the run's
+    // fingerprint. Throws Error if the folder cannot be made or read.
     CachedRun(const std::filesystem::path& folder, std::string hash, Scene& scene);
 
     struct Known {
@@ -46,28 +46,28 @@ public:
         std::vector<std::string> warnings;
         std::int64_t shapes = 0;  // the number of their file; 0: none
     };
-    // The frames that were there at the beginning.
+    // Frames that existed at the beginning.
     const std::map<std::int64_t, Known>& known() const { return known_; }
 
-    // Writes a frame unless it is there; waits while two others are being written. read: the files that were read for
-    // it (Scene::take_inputs).
+    // Writes a frame unless it exists; waits while two others are being written. read: the files that were read for it
+    // (Scene::take_inputs).
     void put(const ViewFrame& frame, const std::vector<std::string>& warnings,
              const std::map<std::string, std::string>& read);
     void keep(const SceneSnapshot& snapshot);
-    // Waits until all is written.
+    // Waits until everything is written.
     void finish() { archive_.finish(); }
-    // The latest one before a frame that is whole.
+    // Returns the latest complete snapshot before a frame.
     std::optional<SceneSnapshot> snapshot_before(std::int64_t frame) const;
 
     bool has(std::int64_t number) const;
-    // Without statistics and bytes. Null: it is not there. Error: it can't be read.
+    // Returns a frame without statistics and bytes, or null if it does not exist. Throws Error if it cannot be read.
     ViewFramePtr load(std::int64_t number, std::uint64_t run);
 
-    // Why files could not be written, since the last call.
+    // Returns the reasons why files could not be written, since the last call.
     std::vector<std::string> take_failures() { return archive_.take_failures(); }
 
 private:
-    // Returns the records of the frames that are known.
+    // Returns the records of the known frames.
     std::vector<std::string> read_journal(Scene& scene);
     std::int64_t number_of(const SceneShapes& shapes);
     SceneShapes shapes(std::int64_t number);
@@ -75,16 +75,16 @@ private:
     const std::string hash_;
     FrameArchive archive_;
     std::map<std::int64_t, Known> known_;
-    mutable std::mutex mutex_;                    // of what follows, and of the journal
+    mutable std::mutex mutex_;                    // guards the members below and the journal
     std::map<std::int64_t, std::int64_t> there_;  // frames with the numbers of their shapes
     std::int64_t last_shapes_ = 0;
-    SceneShapes written_, loaded_;  // the last ones
+    SceneShapes written_, loaded_;  // the most recent ones
     std::int64_t written_number_ = 0, loaded_number_ = 0;
 };
 
 class FrameCache {
 public:
-    // Error: the folder can't be made, or another process has it.
+    // Throws Error if the folder cannot be made, or if another process has it.
     explicit FrameCache(const std::filesystem::path& folder);
 
     std::shared_ptr<CachedRun> open(Scene& scene);
@@ -98,23 +98,23 @@ private:
 
 class FrameStore {
 public:
-    // bytes: that the frames may take.
+    // bytes: capacity for frames.
     explicit FrameStore(std::size_t bytes) : most_bytes_(bytes) {}
 
-    // False where the frame does not fit: then it is not kept. Stale frames go first; then those that the cache has.
+    // Stores a frame. Returns false if it does not fit. Stale frames are evicted first, then those that the cache has.
     bool put(ViewFramePtr frame, std::shared_ptr<CachedRun> cache = nullptr);
-    // A frame that its cache has.
+    // Adds a frame that its cache has.
     void add(std::int64_t number, std::uint64_t run, std::string statistics, std::shared_ptr<CachedRun> cache);
-    // Null where there is none. Error: it can't be read from its cache.
+    // Returns null if the frame does not exist. Throws Error if its cache cannot be read.
     ViewFramePtr find(std::int64_t number);
-    // All frames of a run that are in memory, in order.
+    // Returns all frames of a run that are in memory, in order.
     std::vector<ViewFramePtr> of_run(std::uint64_t run) const;
-    // The statistics of a run's frames behind one, in order, and at most so many.
+    // Returns the statistics of at most `most` frames of a run after a frame, in order.
     std::vector<std::string> statistics(std::uint64_t run, std::int64_t after, std::size_t most) const;
-    // Takes away what is not of the run.
+    // Removes the frames of other runs.
     void keep_only(std::uint64_t run);
 
-    // The first and last of each stretch of frames, of this run, and of those before it.
+    // First and last frames of contiguous ranges: of this run, and of earlier ones.
     struct Stretches {
         std::vector<std::pair<std::int64_t, std::int64_t>> fresh, stale;
     };
@@ -125,7 +125,7 @@ public:
 private:
     struct Entry {
         std::uint64_t run = 0;
-        ViewFramePtr frame;  // null: its cache has it
+        ViewFramePtr frame;  // null if only its cache has it
         std::string statistics;
         std::shared_ptr<CachedRun> cache;  // may be null
         std::uint64_t used = 0;

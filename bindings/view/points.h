@@ -1,4 +1,4 @@
-// Columns of a frame as requests read them: of all points, or of those at some places.
+// Reads columns of a frame for requests: of all points, or of some.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,14 @@
 
 namespace rapid {
 
-// How the page names a group among the attributes.
+// Prefix of a group among the page's attributes.
 inline const std::string group_mark = "group:";
 
-// Of some points, in the columns.
+// Indices of some points in the columns.
 using Places = std::vector<std::uint32_t>;
 
-// The values of a column, packed: a view of the frame's where that has them so. T: of a component. places: null for all
-// points.
+// The values of a column, packed: a view into the frame if it has them in this form. T: type of a component. places:
+// null for all points.
 template <class T>
 class PointValues {
 public:
@@ -46,13 +46,13 @@ public:
     }
 
     std::size_t size() const { return size_; }
-    // Whether all points share one value, which then is there once.
+    // Returns true if all points share one value, which is stored once.
     bool is_one() const { return step_ == 0; }
-    // The components of point k.
+    // Returns the components of point k.
     const T* operator[](std::size_t k) const { return data_ + k * step_; }
 
 private:
-    // count: of the components; 0: as many as there are.
+    // count: number of components; 0: as many as the column has.
     template <std::size_t count>
     void gather(const SceneColumn& column, const Places* places)
     {
@@ -69,7 +69,7 @@ private:
     const T* data_;
 };
 
-// A column of this type. Nothing: there is none.
+// Returns a column of this type, or nothing if there is none.
 inline std::optional<SceneColumn> find_column(const SceneFrame& points, std::string_view name, ColumnType type)
 {
     const Result<SceneColumn> column = points.column(name);

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr int most_depth = 8;  // of lists: a copy of deeper ones would fill the stack
+constexpr int most_depth = 8;  // of lists: copying deeper ones would overflow the stack
 constexpr int least_edge = 16, most_edge = 16384;
 
 int edge_of(const CheckedJson& request, const char* name, int usual)

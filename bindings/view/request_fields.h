@@ -1,5 +1,5 @@
-// The fields of a page's request: each is parsed within its type and its range. All functions throw if a field has
-// another type, or a value that is refused; the error names what would be right.
+// Reads the fields of a page's request, each checked against its type and its range. All functions throw if a field has
+// another type, or a value that is refused; the error names a valid value.
 #pragma once
 
 #include <cstdint>

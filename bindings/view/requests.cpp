@@ -17,8 +17,8 @@ namespace {
 
 using Json = CheckedJson;
 
-constexpr std::size_t most_rows = 500;          // of the spreadsheet, at a time
-constexpr std::size_t most_figures = 500;       // frames, at a time
+constexpr std::size_t most_rows = 500;          // of the spreadsheet, per request
+constexpr std::size_t most_figures = 500;       // frames, per request
 constexpr std::size_t most_segments = 480'000;  // of trails
 constexpr std::size_t most_waiting = 1000;      // requests; a page has one
 
@@ -53,7 +53,7 @@ const char* name_of(ViewState state)
     return "";
 }
 
-// Not finite numbers have no JSON: they are told as texts.
+// JSON has no infinities or NaN: they are sent as strings.
 Json number(double value)
 {
     if (std::isfinite(value)) return value;
@@ -101,20 +101,20 @@ Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size
     return Eigen::Map<const Eigen::Vector3f>(column.at<float>(i));
 }
 
-// A frame of the request that the run may compute.
+// Returns a frame of the request, checked against the run's range.
 std::int64_t computable_frame(const ViewSimulation& simulation, const Json& json, const char* name)
 {
     const ViewStatus status = simulation.status();
     return frame_of(json, name, status.first, status.last);
 }
 
-// The output that a request names; the first one where it names none.
+// Returns the output that a request names, or the first one if it names none.
 Result<SceneFrame> chosen_output(const ViewFrame& frame, const Json& json)
 {
     return frame.points.output(json.value("output", frame.points.outputs().front()));
 }
 
-// As the page gives one: position, target, angle in degrees. Null if the scene has none.
+// Returns the camera as the page sends one: position, target, angle in degrees. Null if the scene has none.
 Json camera_of_scene(const ViewFrame& frame, const Json& json)
 {
     const Result<SceneFrame> points = chosen_output(frame, json);
@@ -148,7 +148,7 @@ ViewRequests::ViewRequests(ViewSimulation& simulation, std::string title,
 {
 }
 
-// A request without a usable number is answered, too: "re" is then null.
+// Also answers a request without a usable number, with "re" null.
 void ViewRequests::handle(const std::string& message, const Answer& answer)
 {
     try {
@@ -348,7 +348,7 @@ void ViewRequests::tell_point(const Json& json, const Ask& ask)
     });
 }
 
-// Where a point is in all frames that are in memory, for its path; its speed, error and sub-steps.
+// Sends a point's path: its positions in all frames in memory, with speed, error and sub-steps.
 void ViewRequests::tell_path(const Json& json, const Ask& ask) const
 {
     const auto id = json.at("id").get<std::int64_t>();
@@ -368,7 +368,7 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
     ask.tell({{"path", path}});
 }
 
-// Where points of a frame were in the frames before, as line segments; of many points every so manieth by id.
+// Sends the previous positions of a frame's points as line segments; if there are many points, every nth by id.
 void ViewRequests::tell_trails(const Json& json, const Ask& ask)
 {
     const std::int64_t last = computable_frame(simulation_, json, "frame");
@@ -460,13 +460,13 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
     });
 }
 
-// The points whose projection is within a rectangle of the screen: how many, and the ranges of their attributes.
+// Sends the number of points whose projection is within a rectangle of the screen, and the ranges of their attributes.
 // matrix: from the world to the screen's -1 ... 1, by columns.
 void ViewRequests::tell_region(const Json& json, const Ask& ask)
 {
     with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
         const auto matrix = json.at("matrix").get<std::vector<double>>();
-        const auto rectangle = json.at("rectangle").get<std::vector<double>>();  // least x, y, largest x, y
+        const auto rectangle = json.at("rectangle").get<std::vector<double>>();  // smallest x, y, largest x, y
         if (matrix.size() != 16 || rectangle.size() != 4) return ask.fail("a matrix has 16 numbers, a rectangle 4");
         const Eigen::Map<const Eigen::Matrix4d> project(matrix.data());
         FrameWish all = wish;
@@ -507,7 +507,7 @@ void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
     const std::int64_t after = json.value("after", std::int64_t{INT64_MIN});
     const std::uint64_t run = simulation_.status().run;
     const std::vector<std::string> all = simulation_.store().statistics(run, after, most_figures);
-    // As they are: reading and writing them again took ten times as long.
+    // The texts are forwarded unchanged: parsing and writing them again took ten times as long.
     ask.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}}})", ask.re, run, fmt::join(all, ","),
                            all.size() == most_figures),
                false);
@@ -548,7 +548,7 @@ void ViewRequests::begin_film(const Json& json, const Ask& ask)
     wish.threads = simulation_.options().threads;
     auto film =
         std::make_unique<ViewFilm>(std::move(wish), [this](std::int64_t number) { return simulation_.frame(number); });
-    film_ = std::move(film);  // one that has not ended is given up
+    film_ = std::move(film);  // a film in progress is abandoned
     tell_film(ask);
 }
 

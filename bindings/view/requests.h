@@ -1,4 +1,4 @@
-// What a page asks for, and the answers. A request is a JSON object: "re", its number, "do", and what that takes.
+// Handles the requests of a page. A request is a JSON object: "re", its number; "do", the action; and its arguments.
 #pragma once
 
 #include <cstdint>
@@ -20,23 +20,23 @@ namespace rapid {
 // Used from one thread, that of the server's handler.
 class ViewRequests {
 public:
-    // post: calls a function from that thread.
+    // post: calls a function on that thread.
     ViewRequests(ViewSimulation& simulation, std::string title, std::function<void(std::function<void()>)> post);
 
     void handle(const std::string& message, const Answer& answer);
-    // The simulation's status has changed: answers those that wait for it.
+    // Answers the requests that wait for a change of the simulation's status.
     void answer_waiting();
 
 private:
     using Json = CheckedJson;
-    struct Ask {  // a request with its number and the way back
+    struct Ask {  // a request with its number and its answer
         std::uint32_t re;
         Answer answer;
 
         void tell(Json json) const;
-        void send(const std::string& data) const;  // a file
+        void send(const std::string& data) const;  // sends a file
         void fail(const std::string& why) const;
-        // Calls answer_it(); an exception of it is the answer.
+        // Calls answer_it(); if it throws, the answer is the error.
         template <class F>
         void guard(const F& answer_it) const;
     };
@@ -45,12 +45,12 @@ private:
 
     // Answers a request whose number is known.
     void dispatch(const Json& json, const Ask& ask);
-    // Calls answer() from the server's handler, for functions that other threads call.
+    // Calls answer() on the thread of the server's handler, for functions that other threads call.
     template <class F>
     void answer_later(const Ask& ask, F answer);
     void with_points(const Json& json, const Ask& ask, const WithPoints& use);
 
-    // graph: the number of the picture of the graph that the page has; of another one it is told.
+    // graph: the number of the page's picture of the graph; a different one is sent.
     void tell_status(const Ask& ask, std::uint64_t graph) const;
     void tell_frame(const Json& json, const Ask& ask);
     void tell_shapes(const Json& json, const Ask& ask);
@@ -64,7 +64,7 @@ private:
     void tell_arguments(const Json& json, const Ask& ask);
     void tell_picture(const Json& json, const Ask& ask);
     void begin_film(const Json& json, const Ask& ask);
-    void tell_film(const Ask& ask) const;  // how far it is
+    void tell_film(const Ask& ask) const;  // its progress
     void send_film(const Ask& ask);
     void set_parameters(const Json& json, const Ask& ask);
 
@@ -74,14 +74,14 @@ private:
     const std::string title_;
     const std::function<void(std::function<void()>)> post_;
     struct Waiting {
-        std::uint64_t since;  // for a newer version than this
+        std::uint64_t since;  // wants a newer version than this
         std::uint64_t graph;
         Ask ask;
     };
     std::vector<Waiting> waiting_;
     std::map<std::weak_ptr<const void>, std::uint64_t, std::owner_less<>> meshes_;  // by owner
     std::uint64_t next_mesh_ = 1;
-    std::unique_ptr<ViewFilm> film_;  // one at a time
+    std::unique_ptr<ViewFilm> film_;  // at most one
 };
 
 }  // namespace rapid

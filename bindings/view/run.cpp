@@ -13,9 +13,9 @@ namespace rapid {
 namespace {
 
 constexpr std::size_t most_warnings = 200;
-constexpr std::size_t most_laid_out = 150;  // nodes, by Graphviz
-constexpr double snapshot_seconds = 0.25;   // of computing: so much is computed again to inspect a frame
-constexpr double cached_seconds = 5;        // likewise, to go on from the cache
+constexpr std::size_t most_laid_out = 150;  // nodes; the limit for Graphviz
+constexpr double snapshot_seconds = 0.25;   // of computing, at most repeated to inspect a frame
+constexpr double cached_seconds = 5;        // likewise, to continue from the cache
 
 }  // namespace
 
@@ -99,9 +99,9 @@ void ViewSimulation::Run::run()
                 status.error = known;
             });
     }
-    // A scene that has failed may still be asked about what it has.
+    // A scene that has failed still answers questions about the frames that it has.
     while (const Task task = next_task(true)) task(*this);
-    // Those that have not been answered end at once, and say so.
+    // The remaining tasks end at once with an error.
     for (const Task& task : std::exchange(tasks_, {})) task(*this);
 }
 
@@ -115,7 +115,7 @@ void ViewSimulation::Run::begin()
     };
     hooks.keep_state = view_.cache_ != nullptr;
     hooks.tell_points = true;
-    hooks.watch_memory = false;  // frames have a share of it, and give way
+    hooks.watch_memory = false;  // frames share the memory, and are evicted
     view_.note_file(number_, view_.options_.graph);
     scene_ = SceneInside::open(view_.options_.graph, view_.scene_options(), std::move(hooks)).value();
     const std::int64_t start = scene_->first_frame();
@@ -197,7 +197,7 @@ void ViewSimulation::Run::compute()
         if (stopped()) return;
         const std::int64_t number = scene_->next_frame();
         const SceneFrame result = scene_->advance().value();
-        if (is_known(number)) continue;  // it leads from a snapshot to what is due
+        if (is_known(number)) continue;  // this frame only leads from a snapshot to the requested one
         std::vector<std::string> warnings = result.warnings();
         const auto add_shapes = [&](ViewFrame& frame) {
             frame.shapes = scene_->shapes(number).value();
@@ -207,7 +207,7 @@ void ViewSimulation::Run::compute()
         auto frame = std::make_shared<ViewFrame>(
             ViewFrame{number, number_, SceneInside::without_statistics(result).value(), result.statistics_json()});
         frame->bytes = bytes_of(*frame);
-        // Shapes of the first frame come after its points: they may take long.
+        // Shapes of the first frame follow its points: they may take long.
         if (number > first_) add_shapes(*frame);
         if (since_snapshot.seconds() > snapshot_seconds) {
             keep_snapshot(scene_->save().value());
@@ -265,7 +265,7 @@ void ViewSimulation::Run::keep_snapshot(const SceneSnapshot& snapshot)
 void ViewSimulation::Run::draw_graph()
 {
     std::string drawn, why_not;
-    // The page lays out the others: dot would take seconds, and the sandbox starts no program.
+    // The page lays out larger graphs: dot would take seconds, and the sandbox starts no program.
     if (scene_->nodes().size() <= most_laid_out && !view_.options_.is_confined) {
         GraphLayout layout = view_.layout();
         Result<std::string> graph = SceneInside::graph_json(*scene_, &layout);

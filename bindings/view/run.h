@@ -1,4 +1,4 @@
-// One run of a viewer's scene: a Scene of its own, on a thread of its own, that publishes frames until it is done or
+// A run of a viewer's scene: a Scene of its own, on a thread of its own, that publishes frames until it is done or
 // abandoned, and answers questions about them between two frames.
 #pragma once
 
@@ -22,10 +22,10 @@
 
 namespace rapid {
 
-// As an error of the scene.
+// Returns the exception as an error of the scene.
 Error error_of(const std::exception& error);
 
-// Its functions but abandon(), ended() and ask() are the thread's own.
+// All functions except abandon(), ended() and ask() belong to its own thread.
 class ViewSimulation::Run {
 public:
     Run(ViewSimulation& view, std::uint64_t number);
@@ -37,7 +37,7 @@ public:
     using Task = std::function<void(Run&)>;
     void ask(Task task);
 
-    // Where there is none, for an error, nothing else is asked for.
+    // False after an error; then nothing else may be called.
     bool has_scene() const { return scene_.has_value(); }
 
     Results inspect(std::int64_t frame);
@@ -53,26 +53,27 @@ private:
     void run();
     void begin();
 
-    // The frames that the cache has.
+    // Adds the frames that the cache has.
     void take_known(ViewStatus& status);
     bool is_known(std::int64_t frame) const { return cached_ && cached_->known().contains(frame); }
-    // The latest one that there is.
+    // Returns the latest snapshot in the cache before a frame.
     std::optional<SceneSnapshot> cached_snapshot_before(std::int64_t frame) const;
     std::optional<SceneSnapshot> snapshot_before(std::int64_t frame) const;
     static void warn(ViewStatus& status, std::int64_t frame, const std::string& text);
 
-    // Of files that could not be written.
+    // Warns about files that could not be written.
     void warn_of_cache(ViewStatus& status, std::int64_t frame);
     void compute();
 
-    // told: so many of the warnings were told before. is_whole: it has its shapes, and may go to the cache.
+    // told: the number of warnings already reported. is_whole: it has its shapes, and may go to the cache.
     bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t told, bool is_whole);
 
-    // They share columns with each other and the frames, but not all of them: of many every second is dropped.
+    // Snapshots share most, not all, of their columns with each other and with frames; if there are many, every second
+    // one is dropped.
     void keep_snapshot(const SceneSnapshot& snapshot);
     void draw_graph();
 
-    // Empty: there is none, or the run is to end.
+    // Returns an empty task if there is none, or if the run is to end.
     Task next_task(bool wait);
 
     ViewSimulation& view_;
@@ -81,7 +82,7 @@ private:
     std::shared_ptr<CachedRun> cached_;  // null without a cache
     std::int64_t first_ = 1, last_ = 1;
     std::map<std::int64_t, SceneSnapshot> snapshots_;
-    std::optional<std::int64_t> inspected_;  // the frame of which the scene keeps the points behind nodes
+    std::optional<std::int64_t> inspected_;  // the frame of which the scene has the points after nodes
 
     std::mutex mutex_;
     std::condition_variable wake_;

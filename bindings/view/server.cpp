@@ -36,16 +36,16 @@ using Tcp = asio::ip::tcp;
 using Request = http::request<http::string_body>;
 using HttpResponse = http::response<http::string_body>;
 
-// Bytes. A header has the cookies of all servers of this machine that a browser has seen: it keeps 180 of a host.
+// Bytes. A header has the cookies of all servers of this machine that a browser has visited: it stores 180 per host.
 constexpr std::size_t most_header = 32768, most_body = 1024, most_message = 1 << 20;
-// Answers that a page has not taken, and their bytes: it asks for few at a time.
+// Answers that a page has not taken, and their bytes: it requests few at a time.
 constexpr std::size_t most_answers = 64, most_answer_bytes = std::size_t{256} << 20;
-// Requests of a page that are not answered yet; others are read when some are.
+// Unanswered requests of a page; further ones are read when some are answered.
 constexpr int most_unanswered = 32;
-// A connection has this long for a request, and then to take the answer, unless it is the socket of a page.
+// A connection has this long to send a request, and then to take the answer, unless it is a page's socket.
 constexpr std::chrono::seconds request_time{10}, answer_time{60};
 
-// Descriptors: most of those that the process may have are left to the simulation.
+// Limits on descriptors, which leave most of the process's descriptors to the simulation.
 struct ConnectionLimits {
     std::size_t pages, strangers;  // sockets with a token; connections without one
 
@@ -66,7 +66,7 @@ std::string random_token()
     return token;
 }
 
-// In a time that does not depend on where they differ.
+// Compares in a time that does not depend on where they differ.
 bool same_secret(std::string_view a, std::string_view b)
 {
     unsigned char differ = a.size() != b.size();
@@ -74,12 +74,12 @@ bool same_secret(std::string_view a, std::string_view b)
     return differ == 0;
 }
 
-// Subprotocols that a page offers with its socket: the one that it speaks, and one that is its token. A script can set
-// no other header of a socket. A cookie would not do: browsers send it to every port of this machine.
+// Subprotocols that a page offers with its socket: the one that it speaks, and one that is its token. A script cannot
+// set any other header of a socket. A cookie would go to every port of this machine.
 constexpr const char* protocol = "rapid";
 constexpr std::string_view token_protocol = "rapid.token.";
 
-// Programs that are started from here, such as the browser, would keep it.
+// Otherwise programs started from here, such as the browser, would inherit it.
 void close_on_exec(int socket) { ::fcntl(socket, F_SETFD, FD_CLOEXEC); }
 
 bool is_own_host(std::string_view host)
@@ -98,7 +98,7 @@ const char* type_of(std::string_view name)
     return name.ends_with(".svg") ? "image/svg+xml" : "application/octet-stream";
 }
 
-// An exception, as a rule for want of memory, ends the handler that threw it, and no other.
+// An exception, usually out of memory, ends only the handler that threw it.
 void run_handlers(asio::io_context& context)
 {
     for (;;) {
@@ -183,10 +183,10 @@ private:
 
     enum class Token { None, Lasting, Once };
 
-    // For a page that has come by the address to open, so that it can come again.
+    // Returns the message for a page opened with the one-time token, so that it can connect again.
     std::string lasting_token() const { return fmt::format(R"({{"re": 0, "token": "{}"}})", token_); }
 
-    // The token among the subprotocols. That of the address to open is one for the first time only.
+    // Returns the token among the subprotocols. That of the address to open is valid once.
     Token token_of(const Request& request)
     {
         const auto offered = request[http::field::sec_websocket_protocol];
@@ -209,7 +209,7 @@ private:
         return target.substr(0, target.find('?'));
     }
 
-    // Empty, or why the request is refused.
+    // Returns why the request is refused, or an empty string.
     std::string refusal(const Request& request) const
     {
         const std::string host(request[http::field::host]), origin(request[http::field::origin]);
@@ -243,7 +243,7 @@ private:
         return response;
     }
 
-    // A file of the page. These have nothing of the scene, and need no token.
+    // Returns a file of the page. These contain nothing of the scene, and need no token.
     HttpResponse answer(const Request& request) const
     {
         if (const std::string why = refusal(request); !why.empty())
@@ -310,7 +310,7 @@ public:
     }
 
 private:
-    // A request that is not answered yet; its answer has a share of it.
+    // A request that is not answered yet; its answer shares ownership.
     class Unanswered {
     public:
         explicit Unanswered(std::weak_ptr<Socket> page) : page_(std::move(page)) {}
@@ -321,7 +321,7 @@ private:
                     asio::io_context& net = page->server_.net_;
                     asio::post(net, [page = std::move(page)] { page->has_answered(); });
                 }
-            } catch (...) {  // for want of memory: the page may ask for one less
+            } catch (...) {  // out of memory: the page may request a smaller one
             }
         }
         Unanswered(const Unanswered&) = delete;
@@ -358,7 +358,7 @@ private:
         });
     }
 
-    // On the handler's thread. An answer may wait for long, and its page be gone.
+    // Runs on the handler's thread. An answer may take long, and its page may have closed.
     void handle(const std::string& text)
     {
         const auto unanswered = std::make_shared<const Unanswered>(weak_from_this());
@@ -407,10 +407,10 @@ private:
     websocket::stream<beast::tcp_stream> stream_;
     beast::flat_buffer buffer_;
     std::deque<std::pair<std::string, bool>> waiting_;
-    std::size_t bytes_ = 0;                // of what waits
+    std::size_t bytes_ = 0;                // of waiting answers
     int unanswered_ = 0;                   // requests
-    bool is_handling_ = false;             // one of them
-    std::atomic<bool> is_closed_ = false;  // what it has asked for is not answered any more
+    bool is_handling_ = false;             // one of its requests is being handled
+    std::atomic<bool> is_closed_ = false;  // its requests are no longer answered
 };
 
 class ViewServer::Impl::Connection : public std::enable_shared_from_this<Connection> {
@@ -470,7 +470,7 @@ private:
 
     Impl& server_;
     beast::tcp_stream stream_;
-    std::optional<std::list<Connection*>::iterator> place_;  // among those of the server, while it is one
+    std::optional<std::list<Connection*>::iterator> place_;  // in the server's list, while it has no token
     beast::flat_buffer buffer_;
     std::optional<http::request_parser<http::string_body>> parser_;
     HttpResponse response_;
@@ -479,14 +479,14 @@ private:
 void ViewServer::Impl::accept()
 {
     acceptor_.async_accept([this](const beast::error_code& error, Tcp::socket socket) {
-        if (error) {  // as a rule for want of descriptors, until others have ended
+        if (error) {  // usually out of descriptors, until others have ended
             auto pause = std::make_shared<asio::steady_timer>(net_, std::chrono::milliseconds(100));
             return pause->async_wait([this, pause](const beast::error_code&) { accept(); });
         }
         beast::error_code none;
         socket.set_option(Tcp::no_delay(true), none);
         close_on_exec(socket.native_handle());
-        // Of too many the first one goes, whoever it is: a page needs few, and for a short time.
+        // If there are too many, the oldest is closed: a page needs few, and for a short time.
         if (strangers_.size() >= limits_.strangers) strangers_.front()->close();
         std::make_shared<Connection>(*this, std::move(socket))->read();
         accept();

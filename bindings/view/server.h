@@ -1,13 +1,13 @@
-// The viewer's server: the files of the page by HTTP, and requests by WebSocket, on this machine alone.
+// The viewer's server: the files of the page by HTTP, and requests by WebSocket, on this machine only.
 //
-// It listens on the loopback device. All requests need a Host of this machine and, if they have an Origin, that host
-// in it. The page's own files are served to anybody: they are the same in all views. Everything else goes over the
-// WebSocket, which needs the token of the address that the command prints. The page offers the token as a subprotocol
-// and not as a cookie, which a browser would send to every port of this machine.
+// It listens on the loopback device. All requests need a Host of this machine; if they have an Origin, it must name
+// that host. The page's own files are served to anybody, since they are the same in all views. Everything else goes
+// over the WebSocket, which needs the token of the address that the command prints. The page offers the token as a
+// subprotocol instead of a cookie, which a browser would send to every port of this machine.
 //
-// Names of files in requests are looked up among those of the page. A page that sends more requests than are answered
-// waits, and a closed one leaves nothing behind. The number of connections is limited, those without a token in time,
-// too, so that the simulation always has descriptors.
+// File names in requests are looked up among those of the page. A page that sends more requests than are answered
+// waits, and a closed one leaves nothing behind. The number of connections is limited, and for those without a token
+// also the time, so that the simulation always has descriptors.
 #pragma once
 
 #include <filesystem>
@@ -23,23 +23,24 @@ using Answer = std::function<void(std::string message, bool binary)>;
 
 class ViewServer {
 public:
-    // Called from a thread of its own with each message of a page, one after another.
+    // Called from its own thread with each message of a page, one after another.
     using Handler = std::function<void(const std::string& message, Answer answer)>;
 
-    // A socket of the loopback device that listens, as a descriptor. port 0: a free one. Error: the port is taken.
+    // Returns a listening socket of the loopback device, as a descriptor. port 0: a free one. Throws Error if the port
+    // is taken.
     static int listen(int port);
-    // The files that it serves: the page's, and three.js. Error: there is no three.js.
+    // Returns the files that it serves: the page's, and three.js. Throws Error if three.js is missing.
     static std::vector<std::filesystem::path> files(const std::filesystem::path& folder);
 
-    // socket: of listen(). folder: of the page. Error: the page or three.js is missing.
+    // socket: from listen(). folder: of the page. Throws Error if the page or three.js is missing.
     ViewServer(int socket, const std::filesystem::path& folder, Handler handler);
     ~ViewServer();
 
     std::string address() const;  // with the token
-    // The same with another token, which opens one socket: arguments of a browser are no secret on this machine. The
-    // page gets the lasting token through that socket.
+    // Returns the address with another token, which opens one socket: a browser's arguments are no secret on this
+    // machine. The page gets the lasting token through that socket.
     std::string address_to_open() const;
-    // Calls f from the handler's thread: soon, or every so many milliseconds.
+    // Calls f on the handler's thread: soon, or at this interval.
     void post(std::function<void()> f);
     void repeat(int milliseconds, std::function<void()> f);
     // Serves until the process ends.

@@ -16,13 +16,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_ending = 2;
-constexpr std::size_t most_spare = 32;  // columns of frames that have been replaced, whose pages serve the next
+constexpr std::size_t most_spare = 32;  // columns of replaced frames, whose pages the next ones reuse
 
 fs::file_time_type changed_at(const fs::path& file)
 {
     std::error_code none;
     const auto time = fs::last_write_time(file, none);
-    return none ? fs::file_time_type::min() : time;  // one that may come
+    return none ? fs::file_time_type::min() : time;  // the file may appear later
 }
 
 int bytes_of_value(const SceneColumn& column)
@@ -98,7 +98,7 @@ void ViewSimulation::begin()
     changed_();
 }
 
-// Those that are at their end; of too many, waits for the first.
+// Removes runs that have ended. If too many are left, waits for the first.
 void ViewSimulation::collect_ended()
 {
     std::erase_if(ending_, [](const auto& run) { return run->ended(); });
@@ -149,7 +149,7 @@ void ViewSimulation::note_file(std::uint64_t run, const fs::path& file)
 SceneOptions ViewSimulation::scene_options() const
 {
     SceneOptions options = options_.scene;
-    for (const auto& [name, value] : values()) options.set.emplace_back(name, value);  // of two the later one counts
+    for (const auto& [name, value] : values()) options.set.emplace_back(name, value);  // the later of two wins
     return options;
 }
 

@@ -1,4 +1,4 @@
-// rapid view: a scene, or the files of a sequence, in a web page of this machine.
+// rapid view: shows a scene, or the files of a sequence, in a web page on this machine.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -28,9 +28,9 @@
 namespace rapid {
 namespace {
 
-constexpr int watch_interval = 100;  // ms between two looks at the files that a run has read
+constexpr int watch_interval = 100;  // ms between checks of the files that a run has read
 
-// In an installation beside the Lua modules, in a checkout among the sources.
+// Returns the page's folder: next to the Lua modules in an installation, among the sources in a checkout.
 std::filesystem::path page_folder()
 {
     const std::filesystem::path root = std::filesystem::path(Installation::find().value().lua).parent_path();
@@ -65,7 +65,7 @@ public:
         untrusted_.declare(options, "graph");
     }
 
-    // The sandbox makes no sockets: the one that listens is there before.
+    // The sandbox cannot create sockets, so the listening one is made before.
     void confine(const CommonOptions& common) override
     {
         untrusted_.confine(
@@ -93,7 +93,7 @@ public:
             _exit(128 + signal);
         });
         const Threads threads(common.threads);
-        // The run takes memory, too.
+        // The run needs memory, too.
         ViewOptions options{graph_.file(),
                             graph_.scene_options(),
                             {},
@@ -102,7 +102,7 @@ public:
                             static_cast<std::size_t>(memory_budget() / 2),
                             cache_,
                             untrusted_.asked()};
-        options.scene.log = nullptr;  // the page has the warnings
+        options.scene.log = nullptr;  // the page shows the warnings
         if (frames_) options.frames = {frames_->first, frames_->last};
         if (std::filesystem::path(graph_.file()).extension() != ".lua")
             options.files = find_cache(graph_.file()).frames;
@@ -122,23 +122,23 @@ public:
         server.repeat(watch_interval, [&] { simulation.check_files(); });
         print(server.address() + '\n');
         std::fflush(stdout);
-        if (!no_open_ && !untrusted_.asked()) open(server.address_to_open());  // which starts a program
+        if (!no_open_ && !untrusted_.asked()) open(server.address_to_open());  // starts a program
         server.run();
         return status_done;
     }
 
 private:
-    // Where there is a desktop.
+    // Opens a browser if there is a desktop.
     static void open(const std::string& address)
     {
         if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
         const std::string program = program_path("xdg-open");
-        if (program.empty() || fork() != 0) return;  // the line that was printed has to do
+        if (program.empty() || fork() != 0) return;  // the printed line has to suffice
         execl(program.c_str(), program.c_str(), address.c_str(), nullptr);
         _exit(status_failed);
     }
 
-    static constexpr int inherited_socket = 3;  // of the process that restarts in the sandbox
+    static constexpr int inherited_socket = 3;  // in the process that restarts in the sandbox
 
     SceneArguments graph_;
     UntrustedOptions untrusted_;

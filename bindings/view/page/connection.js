@@ -1,11 +1,11 @@
-// The way to the server: requests, answered in any order.
+// The connection to the server. Requests are answered in any order.
 //
-// The token of the address is kept for this tab, in a storage that pages of other ports cannot read. Only the socket's
+// The token of the address is stored for this tab, where pages of other ports cannot read it. Only the socket's
 // subprotocols carry it: a cookie would go to every server of this machine.
 
 const kinds = { u8: Uint8Array, u16: Uint16Array, i16: Int16Array, u32: Uint32Array, f32: Float32Array };
 
-// A binary answer: its header, and the arrays that it names (without copies).
+// Decodes a binary answer: its header, and the arrays that it names (without copies).
 function decode(buffer) {
   const head = new Uint32Array(buffer, 0, 2);
   if (head[1] === 0) return { re: head[0], data: new Uint8Array(buffer, 8) };
@@ -28,7 +28,7 @@ function findToken() {
 }
 
 export class Connection {
-  // lost: called when the server is gone, and found when it is there.
+  // lost: called when the server is gone; found: called when it is back.
   constructor({ lost, found }) {
     this.token = findToken();
     this.waiting = new Map();
@@ -48,10 +48,10 @@ export class Connection {
       this.socket.onopen = () => { resolve(); this.found(); };
       refuse = reject;
     });
-    this.ready.catch(() => {}); // those that wait are told
+    this.ready.catch(() => {}); // the waiting requests receive the error
     this.socket.onmessage = (event) => {
       const answer = typeof event.data === "string" ? JSON.parse(event.data) : decode(event.data);
-      if (answer.token) this.token = rememberToken(answer.token); // the address had one for the first time only
+      if (answer.token) this.token = rememberToken(answer.token); // that of the address works only once
       const waiting = this.waiting.get(answer.re);
       this.waiting.delete(answer.re);
       if (!waiting) return;

@@ -1,4 +1,4 @@
-// Elements of the page. Text is always text: no name of a scene becomes HTML.
+// Creates elements of the page. Text is always text: no name of a scene becomes HTML.
 
 // element("button", { title: "...", onclick: f, class: "small" }, child or text, ...)
 export function element(tag, properties = {}, ...children) {
@@ -21,7 +21,7 @@ function fill(made, properties, children) {
 
 export const by = (id) => document.getElementById(id);
 
-// A number in few characters.
+// Returns a number in few characters.
 export function brief(x) {
   if (typeof x !== "number") return String(x);
   if (Number.isInteger(x) && Math.abs(x) < 1e7) return x.toLocaleString("en-US").replaceAll(",", " ");
@@ -29,7 +29,7 @@ export function brief(x) {
   return size !== 0 && (size < 1e-3 || size >= 1e6) ? x.toExponential(2) : String(Number(x.toPrecision(4)));
 }
 
-// As few digits as tell the value, of 32 bits, from all others.
+// Returns a 32-bit value with just enough digits to distinguish it from all others.
 export function exact(value) {
   if (Array.isArray(value)) return value.map(exact).join("  ");
   if (typeof value !== "number" || Number.isInteger(value)) return String(value);
@@ -41,7 +41,7 @@ export function exact(value) {
   return Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
 }
 
-// How many, in the room of a node.
+// Returns a count short enough for a node.
 export function count(n) {
   if (n < 1e5) return brief(n);
   return n < 999500 ? `${Math.round(n / 1e3)} k` : `${(n / 1e6).toPrecision(3)} M`;
@@ -59,10 +59,10 @@ export function seconds(time) {
   return time < 1 ? `${(time * 1e3).toPrecision(3)} ms` : `${time.toPrecision(3)} s`;
 }
 
-// How much larger than by default texts are.
+// Returns the scale of text relative to the default.
 export const unit = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 12;
 
-// A canvas as sharp as the screen: its context and its size in CSS pixels.
+// Returns the context of a canvas at the screen's resolution, and its size in CSS pixels.
 export function prepare(canvas) {
   const ratio = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
   const width = Math.max(1, Math.round(box.width * ratio)), height = Math.max(1, Math.round(box.height * ratio));

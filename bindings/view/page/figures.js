@@ -1,9 +1,9 @@
-// Figures over frames: one or more curves each; a click goes to a frame.
+// Charts over frames, with one or more curves each. A click goes to a frame.
 import { element, prepare, colour, brief, seconds, unit } from "./dom.js";
 
 const energy = (f) => (f.ledger ? f.ledger.kinetic + f.ledger.potential + f.ledger.elastic : undefined);
 const one = (read) => [["", "accent", read]];
-// name, unit, lines: of each its name, colour and value in a frame.
+// name, unit, lines: name, colour and value in a frame of each line.
 const charts = [
   ["points", "", one((f) => f.points)],
   ["time of a frame", "s", one((f) => f.seconds?.total)],
@@ -40,14 +40,14 @@ export class Figures {
 
   of(frame) { return this.byFrame.get(frame); }
 
-  // statistics: of all frames, in order; the list grows, or is another one.
+  // statistics: of all frames, in order; the list grows, or is replaced.
   know(statistics) {
     if (statistics !== this.known) {
       this.known = statistics;
       this.byFrame.clear();
       for (const chart of this.charts) chart.curves = chart.lines.map(() => ({ values: [], least: 0, high: -Infinity, isZero: true }));
     }
-    // Each frame is read once: of ten thousand all were read again for each that was shown.
+    // Each frame is read once: with ten thousand, reading all of them for every shown frame was slow.
     for (let k = this.byFrame.size; k < statistics.length; ++k) {
       const f = statistics[k];
       this.byFrame.set(f.frame, f);
@@ -76,7 +76,7 @@ export class Figures {
       chart.box.hidden = chart.curves.every((curve) => curve.isZero);
       if (!chart.box.hidden) shown.push(chart);
     }
-    // Rows that are full: no empty place at the end.
+    // Fills rows, with no gap at the end.
     const most = Math.max(1, Math.floor(this.root.clientWidth / (22 * 12 * unit()))), rows = Math.ceil(shown.length / most);
     const columns = Math.max(1, Math.ceil(shown.length / Math.max(1, rows)));
     this.root.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
@@ -94,7 +94,7 @@ export class Figures {
     curves.forEach(({ values }, k) => {
       context.strokeStyle = colour(chart.lines[k][1]);
       context.beginPath();
-      // Of frames that share a column of pixels the least and the largest value.
+      // For frames that share a column of pixels, the least and the largest value.
       for (let i = 0; i < values.length;) {
         const column = Math.floor(x(values[i][0]));
         let low = values[i][1], top = low;
@@ -111,7 +111,7 @@ export class Figures {
     const now = this.of(this.frame), text = (v) => (typeof v !== "number" ? "–" : chart.of === "s" ? seconds(v) : brief(v));
     const here = chart.lines.map(([, , read]) => text(now && read(now))), most = chart.of === "s" ? seconds(high) : `${brief(high)} ${chart.of}`;
     chart.value.textContent = here.length === 1 ? `${here[0]} of ${most}` : `of ${most}`;
-    // Of several lines each has its value behind its name; one that is always 0 has neither.
+    // If there are several lines, each is followed by its value; one that is always 0 has neither.
     if (here.length > 1)
       chart.lines.forEach(([line], k) => {
         chart.names[k].hidden = curves[k].isZero;

@@ -1,12 +1,12 @@
-// The graph: nodes as Graphviz or layout.js have laid them out, with points and time in this frame; a click shows the
-// points after a node; a search finds nodes by name or type.
+// The graph: nodes as laid out by Graphviz or layout.js, with points and time in this frame. A click shows the points
+// after a node; a search finds nodes by name or type.
 import { svg, element, count, seconds, unit } from "./dom.js";
 import { layOut } from "./layout.js";
 
-const legible = 0.85; // of the size of other texts
+const legible = 0.85; // fraction of the size of other text
 
 export class Graph {
-  // choose(name): the points after a node, or "" for the output; tools: where the search goes.
+  // choose(name): selects the points after a node, or "" for the output; tools: the place for the search.
   constructor(root, tools, { choose }) {
     this.root = root;
     this.choose = choose;
@@ -38,14 +38,14 @@ export class Graph {
     this.size();
   }
 
-  // Pixels of a unit of the drawing, with which all of it is seen.
+  // Returns the pixels per unit of the drawing at which all of it is visible.
   fit([width, height]) {
     return Math.min((this.root.clientHeight - 12) / (height + 16), (this.root.clientWidth - 20) / (width + 16)) / unit();
   }
 
   size() {
     if (!this.extent || this.root.clientWidth === 0) return;
-    // Another width of the dock, another layout.
+    // Another width of the dock requires another layout.
     if (this.laidOut !== this.layout()) return this.draw();
     const drawing = this.root.querySelector("svg"), [width, height] = this.extent;
     const scale = unit() * this.scale * Math.min(1.2, Math.max(legible, this.fit(this.extent)));
@@ -53,7 +53,7 @@ export class Graph {
     drawing.setAttribute("height", (height + 16) * scale);
   }
 
-  // How wide the lines of a layout of our own are; 0: Graphviz's, where all of it is legible.
+  // Returns the line width of our own layout; 0: Graphviz's, if all of it is legible.
   layout() {
     if (this.picture.size && (this.root.clientWidth === 0 || this.fit(this.picture.size) >= legible)) return 0;
     return Math.max(300, Math.floor((this.root.clientWidth || 1200) / unit() - 36));
@@ -73,7 +73,7 @@ export class Graph {
   draw() {
     const { picture } = this, drawing = svg("svg", { id: "graph" }), wide = this.layout();
     this.laidOut = wide;
-    const nodes = picture.nodes.map((node) => ({ ...node })); // a layout of our own gives them other places
+    const nodes = picture.nodes.map((node) => ({ ...node })); // our own layout moves them
     if (wide === 0) this.drawPaths(drawing);
     else this.layOut(drawing, nodes, wide);
     const [width, height] = this.extent;
@@ -100,7 +100,7 @@ export class Graph {
     this.figures(this.statistics);
   }
 
-  // As Graphviz has it: Bézier curves, with their heads.
+  // Draws Graphviz's paths: Bézier curves with heads.
   drawPaths(drawing) {
     this.extent = this.picture.size;
     for (const edge of this.picture.edges) {
@@ -132,7 +132,7 @@ export class Graph {
     for (const [name, { group }] of this.facts ?? []) group.classList.toggle("chosen", name === this.chosen);
   }
 
-  // Marks the nodes that the search finds, and goes to the next one, or the one before.
+  // Marks the nodes that match the search, and goes to the next or previous one.
   find(step) {
     const words = this.search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
     const found = [];
@@ -149,14 +149,14 @@ export class Graph {
     if (step) found[this.at].dispatchEvent(new Event("click"));
   }
 
-  // Points and seconds of each node in a frame.
+  // Shows points and seconds of each node in a frame.
   figures(statistics) {
     this.statistics = statistics;
     if (!this.facts || !statistics?.nodes) return;
     const texts = new Map();
     for (const work of statistics.nodes)
       work.nodes.forEach((name, k) => texts.set(name, `${count(work.points)} · ${k === 0 ? seconds(work.seconds) : "fused"}`));
-    // Only what has changed: of each text that is set the page is laid out again.
+    // Sets only texts that have changed: each assignment lays out the page again.
     for (const [name, { fact, node }] of this.facts) {
       const text = texts.get(name) ?? node.type;
       if (fact.textContent !== text) fact.textContent = text;

@@ -1,17 +1,18 @@
-// A layout of graphs from left to right, for those that Graphviz has not laid out: large ones, and in a sandbox. What is
-// too wide goes on in another line, as text does.
+// Lays out graphs from left to right, if Graphviz has not: large ones, and in a sandbox. A graph that is too wide
+// continues on another line, as text does.
 
 const gapX = 34, gapY = 12, gapLine = 34, high = 34, margin = 12;
-const lanes = { flow: 0, source: 5, feedback: -5 }; // of edges between two lines
+const lanes = { flow: 0, source: 5, feedback: -5 }; // for edges between two lines
 
 const widthOf = (node) => Math.max(88, 7 * Math.max(node.name.length, node.type.length) + 18);
 
-// Gives the nodes x, y, width and height, and returns the size of all and an SVG path for each edge. widest: of a line.
+// Gives the nodes x, y, width and height, and returns the size of all and an SVG path for each edge. widest: width of a
+// line.
 export function layOut(nodes, edges, widest) {
   const forward = edges.filter((edge) => edge.kind !== "feedback");
   const layers = layersOf(nodes.length, forward);
   order(layers, forward);
-  // Layers, from the left, a line after the other.
+  // Places layers from the left, line by line.
   const line = new Array(nodes.length).fill(0);
   let x = margin, y = 0, tallest = 0, wide = 0, number = 0;
   const lines = [];
@@ -36,18 +37,18 @@ export function layOut(nodes, edges, widest) {
   const paths = edges.map(({ from, to, kind }) => {
     const a = nodes[from], b = nodes[to], ax = a.x + a.width / 2, bx = b.x - b.width / 2;
     if (line[from] === line[to] && bx > ax) {
-      // Across at the lower of the two, where fewer nodes are in the way.
+      // Crosses at the lower of the two, where fewer nodes are in the way.
       const turn = a.y > b.y ? bx - gapX : ax, middle = turn + gapX / 2;
       return `M${ax},${a.y} L${turn},${a.y} C${middle},${a.y} ${middle},${b.y} ${turn + gapX},${b.y} L${bx},${b.y}`;
     }
-    // Along the gap below the line that it comes from, or, backward, below the line that it goes to.
+    // Follows the gap below the line that it leaves or, if it goes backward, below the line that it enters.
     const at = lines[Math.min(line[from], line[to])], between = at.y + at.tall + gapLine / 2 + (lanes[kind] ?? 0), out = ax + gapX / 3, into = bx - gapX / 3;
     return `M${ax},${a.y} L${out},${a.y} L${out},${between} L${into},${between} L${into},${b.y} L${bx},${b.y}`;
   });
   return { size: [wide, y + tallest + gapLine], paths };
 }
 
-// Each node behind those that it comes from.
+// Returns layers in which each node comes after those that feed it.
 function layersOf(count, edges) {
   const after = Array.from({ length: count }, () => []), missing = new Array(count).fill(0), depth = new Array(count).fill(0);
   for (const { from, to } of edges) { after[from].push(to); ++missing[to]; }
@@ -62,7 +63,7 @@ function layersOf(count, edges) {
   return layers.filter(Boolean);
 }
 
-// Within a layer in the order of what they come from, so that few edges cross.
+// Orders each layer by the positions of its inputs, so that few edges cross.
 function order(layers, edges) {
   const before = new Map();
   for (const { from, to } of edges) before.set(to, [...(before.get(to) ?? []), from]);

@@ -1,10 +1,10 @@
-// What leaves the page: this frame as a picture, a range as a film, at any size, from where the picture is seen.
+// Exports: this frame as a picture, or a range as a film, at any size, with the camera of the view.
 import { element, bytes } from "./dom.js";
 
 const sizes = [["1280x720", "1280 × 720"], ["1920x1080", "1920 × 1080"], ["3840x2160", "3840 × 2160"], ["1080x1080", "1080 × 1080"], ["view", "as here"]];
 
 export class Out {
-  // ask; shown(): what is shown, with its camera; size(): of the picture here, pixels; tell(text); title(): for names.
+  // ask; shown(): the view with its camera; size(): of the picture here, pixels; tell(text); title(): for names.
   constructor(root, { ask, shown, size, tell, title, close }) {
     Object.assign(this, { ask, shown, viewSize: size, tell, title });
     const number = (id, label, given) => element("input", { type: "number", id, "aria-label": label, title: label, ...given });
@@ -49,7 +49,7 @@ export class Out {
 
   choose(value) {
     if (value === "own") return;
-    // Films have even edges.
+    // Films have even edge lengths.
     const [width, height] = value === "view" ? this.viewSize().map((x) => 2 * Math.round(x / 2)) : value.split("x");
     this.width.value = width;
     this.height.value = height;

@@ -1,4 +1,4 @@
-// The page: what is shown, and what its parts tell each other.
+// The page: its state, and the communication between its parts.
 import { Connection } from "./connection.js";
 import { Picture } from "./picture.js";
 import { Timeline } from "./timeline.js";
@@ -19,7 +19,7 @@ const state = {
   status: null, frame: NaN, run: 0, follow: true, playing: false, output: "", colour: "", group: "", after: "",
   style: "discs", trails: 0, point: null, life: null, statistics: [], statisticsRun: 0,
 };
-const cache = new Map(); // messages of frames, by what they show
+const cache = new Map(); // messages of frames, by the request that they answer
 let cached = 0;
 
 const connection = new Connection({
@@ -64,7 +64,7 @@ const inspector = new Inspector(by("side"), {
   },
 });
 
-// Marks of the page alone would be covered, and so would colours and groups that are chosen.
+// The page's own marks would be covered, and so would chosen colours and groups.
 const rendered = new Rendered(by("rendered"), {
   ask: (wish) => ask("picture", wish), tell,
   wish() {
@@ -158,7 +158,7 @@ function tell(error) { flash(error.message ?? String(error)); }
 
 // ---- frames ----
 
-// Of the page; none while it looks through the scene's, which the server knows.
+// The page's camera, or undefined while it looks through the scene's, which the server knows.
 const cameraNumbers = () => (picture.isSceneCamera ? undefined : picture.cameraText().split(",").map(Number));
 const shown = () => ({ frame: state.frame, output: state.output || undefined, group: state.group, after: state.after });
 const wishes = (frame) => ({ frame, output: state.output || undefined, colour: state.colour, group: state.group, velocities: state.style === "streaks", after: state.after });
@@ -233,14 +233,14 @@ async function show(frame, fresh = false) {
   tellFrame();
 }
 
-// The frame's own figures.
+// Reports the frame's own figures.
 function tellFrame() {
   const figure = figures.of(state.frame);
   graph.figures(figure);
   inspector.frame(state.frame, figure, state.status);
 }
 
-// What is told about the frame besides its points.
+// Refreshes the frame's details besides its points.
 function refreshDetails() {
   if (!tabs.sheet.panel.hidden) sheet.refresh();
   if (state.point !== null) showPoint();
@@ -285,14 +285,14 @@ async function advance() {
   if (!state.playing) return;
   const end = newest(), now = performance.now();
   let frame = playFrame + Math.floor(((now - playFrom) / 1000) * state.status.fps);
-  // A browser that is too slow skips frames, a quarter of a second at most.
+  // A browser that is too slow skips frames, up to a quarter of a second.
   const furthest = state.frame + Math.max(1, Math.round(state.status.fps / 4));
   if (frame > furthest) {
     frame = playFrame = furthest;
     playFrom = now;
   }
   if (frame > end) {
-    // At the end from the beginning; while it is computed the newest frame waits for the next.
+    // At the end, playing restarts from the beginning; during computation, the newest frame waits for the next.
     if (state.status.state !== "computing") frame = state.status.first;
     else frame = end;
     playFrame = frame;
@@ -424,7 +424,7 @@ function openOut(on) {
   press(by("save"), on);
 }
 
-// A line of seven numbers: copied for the command line, or typed in.
+// A line of seven numbers, to copy to the command line or to edit.
 function openCamera() {
   const dialog = by("camera-dialog"), field = element("input", { type: "text", id: "camera-text", value: picture.cameraText(), "aria-label": "the camera", size: 64,
     title: "position, target, metres; vertical angle, degrees" });
@@ -446,7 +446,7 @@ function openCamera() {
   field.select();
 }
 
-// ---- what is told about the scene ----
+// ---- reports about the scene ----
 
 function showLegend(message) {
   const legend = by("legend");
@@ -479,7 +479,7 @@ function showChoices(status) {
   bar.group.hidden = bar.group.previousElementSibling.hidden = groups.length === 0;
 }
 
-// where: in the scene, or the browser's own words; then: what helps.
+// where: position in the scene, or the browser's own words; then: the remedy.
 function showProblem(what, where, then) {
   by("error").hidden = false;
   by("error").replaceChildren(element("b", {}, what), element("div", { class: "where" }, where), element("div", { class: "quiet" }, then));
@@ -500,14 +500,14 @@ function drawFigures() {
   }, state.statistics.length > 1000 ? 250 : 16);
 }
 
-// One request at a time, of some hundred frames each.
+// One request at a time, for some hundred frames each.
 let askingFigures = false;
 async function showFigures(status) {
   if (status.sequence || askingFigures) return;
   askingFigures = true;
   try {
     for (let more = true; more;) {
-      // Those of the run before stay until there are others.
+      // Those of the previous run stay until new ones arrive.
       const known = state.statisticsRun === state.status.run ? state.statistics : [];
       const answer = await ask("figures", known.length ? { after: known[known.length - 1].frame } : {});
       if (answer.run !== state.status.run || !answer.figures.length) break;
@@ -531,10 +531,10 @@ async function follow() {
       version = status.version;
       const hasGraph = status.graph_number !== graphNumber;
       graphNumber = status.graph_number;
-      await take(status, hasGraph).catch(tell); // what can't be shown keeps nothing else from being shown
+      await take(status, hasGraph).catch(tell); // an error here must not stop the rest
       await new Promise((resolve) => setTimeout(resolve, 30));
     } catch {
-      version = graphNumber = 0; // another server, perhaps
+      version = graphNumber = 0; // it may be another server
       await new Promise((resolve) => setTimeout(resolve, 500));
     }
   }
@@ -552,7 +552,7 @@ async function take(status, hasGraph) {
   showChoices(status);
   showError(status.error);
   if (status.sequence && !parameterPart.hidden) {
-    // Files have no parameters, no graph and no figures of a run.
+    // Files have no parameters, no graph and no statistics.
     parameterPart.hidden = tabs.graph.button.hidden = tabs.figures.button.hidden = true;
     openTab("sheet");
   }
@@ -565,7 +565,7 @@ async function take(status, hasGraph) {
     if (state.after && !graph.node(state.after)) chooseNode("");
   }
   showFigures(status).catch(() => {});
-  // The newest frame while nobody has chosen another; then the one chosen, as soon as this run has it.
+  // Shows the newest frame until one is chosen; then the chosen one, as soon as this run has it.
   const end = newest(), isDue = state.shownRun !== status.run || state.shownFrame !== state.frame;
   if (Number.isNaN(state.frame)) { if (!Number.isNaN(end)) await show(status.sequence ? status.first : end, true); }
   else if (state.follow && !Number.isNaN(end) && end !== state.frame && !status.sequence) await show(end);

@@ -1,10 +1,10 @@
-// The borders of the column and the dock: dragged, or moved by the arrows, and kept for the next time; a double click
-// gives back their own places. The picture may have all the room.
+// The borders of the column and the dock: dragged, or moved by the arrow keys, and stored for the next time. A double
+// click restores the default. The picture may fill the window.
 import { element } from "./dom.js";
 
 const least = 120, step = 24; // pixels
 
-// A border of a panel: its size grows against the axis, to the left or upward.
+// A panel's border. Its size grows against the axis, to the left or upward.
 function border(work, panel, { name, axis, title }) {
   const bar = element("div", { class: `border ${axis}`, role: "separator", tabindex: 0, "aria-label": title, title,
     "aria-orientation": axis === "x" ? "vertical" : "horizontal" });
@@ -38,6 +38,6 @@ export class Panels {
     border(work, dock, { name: "dock", axis: "y", title: "the height of the dock: drag, or arrows; double click: as it was" });
   }
 
-  // The picture alone, or with all panels.
+  // Shows the picture alone, or with all panels.
   toggle() { this.work.classList.toggle("alone"); }
 }

@@ -1,8 +1,8 @@
-// The parameters of the scene: a slider, number, vector, tick or text each.
+// The parameters of the scene: a slider, number, vector, checkbox or text each.
 import { element, exact } from "./dom.js";
 
-// The slider of a number goes from zero to twice its default, both ways round zero where that is zero; a number beyond
-// is typed.
+// Returns the range of a number's slider: from zero to twice its default, or on both sides of zero if that is zero. A
+// number beyond it can be typed.
 function limits(fallback) {
   if (fallback === 0) return [-1, 1];
   return fallback > 0 ? [0, 2 * fallback] : [2 * fallback, 0];
@@ -11,7 +11,7 @@ function limits(fallback) {
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class Parameters {
-  // change(values): runs the scene with these; copy(text): puts a text into the clipboard.
+  // change(values): runs the scene with these; copy(text): copies text to the clipboard.
   constructor(root, { change, copy }) {
     this.root = root;
     this.change = change;
@@ -73,7 +73,7 @@ export class Parameters {
       const [min, max] = limits(fallback);
       const slider = element("input", { type: "range", min, max, step: Number.isInteger(fallback) && Math.abs(fallback) >= 10 ? 1 : "any", title, "aria-label": name });
       const number = element("input", { type: "number", step: "any", title, "aria-label": name });
-      // One run a picture at most, while it is dragged.
+      // At most one run per picture while it is dragged.
       slider.addEventListener("input", () => {
         number.value = Number(Number(slider.value).toPrecision(4));
         if (!this.due) this.due = requestAnimationFrame(() => { this.due = 0; give(Number(number.value)); });

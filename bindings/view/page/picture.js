@@ -1,4 +1,4 @@
-// The picture: points, shapes, ground and axes by three.js; the camera; what is under the pointer.
+// The picture: points, shapes, ground and axes by three.js; the camera; picking under the pointer.
 import * as THREE from "./three.module.js";
 import { rampBytes } from "./ramp.js";
 
@@ -22,14 +22,14 @@ const pointVertex = `
       tint = rgb;
     #else
       tint = texture2D(ramp, vec2(value * 0.998 + 0.001, 0.5)).rgb;
-      // Where some have no value, 0 says so: they recede behind those that have one.
+      // If some have no value, 0 marks them: they recede behind those that have one.
       if (gaps > 0.0) {
         if (value < 0.5 / 65535.0) { tint = vec3(0.45); gl_PointSize = min(gl_PointSize, least); }
         else gl_PointSize = max(gl_PointSize, 2.0 * least);
       }
     #endif
   }`;
-// The light of pictures (runtime/picture/marks.cpp) without its shadows: colours are encoded as in tone.cpp.
+// The lighting of pictures (runtime/picture/marks.cpp) without its shadows: colours are encoded as in tone.cpp.
 const pictureLight = `
   vec3 decoded(vec3 c) {
     vec3 light = mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
@@ -57,7 +57,7 @@ const pointFragment = `
     gl_FragColor = vec4(encoded(decoded(tint) * 1.1 * fog * shade), 1.0);
   }`;
 
-// A streak has a vertex at the point and one where it was.
+// A streak has a vertex at the point and one at its previous position.
 const streakVertex = pointVertex.replace("attribute float value, radius;",
   "attribute float value, radius, tail; attribute vec3 velocity; uniform float shutter;")
   .replace("low + position * size", "low + position * size - tail * shutter * velocity");
@@ -102,7 +102,7 @@ export class Picture {
     this.message = null;
     this.marker = this.line(0xffffff);
     this.path = this.line(0xffb454);
-    this.drawn = 0; // pictures so far
+    this.drawn = 0; // pictures drawn so far
     this.control();
     canvas.addEventListener("webglcontextrestored", () => { this.kind = ""; if (this.message) this.show(this.message); });
     new ResizeObserver(() => this.draw()).observe(canvas);
@@ -110,7 +110,7 @@ export class Picture {
 
   line(colour) {
     const made = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour, depthTest: false, transparent: true }));
-    made.renderOrder = 1; // seen through what is before it
+    made.renderOrder = 1; // visible through objects in front of it
     made.frustumCulled = false;
     made.visible = false;
     this.lines.add(made);
@@ -125,7 +125,7 @@ export class Picture {
     this.draw();
   }
 
-  // Grid and axes, of the size of what is to be seen.
+  // Lays out grid and axes at the size of the scene.
   lay() {
     for (const child of [...this.ground.children]) { this.ground.remove(child); child.geometry.dispose(); }
     const cell = 10 ** Math.round(Math.log10(this.distance / 12)), wide = 40 * cell;
@@ -137,7 +137,7 @@ export class Picture {
     for (const shape of this.shapes.children) if (shape.userData.plane) shape.scale.setScalar(wide);
   }
 
-  // ---- what is shown ----
+  // ---- the contents ----
 
   show(message) {
     this.message = message;
@@ -229,7 +229,7 @@ export class Picture {
     this.draw();
   }
 
-  // The chosen point: a cross at its place, and its path; null: none.
+  // Marks the chosen point: a cross at its position, and its path; null: none.
   mark(place, path) {
     this.marked = place;
     const set = (line, places) => {
@@ -249,20 +249,20 @@ export class Picture {
 
   // ---- the camera ----
 
-  // Pixels, as pictures may have them.
+  // Size in pixels, within the limits of pictures.
   size() {
     const edge = (x) => Math.min(Math.max(x, 16), 16384);
     return { width: edge(this.canvas.width), height: edge(this.canvas.height) };
   }
 
-  // Looks through the scene's camera until it is moved.
+  // Looks through the scene's camera until the user moves it.
   followScene() {
     if (!this.sceneCamera) return;
     this.setCamera(this.sceneCamera);
     this.isSceneCamera = true;
   }
 
-  // Everything that there is.
+  // Fits everything into the picture.
   fit() {
     const box = new THREE.Box3();
     if (this.message && this.message.shown > 0)
@@ -273,7 +273,7 @@ export class Picture {
     if (this.message?.shown > 0) box.expandByScalar(largest);
     this.isSceneCamera = false;
     box.getCenter(this.target);
-    // So near that each corner is still in the picture, from where it is looked at now.
+    // Moves as near as possible with each corner still in the picture, from the current direction.
     this.place();
     this.camera.updateMatrixWorld();
     const [right, above, behind] = [0, 1, 2].map((k) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, k));
@@ -287,7 +287,7 @@ export class Picture {
     this.draw();
   }
 
-  // The marked point in the middle.
+  // Centres the marked point.
   centre() {
     if (!this.marked) return;
     this.isSceneCamera = false;
@@ -304,7 +304,7 @@ export class Picture {
     this.camera.lookAt(this.target);
   }
 
-  // As --camera of pictures has it.
+  // Returns the camera in the format of --camera.
   cameraText() {
     this.place();
     return [...this.camera.position.toArray(), ...this.target.toArray(), this.camera.fov]
@@ -369,15 +369,15 @@ export class Picture {
     }, { passive: false });
   }
 
-  // From the world to the screen, -1 ... 1, by columns.
+  // Returns the matrix from the world to the screen, -1 ... 1, by columns.
   matrix() {
     this.place();
     this.camera.updateMatrixWorld();
     return new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
   }
 
-  // The row, among the points shown, of the foremost whose disc is under the pointer; else of the one whose middle is
-  // nearest, up to five pixels away; -1: none.
+  // Returns the row, among the points shown, of the foremost point whose disc is under the pointer; else of the one
+  // with the nearest centre, up to five pixels away; -1 if there is none.
   nearest(clientX, clientY) {
     if (!this.message) return -1;
     const box = this.canvas.getBoundingClientRect(), e = this.matrix().elements, P = this.message.arrays.P;
@@ -420,8 +420,8 @@ export class Picture {
   }
 }
 
-// Gives an attribute these values, in a buffer of the GPU that is written in place while it is large enough: the arrays
-// of messages go there as they are.
+// Sets an attribute's values, in a buffer of the GPU that is overwritten while it is large enough: the arrays of
+// messages go there unchanged.
 function fill(geometry, name, array, items, normalized = true) {
   const known = geometry.getAttribute(name);
   if (known && known.room >= array.length && known.array.constructor === array.constructor) {
@@ -439,7 +439,7 @@ function fill(geometry, name, array, items, normalized = true) {
   geometry.setAttribute(name, made);
 }
 
-// Every item twice, one after the other.
+// Returns every item twice in succession.
 function twice(array, items) {
   const made = new array.constructor(2 * array.length);
   for (let i = 0; i < array.length / items; ++i)

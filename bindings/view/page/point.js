@@ -1,8 +1,8 @@
-// The chosen point, its life; the chosen node; the chosen region.
+// The chosen point and its life; the chosen node; the chosen region.
 import { element, exact, brief, bytes, seconds, prepare, colour } from "./dom.js";
 
 export class Inspector {
-  // go(frame); trace(id): asks for a life; close(what).
+  // go(frame); trace(id): requests a life; close(what).
   constructor(root, actions) {
     this.root = root;
     this.actions = actions;
@@ -29,10 +29,10 @@ export class Inspector {
     this.hinted();
   }
 
-  // Only where nothing is chosen.
+  // Shows the hint only if nothing is chosen.
   hinted() { this.hint.hidden = ["node", "point", "region"].some((name) => !this.parts[name].hidden); }
 
-  // path: [frame, x, y, z, speed, error, sub-steps] of each frame that has the point.
+  // path: [frame, x, y, z, speed, error, sub-steps] for each frame that has the point.
   point(id, row, life, path = [], frame = NaN) {
     if (!row) return this.hide("point");
     const rows = Object.entries(row.values).map(([name, value]) =>
@@ -41,7 +41,7 @@ export class Inspector {
     const table = element("table", { id: "attributes" }, ...rows);
     const curves = [[4, "speed", "m/s"], [5, "estimated error", "m"], [6, "sub-steps", ""]]
       .map(([k, name, of]) => this.curve(name, of, path.filter((place) => typeof place[k] === "number").map((place) => [place[0], place[k]]), frame));
-    if (life === "") this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box)); // files tell no life
+    if (life === "") this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box)); // files: no life
     else this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box),
       element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
         life ? null : element("button", { id: "trace", title: "computes what happened to the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
@@ -49,7 +49,7 @@ export class Inspector {
     for (const curve of curves) curve?.draw();
   }
 
-  // Values of the point over its frames; none where they are all 0.
+  // Returns a curve of the point's values over its frames, or null if they are all 0.
   curve(name, of, values, frame) {
     if (values.length < 2 || values.every(([, v]) => v === 0)) return null;
     const most = Math.max(...values.map(([, v]) => v)), first = values[0][0], last = values[values.length - 1][0];
@@ -72,7 +72,7 @@ export class Inspector {
     } };
   }
 
-  // life: as rapid trace --json has it, or a text.
+  // life: as in rapid trace --json, or a text.
   life(life) {
     if (typeof life === "string") return element("div", { class: "quiet" }, life);
     const list = element("ul", { class: "life", id: "life" });
@@ -136,7 +136,7 @@ export class Inspector {
 
   messages(status) {
     if (!status.warnings.length) return this.hide("messages");
-    // Of those that differ in numbers alone the first, and how many more there are.
+    // Warnings that differ only in numbers are shown as the first one and a count of the rest.
     const kinds = new Map();
     for (const warning of status.warnings) {
       const kind = warning.text.replace(/\d[\d.e+-]*/g, "#"), known = kinds.get(kind);

@@ -1,10 +1,10 @@
-// The picture as the renderer of pictures draws it, above the page's own: it is there once nothing has changed for a
+// The picture drawn by the renderer of pictures, above the page's own. It appears when nothing has changed for a
 // moment.
 
 const pause = 150; // ms
 
 export class Rendered {
-  // wish(): what is to be seen, or null; ask(wish): the answer with the .png; tell(error).
+  // wish(): the view to draw, or null; ask(wish): the answer with the .png; tell(error).
   constructor(image, { wish, ask, tell }) {
     Object.assign(this, { image, wish, ask, tell });
     this.changes = 0;

@@ -1,11 +1,11 @@
-// The spreadsheet of the frame: rows are asked for as they come into view.
+// The spreadsheet of the frame: rows are requested as they come into view.
 import { element, exact, unit } from "./dom.js";
 
 const most = 300; // rows at a time
 const rowHeight = () => 17 * unit(); // as page.css has it
 
 export class Sheet {
-  // rows(from, count, sort, descending): asks for some; pick(id).
+  // rows(from, count, sort, descending): requests some; pick(id).
   constructor(root, { rows, pick }) {
     this.ask = rows;
     this.pick = pick;
@@ -33,7 +33,7 @@ export class Sheet {
     root.addEventListener("scroll", () => { if (!this.due) this.due = setTimeout(() => { this.due = 0; this.load(); }, 60); });
   }
 
-  // Another frame, or nothing to show.
+  // Loads another frame, or nothing to show.
   async refresh() { this.total = undefined; await this.load(); }
 
   async load() {
@@ -51,7 +51,7 @@ export class Sheet {
     this.rows = answer.rows;
     this.note.textContent = answer.total === 0 ? "No points in this frame." : "";
     const names = ["id", ...answer.names.filter((name) => name !== "id")];
-    // A vector has a column for each of its numbers.
+    // A vector has a column for each component.
     const parts = (name) => (Array.isArray(answer.rows[0]?.values[name]) ? answer.rows[0].values[name].length : 1);
     const sort = (name) => { this.descending = this.sort === name && !this.descending; this.sort = name; this.root.scrollTop = 0; this.load(); };
     const focused = [...this.head.children].indexOf(document.activeElement);

@@ -1,8 +1,8 @@
-// The timeline: which frames are ready, stale or missing; the frame that is shown; playing.
+// The timeline: ready, stale and missing frames; the shown frame; playing.
 import { element, prepare, colour, unit } from "./dom.js";
 
 export class Timeline {
-  // go(frame): the user wants a frame; play(on).
+  // go(frame): the user chose a frame; play(on).
   constructor(root, { go, play, step }) {
     this.go = go;
     this.canvas = element("canvas", { title: "click or drag: go to a frame. Green: computed; ochre: of the run before; blue: being computed; marks: warnings", "aria-label": "frames" });
@@ -58,7 +58,7 @@ export class Timeline {
       context.fillStyle = colour(name);
       for (const [a, b] of list) context.fillRect(x(a) - half, top, x(b) - x(a) + 2 * half, thick);
     }
-    if (this.computing) { // the frame that is being computed
+    if (this.computing) { // the frame being computed
       const next = this.ready.length ? this.ready[this.ready.length - 1][1] + 1 : this.first;
       context.fillStyle = colour("accent");
       if (next <= this.last) context.fillRect(x(next) - half, top, Math.max(2 * half, 4 * u), thick);
@@ -68,7 +68,7 @@ export class Timeline {
     context.fillStyle = colour("quiet");
     context.font = `${10 * u}px system-ui, sans-serif`;
     const wish = span / Math.max(1, room / (70 * u)), step = [1, 2, 5, 10, 20, 24, 48, 50, 100, 200, 500, 1000, 2000, 5000].find((s) => s >= wish) ?? 10000;
-    // The frame that is shown, on its mark; texts keep clear of it, and of the ends.
+    // The shown frame, on its mark. Labels avoid it, and the ends.
     context.textAlign = "center";
     const wideOf = (text) => context.measureText(text).width / 2, within = (text, at) => Math.min(Math.max(at, wideOf(text)), width - wideOf(text));
     const shown = String(this.frame), middle = within(`  ${shown}`, x(this.frame)), reach = wideOf(`  ${shown}`);

@@ -136,8 +136,7 @@ void Evaluator::evaluate_constants(const Snapshot& snapshot)
     next_ = plan_.first_frame();
     take_columns();
     std::vector<Flow> results(plan_.nodes.size());
-    std::vector<std::size_t> readers(plan_.nodes.size(),
-                                     plan_.nodes.size() + 1);  // never exhausted, so results are not moved
+    std::vector<std::size_t> readers(plan_.nodes.size(), plan_.nodes.size() + 1);  // so none is the last
     FrameResult frame;
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) {
         if (!plan_.nodes[i].once) continue;

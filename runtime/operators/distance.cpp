@@ -33,7 +33,7 @@ namespace {
 
 constexpr double bytes_a_tie = 256;  // a row, and the search for it
 
-// Length, m, below which the square of a length underflows, so that it cannot be divided by the root.
+// Length, m, below which the square of a length underflows, so that dividing by its root is unsafe.
 constexpr double no_length = 1e-150;
 
 struct Tie {

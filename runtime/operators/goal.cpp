@@ -97,8 +97,8 @@ struct Goal {
                 const std::optional<double> left = time_left(since, dt);
                 if (!left) continue;
                 const Vec3d at = P[i].cast<double>(), d = goal[i].cast<double>() - at;
-                // For a point that was at its target and nowhere else, the target has the velocity of the path through
-                // the frame.
+                // A point that was at its target moves with it: the target's velocity is that of the path through the
+                // frame.
                 const bool is_held = *left <= 1e-6 * time && places_before &&
                                      (at - (*places_before)[i].cast<double>()).norm() <= 1e-3 * d.norm();
                 go(d, *left, dt, double{mass[i]}, is_held ? Vec3d(d / dt) : Vec3d::Zero(), v[i], force[i]);

@@ -15,7 +15,7 @@ namespace rapid::test {
 constexpr double g = 9.81;      // m/s^2
 constexpr double h = 1.0 / 24;  // s, of a frame
 
-// An acceleration by place, velocity and time: asked at the middle of every sub-step.
+// An acceleration that depends on position, velocity and time, evaluated at the middle of every substep.
 template <class F>
 class LocalForce : public Force {
 public:
@@ -36,8 +36,8 @@ public:
     SolveOptions options;
     SleepRecords sleep_records;
     SolveResult last;              // of the last frame
-    std::uint64_t collisions = 0;  // of all frames
-    double penetration_max = 0;    // of all frames, m
+    std::uint64_t collisions = 0;  // over all frames
+    double penetration_max = 0;    // over all frames, m
 
     explicit Scene(PointSet set) : points(std::move(set)) { options.h = 1.0 / 24; }
 
@@ -81,7 +81,7 @@ public:
         return *this;
     }
 
-    // Points at rest sleep after so many seconds.
+    // Makes points at rest sleep after this many seconds.
     Scene& sleep(double after = 0.25)
     {
         if (!points.has("still")) points.add({"still", 0.0f});
@@ -106,7 +106,7 @@ public:
     Vec3d v(std::size_t i = 0) const { return std::as_const(points).v()[i].cast<double>(); }
 };
 
-// Whether places and velocities are the same, to the bit.
+// Returns true if positions and velocities are bit-identical.
 inline bool same_bits(const PointSet& a, const PointSet& b)
 {
     return same_bits(a.P(), b.P()) && same_bits(a.v(), b.v());

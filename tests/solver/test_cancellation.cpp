@@ -1,4 +1,4 @@
-// Cancellation within a frame, on both routes of a step that takes sub-steps.
+// Cancellation within a frame, in both kinds of steps with substeps.
 #include "runtime/base/cancellation.h"
 
 #include <atomic>
@@ -41,7 +41,7 @@ TEST_CASE("a step of hours ends when another thread cancels it", "[solve][thread
     other.join();
     CHECK(message == Cancellation::cancelled().message());
 
-    // Outside of the scope nothing is cancelled.
+    // Nothing is cancelled outside the scope.
     Scene next(points(places));
     next.gravity();
     next.options.interacts = is_barrier;

@@ -1,7 +1,7 @@
--- The radius at which points meet shapes, where :contact says how large they are and :collide does not.
+-- The radius at which points collide with shapes if :contact gives their size and :collide does not.
 local scene = require "testing.scene"
 
--- Eight spheres above one another, at rest after two seconds; `radius` of :contact, further columns and parameters.
+-- Eight stacked spheres, at rest after two seconds; `radius` of :contact, further columns and parameters.
 local function stack(contact, collide, columns)
   return scene.run(([[
 local P = {}

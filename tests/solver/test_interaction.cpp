@@ -31,7 +31,7 @@ PointSet points_at(std::span<const Vec3f> P, std::span<const Vec3f> v)
     return test::points(std::vector<Vec3f>(P.begin(), P.end())).v(std::vector<Vec3f>(v.begin(), v.end()));
 }
 
-// A frame as Solve takes it: kick, drift, kick.
+// Advances a frame like Solve: kick, drift, kick.
 void advance(PointSet& points, const Dynamics& interaction, double frame = h)
 {
     SolveOptions options;
@@ -78,13 +78,13 @@ double energy(const PointSet& points)
 TEST_CASE("two passing points approach their mean velocity at twice the rate of alignment", "[interaction]")
 {
     const float rate = GENERATE(0.5f, 5.0f, 1e6f);
-    // Coincident, so that each has the weight 1.
+    // Coincident, so that each has weight 1.
     PointSet points = points_at(std::vector<Vec3f>{{0, 0, 0}, {0, 0, 0}}, std::vector<Vec3f>{{3, 1, 0}, {1, 1, 0}});
     const Dynamics interaction = among(1, 0, 0, rate, 0);
     SolveOptions options;
     options.h = h;
     interact(points, interaction, options);
-    CHECK(points.v()[0].x() == Approx(2 + std::exp(-rate * h)));  // half the frame
+    CHECK(points.v()[0].x() == Approx(2 + std::exp(-rate * h)));  // half of the frame
     CHECK(points.v()[1].x() == Approx(2 - std::exp(-rate * h)));
     CHECK(points.v()[0].y() == 1);
 }
@@ -96,7 +96,7 @@ TEST_CASE("drag damps the approach of two points, and not their rotation about e
     SolveOptions options;
     options.h = h;
     interact(points, interaction, options);
-    // At half a weight, half of it, at any strength; they move along x.
+    // At half a weight, half of it, for any strength; they move along x.
     CHECK(points.v()[0].x() == Approx(0.5));
     CHECK(points.v()[1].x() == Approx(-0.5));
     CHECK(points.v()[0].y() == 2);

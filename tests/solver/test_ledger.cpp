@@ -86,11 +86,11 @@ TEST_CASE("the residue is what the frame has changed beside gravity and what is 
 
     after.kinetic += 0.5;
     CHECK_FALSE(residue({}).is_rounding());
-    CHECK(residue({}).energy == Approx(0.5 / (2.5 + 1)));  // of what moves, and what gravity has given
+    CHECK(residue({}).energy == Approx(0.5 / (2.5 + 1)));  // of the kinetic energy, plus the energy from gravity
     EnergyChanges told;
     told.contacts = 0.5;
     CHECK(residue(told).is_rounding());
-    after.kinetic -= 1;  // rows that break take energy with them
+    after.kinetic -= 1;  // breaking rows remove energy
     CHECK(residue({}).is_rounding());
 
     after.momentum += Vec3d(0, 0, 1e-3);

@@ -1,4 +1,4 @@
-// The step without constraints: closed forms at any number of sub-steps; determinism; wrong input. Covers step_scene,
+// The step without constraints: closed forms at any number of substeps; determinism; wrong input. Covers step_scene,
 // step_context, point_errors, point_block, block_step and uncoupled_step; coupled_step is covered by constraints/.
 #include "runtime/solver/solve.h"
 
@@ -37,7 +37,7 @@ std::string solve_error(Scene& scene)
 TEST_CASE("free fall is exact to rounding, whatever the number of sub-steps", "[solve]")
 {
     const int substeps = GENERATE(1, 7, 1000);
-    const bool with_collider = GENERATE(false, true);  // so that sub-steps are taken
+    const bool with_collider = GENERATE(false, true);  // forces substeps to be taken
     CAPTURE(substeps, with_collider);
     const int frames = 24;
 
@@ -46,8 +46,8 @@ TEST_CASE("free fall is exact to rounding, whatever the number of sub-steps", "[
     if (with_collider) scene.collide(make_plane({0, 1, 0}, -1000));
     scene.run(frames);
 
-    // Once per frame the state is rounded to single precision: by half an ulp of P, and of v, which acts for the rest
-    // of the time, at most 1 s.
+    // Once per frame the state is rounded to single precision: by half an ulp of P, and of v, whose error acts for the
+    // remaining time, at most 1 s.
     const double ulp_P = 0x1p-20, ulp_v = 0x1p-20;
     CHECK_THAT(scene.P(), close_to(Vec3d(1.5, 10 + 3 - g / 2, -2), frames * (ulp_P + ulp_v) / 2));
     CHECK_THAT(scene.v(), close_to(Vec3d(0.5, 3 - g, 0), frames * ulp_v / 2));
@@ -145,7 +145,7 @@ TEST_CASE("the energy of an orbit stays bounded", "[solve]")
         least = std::min(least, scene.P().norm());
         most = std::max(most, scene.P().norm());
     }
-    // At 24 steps per revolution the orbit is an ellipse that is off by (ω h)²/8, here 0.9 %, and stays so.
+    // At 24 steps per revolution the orbit is an ellipse with an error of (ω h)²/8, here 0.9 %, which does not grow.
     CHECK(least > 0.98);
     CHECK(most < 1.02);
 }
@@ -264,7 +264,7 @@ TEST_CASE("a collider whose attribute is missing is named", "[solve]")
     CHECK(solve_error(scene) == "node \"collide1\": no attribute \"bounzy\"; did you mean \"bouncy\"?");
 }
 
-// Points all over a scene with a floor, a ball and a box, some of them newborn.
+// Points throughout a scene with a floor, a ball and a box, some of them newborn.
 Scene crowd(std::size_t n, std::size_t before)
 {
     std::mt19937 random(5);
@@ -287,7 +287,7 @@ Scene crowd(std::size_t n, std::size_t before)
     return scene;
 }
 
-// The last n values.
+// Returns the last n values.
 template <class T>
 Column<T> last_of(const Column<T>& column, std::size_t n)
 {

@@ -29,7 +29,7 @@ local distances = {
   end,
 }
 
--- J/kg: of motion, of the spring, and of the field.
+-- Returns the kinetic energy plus that of the spring and the field, J/kg.
 local function energy(p, distance, k, g)
   return 0.5 * p.v:dot(p.v) + 0.5 * k * distance(p.P) ^ 2 - g * p.P.y
 end
@@ -45,7 +45,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v 
         local all = energy(p, distances["rapid.shape.sphere { radius = 1 }"], k, 0)
         assert.near(2, all, 2e-3)
       end
-      if k >= 1e6 then -- where it is a circle: u t / R, by 1/24 of the square of the angle of a frame
+      if k >= 1e6 then -- the path is a circle: u t / R, within 1/24 of the squared angle per frame
         local P, angle = result[241][1].P, 20
         assert.near({math.cos(angle), math.sin(angle), 0}, P, 0.01)
       end
@@ -85,7 +85,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, k =
           local size = math.abs(start) + 3 * math.abs(g)
           for f = 2, 49 do
             local p = result[f][i]
-            -- Places are rounded to single precision once a frame.
+            -- Positions are rounded to single precision once per frame.
             local ulp = 2 ^ -23 * (math.abs(p.P.x) + math.abs(p.P.y) + math.abs(p.P.z) + 1)
             local rounding = (f - 1) * (ulp * math.sqrt(2 * first.k * size) + first.k * ulp ^ 2)
             local now = energy(p, distance, first.k, g)
@@ -99,7 +99,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, k =
   end)
 
   it("of second order on a curved surface, with drag and gravity", function()
-    -- Runge and Kutta's method of order 4, at a step of 1e-4 s.
+    -- Runge-Kutta of order 4, with a step of 1e-4 s.
     local s, c, g = 60, 1, vec3(0, -9.81, 0)
     local function pull(P, v) return g - v * c - P * (s * (P:length() - 1) / P:length()) end
     local P, v, h = vec3(1.25, 0, 0.25), vec3(0.125, 1, 0.25), 1e-4
@@ -168,7 +168,7 @@ return rapid.create { fps = 24, seed = 5, points = rapid.points.grid { size = {1
   :collide { shape = rapid.shape.plane { offset = -0.8 }, bounce = 1 }
   :solve { substeps = 2 }]]):format(k), 73, true)
       for i = 1, #result[73] do
-        local start = energy(result[1][i], distance, k, 0) + 6 -- of at most 12^(1/2) m/s
+        local start = energy(result[1][i], distance, k, 0) + 6 -- for at most 12^(1/2) m/s
         for f = 3, 73 do
           assert.truthy(energy(result[f][i], distance, k, 0) <= start * 1.001, ("k = %g, frame %d"):format(k, f))
         end
@@ -176,7 +176,7 @@ return rapid.create { fps = 24, seed = 5, points = rapid.points.grid { size = {1
     end
   end)
 
-  -- Where shapes move uniformly energy is that which is seen from them. A constant force does the work F·ΔP in a frame.
+  -- If shapes move uniformly, the energy is relative to them. A constant force does the work F·ΔP in a frame.
   it("gives no energy beside other forces, or by moving uniformly, in random scenes", function()
     local meshes = { ["rapid.mesh.box { size = {2, 1, 1.5} }"] = distances["rapid.shape.box { size = {2, 1, 1.5} }"] }
     local targets = {}
@@ -221,7 +221,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, F =
       local function all(p)
         local Q, u = p.P - V * time, p.v - V
         local sum, slack = u:dot(u) / 2 - g * Q.y + place / 2 * Q:dot(Q), 0
-        -- Places and velocities are rounded to single precision.
+        -- Positions and velocities are rounded to single precision.
         local ulp = 2 ^ -23 * (math.abs(p.P.x) + math.abs(p.P.y) + math.abs(p.P.z) + 1)
         local turned = 2 ^ -23 * (math.abs(p.v.x) + math.abs(p.v.y) + math.abs(p.v.z))
         for _, spring in ipairs(springs) do
@@ -263,6 +263,6 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v 
     assert.truthy(told("rapid.shape.plane {}"):find("spring1: omega dt = 41.7; treated exactly", 1, true))
     local curved = told("rapid.shape.sphere { radius = 1 }")
     assert.falsy(curved:find("treated exactly", 1, true), curved)
-    assert.truthy(curved:find("spring1: omega dt = 0.%d+ at 1 sub%-step"), curved) -- the angle about the centre
+    assert.truthy(curved:find("spring1: omega dt = 0.%d+ at 1 sub%-step"), curved) -- the angle around the center
   end)
 end)

@@ -5,7 +5,7 @@
 namespace rapid {
 namespace {
 
-// A wind, a spring and a push along x by this much, of each point.
+// A wind, a spring and a push along x of this size, for each point.
 class Number : public Force {
 public:
     explicit Number(double x) : x_(x) {}
@@ -49,7 +49,7 @@ std::vector<std::shared_ptr<const Force>> numbers(int count)
 
 TEST_CASE("each point has the force of the time that is nearest to its own", "[timed_force]")
 {
-    // 0 at 10 s, 1 at 10.5 s, 2 at 11 s.
+    // The forces are 0 at 10 s, 1 at 10.5 s, 2 at 11 s.
     const TimedForce force(numbers(3), 10, 1, Vec3d(0, 5, 0));
     const std::vector<double> time = {10, 10.2, 10.3, 10.7, 10.8, 10.5, 10.5, 12, 9};
     const std::vector<double> expected = {0, 0, 1, 1, 2, 1, 1, 2, 0};

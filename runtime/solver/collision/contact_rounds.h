@@ -123,8 +123,7 @@ private:
 
     std::vector<CollidingPoint> points_;  // the first started_ belong to this substep
     std::size_t started_ = 0;
-    std::vector<std::uint32_t> going_,
-        going_on_;  // unfinished points_: in this round and the next
+    std::vector<std::uint32_t> going_, going_on_;  // unfinished points_: now and in the next round
 };
 
 }  // namespace rapid

@@ -19,8 +19,8 @@
 //   Σ 2 m s (|v - V| + s),   s = max |V_k - V|
 //
 // Drag and springs to fixed positions are at rest in the world. If they hold points back differently than in free
-// motion, they supply at most |V| times the difference of their impulses. For springs to surfaces, use the surface's
-// velocity relative to V.
+// motion, they supply at most |V| times the difference of their impulses. The bound for springs to surfaces is the same
+// with the surface's speed relative to V.
 #pragma once
 
 #include <cstdint>

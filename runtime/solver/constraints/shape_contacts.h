@@ -67,7 +67,7 @@ public:
     void open(ShapeQuery& query, const Substep& step, std::size_t end);
     // Queries one shape for the points that may be near it, and stores their distances.
     void ask(ShapeQuery& query, std::size_t obstacle, const Substep& step);
-    // Closes the query after all shapes.
+    // Updates the room of open points from one shape. Called after all shapes have been queried.
     void close(const ShapeQuery& query, std::size_t obstacle);
     void begin(std::span<const Vec3d> free);
 

@@ -4,8 +4,8 @@ local json = require "dkjson"
 
 local g = 9.81
 
--- Runs points of the given columns through `chain`: the audit of all frames, the last frame's points by id, the
--- summary.
+-- Runs points of the given columns through `chain`. Returns the audit of all frames, the last frame's points by id,
+-- and the summary.
 local function audit(points, chain, frames)
   local ran = scene.command("run", ([[
 return rapid.create { fps = 24, points = rapid.points.from { %s } } %s]]):format(points, chain),
@@ -88,11 +88,11 @@ describe("the audit of collisions", function()
   end)
 end)
 
--- Where a collider sweeps over an emitter while it emits, what is born at a random moment meets it from then on.
+-- Points born at a random time, while a collider sweeps over their emitter, meet it from then on.
 describe("a collider that sweeps over an emitter", function()
   for _, speed in ipairs { 12, 48, 96 } do -- m/s
     it(("leaves none of the newborn inside, at %d m/s"):format(speed), function()
-      -- Forth and back by 4 m, turning where it is clear of the emitter.
+      -- Back and forth by 4 m, turning at positions clear of the emitter.
       local result = scene.run(([[
 local function along(time)
   local phase = (%d * time / 4) %% 2
@@ -111,7 +111,7 @@ return rapid.create { fps = 24, seed = 5 }
       for _, points in result:frames() do
         if #points > 0 then
           newborn = newborn + #points
-          -- The level set is off its sphere by voxel² / (8 r) at most: 0.4 mm.
+          -- The error of the level set's sphere is at most voxel² / (8 r): 0.4 mm.
           assert.truthy(points:max "inside" < 1e-3, points:max "inside")
         end
       end

@@ -22,7 +22,7 @@ using test::g;
 using test::h;
 constexpr double degrees = std::numbers::pi / 180;
 
-// A ball dropped from rest, bouncing with ε on a floor that it touches at the height 0.
+// A ball dropped from rest, bouncing with ε on a floor, with height 0 at contact.
 struct BouncingBall {
     double from, bounce;
 
@@ -53,13 +53,13 @@ TEST_CASE("a bouncing ball is on its parabolas, at one sub-step as at many", "[c
 
     for (int f = 1; f <= 96; ++f) {
         scene.run(1);
-        // The state's rounding, and what it does to the time of an impact at up to 6.3 m/s.
+        // The state's rounding, and its effect on the time of an impact at up to 6.3 m/s.
         CHECK_THAT(scene.P(), close_to(Vec3d(0, radius + ball.height(f * h), 0), f * 1e-6));
     }
     CHECK(scene.penetration_max == 0);
 }
 
-// A second plane that nothing touches reaches everywhere, so points on the floor are not near one shape alone.
+// A second plane that nothing touches reaches everywhere, so points on the floor are not near a single shape.
 TEST_CASE("points fall, bounce, slide and rest on a floor alike with and without another shape nearby", "[collide]")
 {
     std::mt19937 random(11);
@@ -155,7 +155,7 @@ TEST_CASE("a point rests on a plane for a thousand frames without moving by a bi
         CHECK(scene.P(i) == P[i].cast<double>());
         CHECK(scene.v(i) == Vec3d(0, 0, 0));
         const double gap = n.dot(scene.P(i)) - offset / normal.norm() - radius;
-        CHECK(gap >= -1e-15 * scene.P(i).norm());  // never below the surface, as far as double can tell
+        CHECK(gap >= -1e-15 * scene.P(i).norm());  // never below the surface, within double precision
         CHECK(gap <= 0x1p-23 * scene.P(i).cwiseAbs().maxCoeff());
     }
     CHECK(scene.penetration_max <= 1e-12);
@@ -201,7 +201,8 @@ TEST_CASE("an oblique impact loses μ (1 + ε) |vn| of its tangential speed", "[
 
 TEST_CASE("the bounces that a rest leaves out would have taken as much by friction", "[collide]")
 {
-    // Dropped with a tangential speed: once with the frame long enough to rest in, once in frames that each bounce.
+    // Dropped with a tangential speed: once with a frame long enough to come to rest, once with frames of one bounce
+    // each.
     const float bounce = 0.5f, friction = 0.05f;
     Scene coarse(points({{0, 0.05f, 0}}).v({{2, 0, 0}})), fine(coarse);
     coarse.gravity().floor(bounce, friction).frame_length(0.5).run(1);
@@ -259,7 +260,7 @@ TEST_CASE("a point in a corner of three planes rests there", "[collide]")
     CHECK(scene.v() == Vec3d(0, 0, 0));
 }
 
-// A plane that counts the paths that it is asked about.
+// A plane that counts the paths for which it is queried.
 class AskedPlane final : public Shape {
 public:
     AskedPlane(const Vec3d& normal, double offset) : plane_(make_plane(normal, offset)) {}
@@ -297,7 +298,7 @@ TEST_CASE("a point at the foot of a wall that it nears by rounding alone slides 
     CHECK(scene.P().y() == double(r));
     CHECK(scene.v() == Vec3d(0, 0, 0));
     CHECK(scene.penetration_max < 1e-8);
-    // A path or two a sub-step, not the floor and the wall by turns at each moment.
+    // One or two paths per substep, instead of alternating between floor and wall at each moment.
     CHECK(floor->asked + wall->asked < 4u * 24u * static_cast<unsigned>(substeps));
 }
 
@@ -391,7 +392,7 @@ TEST_CASE("a ball in a hollow ball keeps its speed and angle for 10,000 bounces"
 
     CHECK(double(scene.collisions) == Approx(frames * 10 * speed / chord).margin(2));
     CHECK(scene.collisions > 10000);
-    CHECK(scene.v().norm() == Approx(speed).epsilon(frames * 6e-8));  // v is rounded once a frame
+    CHECK(scene.v().norm() == Approx(speed).epsilon(frames * 6e-8));  // v is rounded once per frame
     const double from_center = (scene.P() - scene.P().dot(scene.v()) / scene.v().squaredNorm() * scene.v()).norm();
     CHECK(from_center == Approx(std::sqrt(0.5)).epsilon(frames * 2e-7));
     CHECK(scene.P().norm() <= radius);
@@ -409,12 +410,12 @@ TEST_CASE("a point slides off a ball at 2/3 of the height that it started from",
     for (int f = 0; f < 48; ++f) {
         scene.run(1);
         REQUIRE(scene.P().norm() >= R * (1 - 1e-7));
-        // Frictionless: the energy is that of its height, on the ball and off it.
+        // Frictionless: the energy follows from the height, on the ball and off it.
         CHECK(scene.v().squaredNorm() / 2 == Approx(g * (R * std::cos(from) - scene.P().y())).epsilon(2e-3));
     }
     const double cosine = 2.0 / 3 * std::cos(from);
     const double speed = std::sqrt(2 * g * R * (std::cos(from) - cosine));
-    CHECK(scene.v().x() == Approx(speed * cosine).epsilon(2e-3));  // kept since it left
+    CHECK(scene.v().x() == Approx(speed * cosine).epsilon(2e-3));  // unchanged since it left
 }
 
 TEST_CASE("a point on a curved floor swings as a pendulum, on the surface", "[collide]")
@@ -447,7 +448,8 @@ TEST_CASE("a point swings up to the side of a hollow ball, pressed to it by twic
     for (int f = 0; f < 96; ++f) {
         scene.run(1);
         REQUIRE(scene.P().norm() == Approx(R).epsilon(1e-6));
-        // A sub-step may begin off the surface by rounding, and meet it at an angle of its root.
+        // A substep may begin off the surface by rounding, and meet it at an angle proportional to the square root of
+        // that.
         CHECK(scene.v().squaredNorm() / 2 + g * (R + scene.P().y()) == Approx(energy).epsilon(5e-4));
     }
 }
@@ -496,7 +498,7 @@ TEST_CASE("deep inside, where there is no gradient, a point goes back the way th
     scene.gravity({0, 0, 1}).collide(std::make_shared<NarrowBall>(1, 0.1), 0.0f).run(1);
     CHECK(scene.P(0).norm() >= 1 - 1e-6);
     CHECK(scene.P(0).z() > 0.9);
-    CHECK(scene.P(1).norm() >= 1 - 1e-6);  // without a velocity, against what pulls it
+    CHECK(scene.P(1).norm() >= 1 - 1e-6);  // without a velocity, against the acceleration on it
     CHECK(scene.P(1).z() < -0.9);
     CHECK(scene.last.trapped == 0);
 }
@@ -548,7 +550,7 @@ TEST_CASE("no sub-step is too short or too long, no speed too high, no scene too
         REQUIRE(scene.P(i).allFinite());
         REQUIRE(scene.v(i).allFinite());
     }
-    // Of a position of up to x, single precision keeps x 2^-24; friction and bounces give no energy.
+    // Single precision resolves a position of up to x to x 2^-24; friction and bounces add no energy.
     double largest = size;
     for (std::size_t i = 0; i < P.size(); ++i) largest = std::max(largest, scene.P(i).cwiseAbs().maxCoeff());
     CHECK(scene.penetration_max <= 4 * 0x1p-24 * largest);
@@ -578,7 +580,7 @@ TEST_CASE("no collision gives a point energy", "[collide]")
         for (std::size_t i = 0; i < P.size(); ++i) {
             const double after = scene.v(i).squaredNorm() / 2 + g * scene.P(i).y();
             CAPTURE(f, i);
-            // Rounding, and along a curved surface the second order of the slide.
+            // Rounding, and on curved surfaces the second-order error of the slide.
             REQUIRE(after <= before[i] + 1e-5 * (1 + std::abs(before[i])) + 1e-3 * scene.v(i).squaredNorm());
         }
     }

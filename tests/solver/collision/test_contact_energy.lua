@@ -1,11 +1,11 @@
--- What a run tells of the energy that contacts add and take, against the energy that points have: in random scenes of
--- shapes at rest and in motion, of all responses, with and without drag and springs, of single and of coupled points.
+-- The reported energy that contacts add and remove, compared with the points' energy: in random scenes of resting and
+-- moving shapes, with all responses, with and without drag and springs, for single and coupled points.
 local scene = require "testing.scene"
 local json = require "dkjson"
 local draw = require("tests.lehmer").new(1)
 
 local g, frames = 9.81, 25
-local rounding = 2e-3 -- of single precision, of 20 points in 24 frames, and of what stands for drag and springs
+local rounding = 2e-3 -- single precision, for 20 points in 24 frames, plus the approximation of drag and springs
 
 local shapes = {
   "rapid.shape.plane { normal = {0.3, 1, 0} }",
@@ -21,7 +21,7 @@ local motions = {
   "rapid.translate(0, 0.5 * frame.time ^ 2, 0)",
 }
 
--- moves: shapes move. forces: the text of those beside gravity. couples: points touch each other, too.
+-- moves: shapes move. forces: text of the forces in addition to gravity. couples: points also touch each other.
 local function random_scene(moves, forces, couples)
   local P, v, mass = {}, {}, {}
   for i = 1, 20 do
@@ -47,9 +47,9 @@ return rapid.create { fps = 24, points = rapid.points.from {
   return text .. ("  :solve { substeps = %d }"):format(draw.pick { 4, 8 })
 end
 
--- Of points that springs of so many N/m draw to a place: how much more energy they have in the last frame than in
--- the first, what contacts have added and taken between, the most that was in motion, and in springs, at once, and what
--- was at first; J.
+-- For points attached by springs of this stiffness, N/m. Returns the energy gain from the first to the last frame, the
+-- energy that contacts added and removed, the largest kinetic energy, the largest energy in springs, and the initial
+-- energy; J.
 local function energies(text, stiffness, target)
   local ran = scene.command("run", text, ("-f 1-%d --stats stats.json --quiet"):format(frames))
   assert.equal(0, ran.status, ran.stderr .. text)
@@ -72,7 +72,7 @@ local function energies(text, stiffness, target)
   return last - first, added, taken, size, start
 end
 
--- takes: the largest part of `size` that drag can take in a second, 2 k or 2 c v.
+-- takes: the largest fraction of `size` that drag can remove in a second, 2 k or 2 c v.
 local kinds = {
   { name = "gravity", forces = "", takes = 0 },
   { name = "drag", forces = ":drag { linear = 0.05 }", takes = 0.1 },
@@ -81,7 +81,7 @@ local kinds = {
 }
 
 describe("the energy that contacts add and take", function()
-  -- Springs that turn points by up to tens of radians in a sub-step; shapes at rest in every other scene.
+  -- Springs turn points by up to tens of radians in a substep; every other scene has shapes at rest.
   it("is what points on stiff springs gain, and no more than shapes that move can give", function()
     for number = 1, 24 do
       draw.start(2, number)

@@ -1,4 +1,4 @@
--- Colliders that deform, jump, appear and vanish.
+-- Colliders that deform, jump, appear and disappear.
 local scene = require "testing.scene"
 local command = require "testing.command"
 
@@ -25,7 +25,7 @@ end
 
 describe("a sequence of files as a collider", function()
   it("drives points before it as a wall does, at any speed", function()
-    for _, step in ipairs { 0.02, 0.5, 4 } do -- m a frame; it is 0.2 m thick
+    for _, step in ipairs { 0.02, 0.5, 4 } do -- m per frame; it is 0.2 m thick
       write_boxes("wall", 26, function(frame) return {0, step * (frame - 1), 0} end)
       local start = 3 * step + 0.1 + step / 3
       local p = run([[bounce = 0.5,
@@ -121,7 +121,7 @@ describe("a collider that jumps", function()
       .. '1e+03 times as far as in the frames around; nothing is swept along', 1, true), result.warnings[1])
     local points = result[9]
     assert.near({5, 0, 0}, points[1].P, 0)
-    assert.truthy((points[2].P - vec3(10.09, 0, 0)):length() >= 0.5 - 1e-5) -- out of where it has come
+    assert.truthy((points[2].P - vec3(10.09, 0, 0)):length() >= 0.5 - 1e-5) -- out of its new position
   end)
 
   it("sweeps all of the way where cut = {} says that it does not jump", function()
@@ -140,7 +140,7 @@ describe("a collider that appears and vanishes", function()
       return function(frame) if frame.number >= 5 and frame.number < 30 then return floor end end
     end)(), bounce = 0]], "P = {{0, 0.3, 0}, {0, -1, 0}}", 40, ":gravity {}")
     assert.near(-1 - 0.5 * 9.81 * (3 / 24) ^ 2, result[4][2].P.y, 1e-5)
-    assert.equal(0, result[5][2].P.y) -- moved out as soon as it is there
+    assert.equal(0, result[5][2].P.y) -- moved out as soon as the shape exists
     assert.equal(0, result[29][1].P.y)
     assert.near(-0.5 * 9.81 * (11 / 24) ^ 2, result[40][1].P.y, 1e-4)
   end)
@@ -151,7 +151,7 @@ describe("a collider that appears and vanishes", function()
   end)
 end)
 
--- A body of 3,334 vertices, caught from a dancer; the folder lies beside the checkout where there is one.
+-- A body of 3,334 vertices, captured from a dancer, in a folder next to the checkout if it exists.
 describe("the jumper", function()
   local folder = command.shell("cd ../shared/assets/jumper && pwd").stdout:match "%S+"
 

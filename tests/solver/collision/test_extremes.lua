@@ -1,4 +1,4 @@
--- Colliders and points as nobody would set them up, and everybody does.
+-- Unusual setups of colliders and points that nevertheless occur in practice.
 local scene = require "testing.scene"
 
 local function run(chain, points, frames, options)
@@ -9,7 +9,7 @@ return rapid.create { fps = 24, points = rapid.points.from { %s } } %s :solve {}
 end
 
 describe("a shell of four voxels", function()
-  -- They cross it about 2,300 times a frame.
+  -- They cross it about 2,300 times per frame.
   it("keeps in points of up to 10^5 m/s, with their speed", function()
     local result = scene.run([[
 local voxel = 0.05
@@ -30,11 +30,11 @@ describe("a paddle that turns by 40 degrees a frame", function()
   for _, shape in ipairs { "rapid.levelset.box { size = {2, 0.16, 1}, center = {1.2, 0, 0}, voxel = 0.04 }",
     "rapid.shape.box { size = {2, 0.16, 1}, center = {1.2, 0, 0} }" } do
     it("sweeps up every point in its way: " .. shape:match "rapid%.%w+%.%w+", function()
-      -- In one turn of 9 frames it comes by all places between its ends.
+      -- In one turn of 9 frames it passes all positions between its ends.
       local places = {}
       for i = 0, 199 do
         local angle, r = 2 * math.pi * ((i * 0.618034) % 1), 0.45 + 1.5 * i / 199
-        if math.abs(math.sin(angle) * r) > 0.09 or math.cos(angle) < 0 then -- not in it to begin with
+        if math.abs(math.sin(angle) * r) > 0.09 or math.cos(angle) < 0 then -- not inside at first
           places[#places + 1] = ("{%.9g, %.9g, %.9g}"):format(r * math.cos(angle), r * math.sin(angle),
             0.8 * ((i * 0.7548) % 1 - 0.5))
         end
@@ -63,7 +63,7 @@ describe("a level set's cube", function()
           assert.truthy(math.max(P.x, P.y, P.z) > 0.93, tostring(P)) -- it rounds corners by less than a voxel
         end
       end
-      -- Back the way that they came, by the symmetry of the field, slower by the bounce.
+      -- It returns along the same path, by the symmetry of the field, slowed by the bounce.
       if speed == 1 then
         assert.near({-0.5, -0.5, -0.5}, -result[49][1].v, 0.02)
         assert.near({-0.5, -0.5, 0}, -result[49][2].v, 0.02)
@@ -97,7 +97,7 @@ describe("a method that puts points back", function()
       local points = run((":collide { shape = rapid.levelset.box { size = {2, 2, 2}, voxel = 0.05 }, method = %q, "
         .. "bounce = 0.5 }"):format(method), "P = {{0, 1.5, 0}}, v = {{0, -24, 0}}", 2)
       assert.near(12, points[2][1].v.y, 1e-4)
-      -- It goes 1 m a frame, and meets the cube in the middle of that.
+      -- It moves 1 m per frame, and meets the cube in the middle of the frame.
       assert.near(method == "project" and 1 or 1.25, points[2][1].P.y, 1e-4)
     end
   end)
@@ -115,7 +115,7 @@ describe("a level set's ball", function()
 end)
 
 describe("a level set's block", function()
-  -- Straight back, the way that a spring would let it go from there, which it hardly leaves by.
+  -- The point is moved straight back along the path that the spring gives it, which hardly leads out by itself.
   it("lets out what is born deep inside on a stiff, damped spring", function()
     local result = run(":spring { stiffness = 4e6, damping = 0.048, target = {0, 0.3, 0} } " ..
       ":collide { shape = rapid.levelset.box { size = {2, 2, 2}, voxel = 0.05 } }",
@@ -128,19 +128,19 @@ describe("a level set's block", function()
 end)
 
 describe("a level set's ball that moves", function()
-  -- It is as if the point had flown in from there.
+  -- As if the point had flown in from there.
   it("lets out ahead of it what is deep inside, beyond its band", function()
     local result = run(":collide { shape = rapid.levelset.sphere { radius = 1, voxel = 0.05 }, "
       .. "transform = function(frame) return rapid.translate(12 * frame.time, 0, 0) end }",
       "P = {{0.01, 0.02, 0.03}}", 2)
     local P = result[2][1].P
-    assert.truthy(P.x > 1.49 and P.x < 2.1, tostring(P)) -- ahead, and a bounce farther
+    assert.truthy(P.x > 1.49 and P.x < 2.1, tostring(P)) -- ahead, plus a bounce
   end)
 end)
 
 describe("a mesh that is turned inside out", function()
   it("is reported, and keeps points out as it would the right way round", function()
-    -- A tetrahedron with faces that look inwards.
+    -- A tetrahedron whose faces point inwards.
     local faces = { "{{1, 2, 3}, {1, 3, 4}, {1, 4, 2}, {2, 4, 3}}", "{{1, 3, 2}, {1, 4, 3}, {1, 2, 4}, {2, 3, 4}}" }
     local results = {}
     for k, list in ipairs(faces) do

@@ -2,7 +2,7 @@
 local scene = require "testing.scene"
 local json = require "dkjson"
 
--- A lid comes down onto points on a floor, until there is no room for them.
+-- A lid moves down onto points on a floor until there is no room for them.
 local lid = [[
 local lid = rapid.shape.plane { normal = {0, -1, 0}, offset = -1 }
   :transform { [1] = rapid.translate(0, 0, 0), [12] = rapid.translate(0, -0.95, 0) }
@@ -37,7 +37,7 @@ describe("the limit of impacts", function()
   end)
 
   it("is not met by a fast point that bounces on between walls, two thousand times a step", function()
-    -- Between walls 0.11 m apart, less a diameter of 0.01 m on each side: a way of 0.1 m.
+    -- Between walls 0.11 m apart, with a radius of 0.005 m on each side: a path of 0.1 m.
     local speed = 2000 * 0.1 * 24
     local points = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{%g, 0, 0}}, pscale = {0.005} } }

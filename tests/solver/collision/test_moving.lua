@@ -42,13 +42,14 @@ describe("a wall that moves", function()
       local height = 0.5 - 0.5 * math.cos(3 * (frame - 1) / 24)
       for i = 1, 2 do
         local above = points[i].P.y - height
-        assert.truthy(above > -1e-4, ("%d: %g"):format(frame, above)) -- the motion is followed to 1e-5 of its way
+        assert.truthy(above > -1e-4, ("%d: %g"):format(frame, above)) -- the motion is followed to 1e-5 of its path
       end
     end
     assert.near(0.5 - 0.5 * math.cos(9), result[73][1].P.y, 0.02)
   end)
 
-  -- Flush with a box that turns a point is a bead on a rod: pressed by Coriolis' force, it goes outwards as cosh ωt.
+  -- A point flush with a box that turns it is a bead on a rod: pressed by the Coriolis force, it moves outwards as
+  -- cosh ωt.
   it("presses what lies flush with a face that turns, however it would bounce", function()
     local rate = math.rad(90)
     local expected = math.cosh(rate / 2)
@@ -58,7 +59,7 @@ describe("a wall that moves", function()
         ("P = {{1, 0.05, 0}}, v = {{%.9g, %.9g, 0}}"):format(-0.05 * rate, rate), 13, substeps)[13][1]
       local cos, sin = math.cos(rate / 2), math.sin(rate / 2)
       assert.near(0.05, cos * p.P.y - sin * p.P.x, 1e-5)
-      assert.truthy(p.hittotal < 100, p.hittotal) -- its hops grow no lower than rounding
+      assert.truthy(p.hittotal < 100, p.hittotal) -- its hops decrease to rounding
       return math.abs(cos * p.P.x + sin * p.P.y - expected)
     end
     assert.truthy(off(0, 1) < 1e-4)
@@ -86,7 +87,7 @@ describe("a wall that moves", function()
     end
   end)
 
-  -- As it would on a slope of the same angle at rest, but that the normal force is that of the body's frame.
+  -- Like on a slope of the same angle at rest, except that the normal force is that of the body's frame.
   it("holds what lies on a face that turns, and is not yet steeper than friction, to the place", function()
     local friction, rate = 0.5, math.rad(20)
     local from = { 0.5, 0.05 }
@@ -99,12 +100,13 @@ describe("a wall that moves", function()
     assert.near({from[1], from[2], 0}, vec3(cos * p.P.x + sin * p.P.y, cos * p.P.y - sin * p.P.x, p.P.z), 2e-6)
   end)
 
-  -- A bead on a rod without gravity: nothing pulls it in the world, and in the frame of the rod, which draws it out,
-  -- x = x0 cosh ωt + u/ω sinh ωt. Coriolis' force, 2 ω x', is more than what lifts it off, ω² y, and so it parts at the
-  -- end of the rod. Within a voxel of that the field's normals turn, and one facet after another seems to let it go.
+  -- A bead on a rod without gravity: no force acts in the world frame. In the frame of the rod, it is driven outwards,
+  -- x = x0 cosh ωt + u/ω sinh ωt. The Coriolis force, 2 ω x', exceeds the lifting force, ω² y, so the bead leaves at
+  -- the end of the rod. Within a voxel of the end the field's normals turn, and one facet after another seems to
+  -- release it.
   it("bears what seems to part from the last voxel of a face, up to its end", function()
     local rate, height, reach = math.rad(30), 0.05, 1.25
-    for _, pressed in ipairs { 1.2, 2 } do -- times what lifts it
+    for _, pressed in ipairs { 1.2, 2 } do -- multiples of the lifting force
       local u = pressed * rate * height / 2
       local function along(x0, t) return x0 * math.cosh(rate * t) + u / rate * math.sinh(rate * t) end
       local P, v = {}, {}
@@ -124,14 +126,15 @@ describe("a wall that moves", function()
           assert.near(x, cos * p.P.x + sin * p.P.y, 3e-7)
           assert.near(height, cos * p.P.y - sin * p.P.x, 1.5e-6)
         end
-        -- When x is `reach`: by e^ωt, the larger root of (x0 + u/ω) e^2ωt - 2 reach e^ωt + x0 - u/ω. Then straight on.
+        -- Time at which x is `reach`: from e^ωt, the larger root of (x0 + u/ω) e^2ωt - 2 reach e^ωt + x0 - u/ω. Then
+        -- straight on.
         local ratio = u / rate
         local parts = math.log((reach + math.sqrt(reach ^ 2 - x0 ^ 2 + ratio ^ 2)) / (x0 + ratio)) / rate
         cos, sin = math.cos(rate * parts), math.sin(rate * parts)
         local at = vec3(reach * cos - height * sin, reach * sin + height * cos, 0.01 * i)
         local out = rate * (x0 * math.sinh(rate * parts) + ratio * math.cosh(rate * parts))
         local off = vec3(out * cos - rate * at.y, out * sin + rate * at.x, 0)
-        assert.near(at + (1 - parts) * off, result[25][i].P, 2e-3) -- a 25th of a voxel: the field's edge is round
+        assert.near(at + (1 - parts) * off, result[25][i].P, 2e-3) -- a 25th of a voxel: the field has a rounded edge
       end
     end
   end)

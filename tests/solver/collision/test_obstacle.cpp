@@ -10,7 +10,7 @@ namespace {
 
 using test::points;
 
-// An obstacle refers to its collider.
+// A collider that outlives its obstacles.
 struct ShapeCollider : Collider {
     explicit ShapeCollider(ShapePtr of) { shape = std::move(of); }
     Obstacle among(const PointSet& set) const { return {*this, set, radii_of(radius, set)}; }

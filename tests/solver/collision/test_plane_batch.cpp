@@ -21,11 +21,11 @@ void add(PlaneBatch& batch, const Vec3d& P, const Vec3d& v, const Vec3d& a = {0,
 TEST_CASE("a batch tells which points miss a plane, slide on it and bounce off it once", "[plane]")
 {
     PlaneBatch batch;
-    add(batch, {0, 10, 0}, {1, 0, 0});             // does not come down in time
+    add(batch, {0, 10, 0}, {1, 0, 0});             // does not descend in time
     add(batch, {0, 0, 0}, {1, 0, 0});              // lies
     add(batch, {0, 1, 0}, {1, -4, 0});             // falls
     add(batch, {0, 0.001, 0}, {0, 0, 0});          // comes to rest
-    add(batch, {0, 0, 0}, {1, 0, 0}, {1, -g, 0});  // something else drives it along the plane
+    add(batch, {0, 0, 0}, {1, 0, 0}, {1, -g, 0});  // another force drives it along the plane
     add(batch, {0, -1, 0}, {0, 0, 0});             // is below
     batch.solve(floor_plane);
 
@@ -63,7 +63,7 @@ TEST_CASE("points that may come near another shape after their contact are left 
 {
     PlaneBatch batch;
     add(batch, {0, 0, 0}, {1, 0, 0});   // to x = 0.2
-    add(batch, {0, 10, 0}, {1, 0, 0});  // misses, wherever other shapes are
+    add(batch, {0, 10, 0}, {1, 0, 0});  // misses, regardless of other shapes
     batch.solve(floor_plane);
     batch.leave_out_near({Vec3d(0.5, -1, -1), Vec3d(1, 1, 1)}, 0.25);
     CHECK(batch.outcome(0) == PlaneBatch::Slides);

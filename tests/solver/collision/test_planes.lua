@@ -1,12 +1,12 @@
--- Points at rest on planes: what lifts them, and what they do under a force that varies from place to place.
+-- Points at rest on planes: lifting, and motion under a force that varies in space.
 local scene = require "testing.scene"
 local lehmer = require "tests.lehmer"
 
 local function vector(x) return ("{%.17g, %.17g, %.17g}"):format(x.x, x.y, x.z) end
 
--- The heights over a plane through a random place, after some frames, of points that lay on it anywhere, pulled onto it
--- by gravity and lifted by an action of `net` m/s² more. planes: how many there are, all of them the same; points near
--- one alone go through their sub-step in batches.
+-- Returns the heights, after some frames, of points that lay anywhere on a plane through a random position, pulled
+-- onto it by gravity and lifted by an action with a net acceleration of `net` m/s². planes: number of identical
+-- planes; points near a single one go through their substep in batches.
 local function lifted(net, substeps, frames, size, seed, planes)
   local random, P = lehmer.new(seed).random, {}
   local n = vec3(random() - 0.5, random() + 0.2, random() - 0.5):normalized()
@@ -36,7 +36,7 @@ describe("a point that rests on a plane", function()
           local heights = lifted(1, substeps, frames, size, 7 * k, planes)
           assert.equal(20, #heights)
           for i = 1, #heights do
-            -- The plane still bears it for half a sub-step. A frame's roundings move it by an ulp of its place.
+            -- The plane still supports it for half a substep. A frame's rounding moves it by an ulp of its position.
             local half = 0.5 / (24 * substeps)
             local height = 0.5 * t * t + 9.81 * half * (t - half / 2)
             assert.near(height, heights[i], 1e-5 + 1e-6 * size)
@@ -52,7 +52,7 @@ describe("a point that rests on a plane", function()
 end)
 
 describe("points that turbulence drives over a plane without bounce", function()
-  -- Positions at frame 10 of points some of which slide, take off and land.
+  -- Returns positions at frame 10 of points some of which slide, take off and land.
   local function positions(substeps)
     return scene.run(([[
 local P = {}

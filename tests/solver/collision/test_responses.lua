@@ -1,4 +1,4 @@
--- What becomes of points at a collider: responses, the paper's methods, and the hit attributes.
+-- Points at a collider: responses, the paper's methods, and the hit attributes.
 local scene = require "testing.scene"
 
 -- A point that falls from 2 m onto the floor, at 24 frames a second.
@@ -24,7 +24,7 @@ describe("the response", function()
     local result = fall("response = 'stick'", 96)
     assert.near({landing, 0, 0}, result[48][1].P, 1e-5)
     assert.same_points(result[48], result[96])
-    -- On a ceiling, and at a level set's wall.
+    -- On a ceiling, and on a level set's wall.
     local points = scene.run([[
 return rapid.create { fps = 24,
     points = rapid.points.from { P = {{0, 0, 0}, {0.1, 0, 0}}, v = {{0, 9, 0}, {9, 0.5, 0}} } }
@@ -54,7 +54,7 @@ return rapid.create { fps = 24, points = two } :gravity {}
 end)
 
 describe("the method", function()
-  -- The largest error of the height of a ball that bounces with 0.7 over two seconds.
+  -- Returns the largest height error, over two seconds, of a ball that bounces with 0.7.
   local function off(method, substeps)
     local result = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 2, 0}} } } :gravity {}

@@ -23,7 +23,7 @@ Support support(const Vec3d& normal, double friction)
 
 TEST_CASE("static friction holds a point up to μ times the normal force", "[slide]")
 {
-    const double pull = GENERATE(0.0, 0.99, 1.01);  // parts of the friction
+    const double pull = GENERATE(0.0, 0.99, 1.01);  // relative to friction
     const Slide slide = slide_on(support({0, 1, 0}, 0.5), Vec3d::Zero(), {pull * 0.5 * g, -g, 0}, 1, 0);
     CHECK(slide.kind == (pull > 1 ? Slide::Moves : Slide::Sticks));
     if (pull > 1) CHECK_THAT(slide.a, close_to(Vec3d(0.01 * 0.5 * g, 0, 0), 1e-12));
@@ -38,8 +38,8 @@ TEST_CASE("sliding friction stops a point after v/(μ g)", "[slide]")
     CHECK_THAT(slide.a, close_to(Vec3d(0, 0, 0.25 * g), 1e-12));
 }
 
-// So slow that friction turns within the shortest piece. The velocity at the end of a piece is by the mean of the
-// accelerations at both ends, as along curved surfaces.
+// The point is so slow that friction turns within the shortest piece. The final velocity of a piece uses the mean of
+// the accelerations at both ends, as along curved surfaces.
 TEST_CASE("a slow point goes where it is pulled, and not to and fro across the pull", "[slide]")
 {
     const double excess = GENERATE(0.02, 0.1), turn = GENERATE(0.5, 1.5, 2.5);  // m/s² over friction; rad
@@ -64,14 +64,14 @@ TEST_CASE("a surface does not bear a point that is pulled off it, or that it fal
 {
     CHECK(slide_on(support({0, 1, 0}, 0), {1, 0, 0}, {0, g, 0}, 1, 0).kind == Slide::Leaves);
     Support ball = support({0, 1, 0}, 0);
-    ball.curvature = 1;  // of a ball of 1 m, which a point leaves at v² > g
+    ball.curvature = 1;  // a ball of 1 m, which a point leaves at v² > g
     CHECK(slide_on(ball, {std::sqrt(0.99 * g), 0, 0}, {0, -g, 0}, 1, 0).kind == Slide::Moves);
     CHECK(slide_on(ball, {std::sqrt(1.01 * g), 0, 0}, {0, -g, 0}, 1, 0).kind == Slide::Leaves);
 }
 
 TEST_CASE("a point in a groove slides along the edge of its sides, with the friction of both", "[slide]")
 {
-    // Each side of a groove of 90 degrees bears g cos(slope) / √2.
+    // Each side of a groove of 90 degrees supports g cos(slope) / √2.
     const double friction = 0.1, slope = 0.3;
     const Support left = support({1, 1, 0}, friction), right = support({-1, 1, 0}, friction);
     int lifted = 0;

@@ -1,4 +1,4 @@
--- Points that a shape holds: by adhesion, on any motion, and sliding against viscosity.
+-- Points held by a shape: by adhesion, on any motion, and sliding against viscosity.
 local command = require "testing.command"
 local scene = require "testing.scene"
 
@@ -10,7 +10,7 @@ return rapid.create { fps = 24, points = rapid.points.from { %s } } %s :collide 
     :format(points, chain or ":gravity {}", collide, substeps or 1), { frames = {1, frames} })
 end
 
--- A disc's top at y = 0.1, which turns about the y axis.
+-- A disc with its top at y = 0.1 that turns about the y axis.
 local function disc(angle, more)
   return ([[shape = rapid.shape.box { size = {9, 0.2, 9} }, response = "stick", %s,
     transform = function(frame) return rapid.rotate({0, 1, 0}, math.deg(%s)) end]]):format(more or "bounce = 0", angle)
@@ -34,7 +34,7 @@ describe("what sticks", function()
     end
   end)
 
-  -- With an angular acceleration of 1 the bond has to bear sqrt((t² r)² + r²).
+  -- An angular acceleration of 1 loads the bond with sqrt((t² r)² + r²).
   it("goes with its surface, whatever neighbours, rods and springs do to it", function()
     for name, pull in pairs {
       ["overlapping neighbours"] = ":attribute { pscale = 0.2 } :contact {}",
@@ -64,13 +64,13 @@ describe("what sticks", function()
   it("is torn off at the moment at which the disc's acceleration exceeds the adhesion", function()
     local adhesion, r = 20, 1.5
     local torn = math.sqrt(math.sqrt(adhesion ^ 2 - r ^ 2) / r)
-    local phase = torn ^ 2 / 2 - landing ^ 2 / 2 -- since it landed
+    local phase = torn ^ 2 / 2 - landing ^ 2 / 2 -- since landing
     for _, substeps in ipairs { 1, 4 } do
       local result = run(disc("0.5 * frame.time ^ 2", "adhesion = 20"), "P = {{1.5, 0.5, 0}}", 97, substeps)
       local last = 1 + math.floor(torn * 24)
       local P = result[last][1].P
       assert.near(r, math.sqrt(P.x ^ 2 + P.z ^ 2), 1e-4)
-      -- Without friction it goes straight on over the disc.
+      -- Without friction it continues straight over the disc.
       local cos, sin, along = math.cos(phase), math.sin(phase), torn * (95 / 24 - torn)
       local expected = vec3(r * (cos - sin * along), 0.1, -r * (sin + cos * along))
       assert.near(expected, result[96][1].P, 2e-3)
@@ -84,7 +84,7 @@ describe("what sticks", function()
     end
     assert.near(1, height(1.01 * g), 1e-6)
     local hit = (9 - math.sqrt(81 - 2 * g * 0.5)) / g
-    local fallen = 49 / 24 - 1 / 24 - math.ceil(hit * 24) / 24 -- it is tested from the next step on
+    local fallen = 49 / 24 - 1 / 24 - math.ceil(hit * 24) / 24 -- tested from the next step on
     assert.near(1 - g * fallen ^ 2 / 2, height(0.99 * g), 1e-4)
   end)
 
@@ -144,12 +144,12 @@ describe("what sticks", function()
   end)
 end)
 
--- A body of 3,334 vertices, caught from a dancer; the folder lies beside the checkout where there is one.
+-- A body of 3,334 vertices, captured from a dancer, in a folder next to the checkout if it exists.
 describe("drops on a figure that jumps", function()
   local folder = command.shell("cd ../shared/assets/jumper && pwd").stdout:match "%S+"
   local test = folder and it or pending
 
-  -- Of drops that have hit it, how many there are at frame 60, and how many of these are on its surface.
+  -- Returns the number of drops that have hit it at frame 60, and how many of them are on its surface.
   local function held(options)
     local points = scene.run(([[
 local body = rapid.mesh.read "%s/jumper.####.ply"
@@ -239,7 +239,7 @@ describe("what slides with viscosity", function()
     assert.truthy(drop(0.95 * g * math.cos(math.rad(30))).P:dot(normal) > 1)
   end)
 
-  -- As what sticks is: by the kick over the frame, with the weight.
+  -- Like sticking points: the kick over the frame acts together with the weight.
   it("is kicked off a floor by more than the adhesion and its weight, a ceiling by more than the rest", function()
     local function height(up, kick)
       local normal = vec3(0, up, 0)
@@ -267,7 +267,7 @@ describe("what slides with viscosity", function()
     end
   end)
 
-  -- Where viscosity is strong the angle from the top follows R k θ' = g sin θ: tan(θ/2) grows as exp(g t/(R k)).
+  -- Under strong viscosity the angle from the top follows R k θ' = g sin θ: tan(θ/2) grows as exp(g t/(R k)).
   it("runs down a ball, round it and to its lowest point", function()
     local level_set = "rapid.levelset.sphere { radius = 1, voxel = 0.03 }"
     for _, shape in ipairs { "rapid.shape.sphere { radius = 1 }", level_set } do

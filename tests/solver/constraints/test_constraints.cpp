@@ -1,5 +1,5 @@
-// Rows that are solved from their residual and gradient: closed forms of rods, springs and chains; momentum; the same
-// bits on any number of threads.
+// Rows that are solved from their residual and gradient: closed forms of rods, springs and chains; momentum;
+// bit-identical results on any number of threads.
 #include <tbb/global_control.h>
 
 #include <cmath>
@@ -44,7 +44,7 @@ void come_to_rest(Scene& scene, int frames)
     }
 }
 
-// K(k), by the arithmetic-geometric mean.
+// Returns K(k), by the arithmetic-geometric mean.
 double complete_elliptic(double k)
 {
     double a = 1, b = std::sqrt(1 - k * k);
@@ -56,7 +56,7 @@ double complete_elliptic(double k)
     return std::numbers::pi / (2 * a);
 }
 
-// The time of the n-th passage through the lowest place, interpolated between frames.
+// Returns the time of the n-th passage through the lowest position, interpolated between frames.
 double time_of_passage(Scene& scene, int n)
 {
     double before = scene.P(1).x();
@@ -101,7 +101,7 @@ TEST_CASE("a spring is stretched by its load, whatever the steps and iterations"
     scene.options.iterations = iterations;
     scene.dynamics.add(rods({{0, 1}}, 1, compliance));
     come_to_rest(scene, 240);
-    // By rounding of P and v once a frame.
+    // Tolerance: rounding of P and v once per frame.
     CHECK(-scene.P(1).y() == Approx(1 + stretch).margin(2e-6));
     CHECK(scene.v(1).norm() < 1e-5);
 }
@@ -206,7 +206,7 @@ TEST_CASE("drag does not change how far a load stretches a spring", "[constraint
 
 TEST_CASE("a point that a rod pushes into the ground lies on it", "[constraints]")
 {
-    // A rod that stands on the ground: it is the ground that bears both.
+    // A rod that stands on the ground: the ground supports both.
     Scene scene(points({{0, 0.1f, 0}, {0, 1.1f, 0}}).set<float>("mass", {1, 2}).set<float>("pscale", {0.1f, 0.1f}));
     scene.gravity().floor(0).substeps(4);
     scene.options.iterations = 20;

@@ -124,7 +124,7 @@ TEST_CASE("beside a rod a contact is recorded once, by any number of iterations"
                        .set<float>("mass", std::vector<float>(4, static_cast<float>(mass))),
                    0, 0.5f);
     record(scene);
-    scene.dynamics.add(test::rods({{1, 3}}, 1));  // between the tops, level: it bears nothing
+    scene.dynamics.add(test::rods({{1, 3}}, 1));  // between the tops, level: it carries nothing
     scene.options.iterations = iterations;
     scene.gravity().floor(0, 0.5f).substeps(16).run(48);
     for (const std::size_t bottom : {0u, 2u}) {

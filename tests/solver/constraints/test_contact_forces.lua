@@ -1,7 +1,7 @@
 -- contact { record }: the forces of contacts as attributes.
 local scene = require "testing.scene"
 
--- Nine columns of grains on nine that are held, between smooth walls.
+-- Nine columns of grains on nine fixed grains, between smooth walls.
 local silo = [[
 local P, held = {}, {}
 for k = 0, 53 do

@@ -1,5 +1,5 @@
-// Contacts between points: the closed forms of impacts, stacks that rest, overlaps that part without speed, extremes;
-// the search against all pairs.
+// Contacts between points: the closed forms of impacts, stacks at rest, overlaps that separate without speed,
+// extremes; the search compared with all pairs.
 #include "runtime/solver/constraints/contacts.h"
 
 #include <rapidcheck.h>
@@ -39,7 +39,7 @@ TEST_CASE("a head-on impact keeps the momentum, and bounces back by its restitut
                    bounce);
     scene.substeps(substeps).run(24);
 
-    // v = (4 - 3)/4 of both together, and -+ bounce (4 + 1) shared by the masses of the other.
+    // v = (4 - 3)/4 for both together, and -+ bounce (4 + 1), shared in proportion to the other's mass.
     CHECK_THAT(scene.v(0), close_to(Vec3d(0.25 - bounce * 5 * 0.75, 0, 0), 2e-6));
     CHECK_THAT(scene.v(1), close_to(Vec3d(0.25 + bounce * 5 * 0.25, 0, 0), 2e-6));
     CHECK(scene.deepest() < 1e-4);
@@ -123,7 +123,7 @@ TEST_CASE("with mass scaling contacts of a stack bear at most m g / (2 sinh(k/2)
     scene.sleep().run(96);
     REQUIRE(scene.last.asleep == n);
     CHECK(scene.deepest() < 0.01 * 0.02);
-    // N, of the j-th from above and what it stands on: g e^(-k/2) (1 + e^-k + ... + e^(-k (j-1))).
+    // N, of the j-th from above on its support: g e^(-k/2) (1 + e^-k + ... + e^(-k (j-1))).
     const auto between = [&](std::size_t j) {
         double sum = 0;
         for (std::size_t i = 0; i < j; ++i) sum += g * std::exp(-k * (0.5 + static_cast<double>(i)));
@@ -132,7 +132,7 @@ TEST_CASE("with mass scaling contacts of a stack bear at most m g / (2 sinh(k/2)
     for (const SleepRecords::Record& record : scene.sleep_records.records) {
         const std::size_t j = n - static_cast<std::size_t>(record.id);
         const double load =
-            between(j - 1) + (record.id > 0 ? between(j) : 0);  // from above and below, but for the ground
+            between(j - 1) + (record.id > 0 ? between(j) : 0);  // from above and below, except for the ground
         CHECK(record.load == Approx(load).epsilon(0.01));
         CHECK(record.load < 2 * g / (2 * std::sinh(k / 2)));
     }
@@ -172,7 +172,7 @@ TEST_CASE("with mass scaling a heap that is born overlapping parts, and does not
         for (std::size_t i = 0; i < 300; ++i) fastest = std::max(fastest, scene.v(i).norm());
     }
     CAPTURE(k, spacing);
-    CHECK(fastest < 1.05 * std::sqrt(2 * g * 1.6));  // of a fall from the top
+    CHECK(fastest < 1.05 * std::sqrt(2 * g * 1.6));  // a fall from the top
 }
 
 TEST_CASE("mass scaling treats points alike that are level within rounding", "[contacts][extreme]")
@@ -180,7 +180,7 @@ TEST_CASE("mass scaling treats points alike that are level within rounding", "[c
     const float higher = GENERATE(0.0f, 1e-20f, -1e-20f);
     Granular scene(points({{0, 0, 0}, {0.3f, higher, 0}})
                        .v({{2, 0, 0}, {-1, 0, 0}})
-                       .set<float>("pscale", alike(2, 0.125f)));  // lies at 0 to the bit
+                       .set<float>("pscale", alike(2, 0.125f)));  // lies exactly at 0
     scene.spheres->options.mass_scaling = 2;
     scene.gravity().collide(make_plane({0, 1, 0}, -0.125), 0).substeps(4).run(12);
     for (const std::size_t i : {0, 1}) CHECK_THAT(scene.v(i), close_to(Vec3d(0.5, 0, 0), 1e-6));
@@ -214,7 +214,7 @@ TEST_CASE("a point that a wall puts out at once leaves behind, without speed, th
 {
     const int substeps = GENERATE(1, 4, 10);
     CAPTURE(substeps);
-    // The wall moves the first by 0.04, by which it is in the second by 0.02.
+    // The wall moves the first by 0.04, and thus into the second by 0.02.
     Granular scene(points({{0.01f, 0, 0}, {0.13f, 0, 0}}).set<float>("pscale", alike(2, 0.05f)));
     scene.collide(make_plane({1, 0, 0}, 0), 0.0f).substeps(substeps).run(4);
     CHECK(scene.P(0).x() == double(0.05f));
@@ -227,7 +227,7 @@ TEST_CASE("points of 1 : 10^6 kg that are born in each other, in a pipe, do not 
 {
     const std::size_t n = GENERATE(2, 3, 4);
     const float overlap = GENERATE(0.1f, 0.3f, 0.5f, 0.9f), ratio = GENERATE(1e3f, 1e6f), r = 0.05f;
-    const bool by_turns = GENERATE(false, true);  // or the uppermost is the heavy one
+    const bool by_turns = GENERATE(false, true);  // alternating; otherwise the uppermost is the heavy one
     CAPTURE(n, overlap, ratio, by_turns);
     std::vector<Vec3f> at;
     std::vector<float> mass;
@@ -241,7 +241,7 @@ TEST_CASE("points of 1 : 10^6 kg that are born in each other, in a pipe, do not 
         scene.collide(make_plane(normal, -double(r)), 0.0f);
     for (int frame = 0; frame < 24; ++frame) {
         scene.run(1);
-        // Of two free falls from where they are.
+        // The energy of two free falls from their positions.
         for (std::size_t i = 0; i < n; ++i) CHECK(0.5 * scene.v(i).squaredNorm() < 2 * g * double(at[i].y()));
     }
 }
@@ -263,7 +263,7 @@ TEST_CASE("a point that slides over others is slowed by friction, v = v0 - frict
                        .set<float>("pscale", {1, 999}),
                    0, 0.1f);
     scene.gravity().substeps(8).run(12);
-    // Nearly flat: a sphere of 999 m. Its curve takes off v²/R of the weight.
+    // Nearly flat: a sphere of 999 m. Its curvature reduces the weight by v²/R.
     CHECK(scene.v(0).x() == Approx(2 - 0.1 * g * 0.5).epsilon(0.01));
     CHECK(scene.P(0).y() == Approx(1 - scene.P(0).x() * scene.P(0).x() / 2000).margin(1e-3));
 }
@@ -319,7 +319,7 @@ TEST_CASE("radii of 1 : 1,000 and masses of 1 : 10^6 in one heap stay finite, an
     Granular scene(points(at).set<float>("pscale", radius).set<float>("mass", mass), 0, 0.3f);
     scene.gravity().floor(0, 0.3f).substeps(16).run(48);
     for (std::size_t i = 0; i < scene.points.size(); ++i) {
-        CHECK(scene.v(i).norm() < 10);  // a fall from 1.6 m is of 5.6 m/s
+        CHECK(scene.v(i).norm() < 10);  // a fall from 1.6 m gives 5.6 m/s
         CHECK(scene.P(i).y() >= radius[i] * 0.999);
     }
 }
@@ -340,7 +340,7 @@ TEST_CASE("a heavy point rests on a light one, and does not sink through it", "[
     scene.gravity().floor(0, 0.3f).substeps(12);
     for (int frame = 0; frame < 96; ++frame) {
         scene.run(1);
-        CHECK(scene.deepest() < 0.3 * r);  // in a sub-step it falls from one overlap into the next
+        CHECK(scene.deepest() < 0.3 * r);  // in a substep it falls from one overlap into the next
     }
     CHECK(scene.deepest() < 0.06 * r);
     CHECK(scene.v(n).norm() < 1e-3);
@@ -364,7 +364,7 @@ TEST_CASE("a heavy point does not sink through a light one by wedging it into a 
         CHECK(scene.deepest() < 0.06 * r);
         CHECK_THAT(scene.P(0), close_to(Vec3d(r, r, 0), 0.05 * r));
         CHECK(scene.P(1).x() == Approx(x).epsilon(0.03));
-        for (const std::size_t i : {0, 1}) CHECK(scene.v(i).norm() < std::sqrt(2) * g / 24 / 11);  // a sub-step's worth
+        for (const std::size_t i : {0, 1}) CHECK(scene.v(i).norm() < std::sqrt(2) * g / 24 / 11);  // a substep's worth
     }
 }
 
@@ -439,7 +439,7 @@ TEST_CASE("a ball of 10^6 times their mass on a bed of grains is in none of them
         CHECK(scene.deepest() < r);
         for (std::size_t i = 0; i < scene.points.size(); ++i) fastest = std::max(fastest, scene.v(i).norm());
     }
-    CHECK(fastest < 10);  // the ball comes down with 1 m/s, and what it squeezes out goes faster
+    CHECK(fastest < 10);  // the ball arrives at 1 m/s, and squeezed-out points are faster
     CHECK(scene.deepest() < 0.15 * r);
     for (std::size_t i = 0; i < scene.points.size(); ++i) CHECK(scene.P(i).y() >= double(radius[i]) * 0.999);
 }
@@ -454,7 +454,7 @@ TEST_CASE("a heap comes to rest, and its energy does not grow", "[contacts]")
             sum += double(mass[i]) * (0.5 * scene.v(i).squaredNorm() + g * scene.P(i).y());
         return sum;
     };
-    scene.run(24);  // what overlapped at birth has parted
+    scene.run(24);  // points that overlapped at birth have separated
     double before = energy();
     for (int second = 0; second < 4; ++second) {
         scene.run(24);
@@ -482,7 +482,7 @@ TEST_CASE("the search finds each touching pair once, whatever the radii, grids a
         at.emplace_back(scatter * in(random), scatter * in(random), scatter * in(random));
         radius.push_back(static_cast<float>(smallest * std::pow(0.1 / smallest, in(random))));
         if (k % 17 == 0) radius.back() = 0;
-        if (k % 50 == 1) at.back() *= spread;  // far from all others, or where they are
+        if (k % 50 == 1) at.back() *= spread;  // far from all others, or in place
     }
     const RadiusGrids grids({radius.data(), 1}, radius.size(), 0.02, max_grids);
     Pairs pairs;
@@ -501,7 +501,7 @@ TEST_CASE("the search finds each touching pair once, whatever the radii, grids a
 
 TEST_CASE("the search finds the pairs that a sweep along an axis finds", "[contacts]")
 {
-    const std::size_t n = GENERATE(3000, 30000);  // of which some are sorted in one go, and some in several
+    const std::size_t n = GENERATE(3000, 30000);  // some counts are sorted at once, others in several parts
     CAPTURE(n);
     std::mt19937 random(11);
     std::uniform_real_distribution<float> in(0, 1);
@@ -536,8 +536,8 @@ TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they
           "[contacts][long]")
 {
     const float r = 0.01f;
-    // Grains a second through a square hole of that width in the floor of a box; those below are taken to the top
-    // again.
+    // Returns the grains per second through a square hole of that width in the floor of a box; grains below are moved
+    // back to the top.
     const auto flow_of = [&](double hole, std::size_t layers, unsigned seed) {
         constexpr int side = 14;
         const double w = side * 2.1 * r;
@@ -573,15 +573,15 @@ TEST_CASE("grains run through a hole by the 5/2 power of what is wider than they
         }
         return static_cast<double>(passed);  // in a second
     };
-    // Grains go in bursts, more of them the higher they stand: a second differs from another by a twelfth.
+    // Grains flow in bursts, more so the higher they stand: seconds differ by a twelfth.
     const auto flow = [&](double hole, std::size_t layers) {
         constexpr unsigned seconds = 8;
         double sum = 0;
         for (unsigned seed = 1; seed <= seconds; ++seed) sum += flow_of(hole, layers, seed);
         return sum / seconds;
     };
-    // Beverloo: flow ~ (hole - k d)^5/2, with d the diameter; k is 1.4 to 3 by what is measured, and not known here. So
-    // its 2/5 power is linear in the width.
+    // Beverloo: flow ~ (hole - k d)^5/2, with d the diameter; measured k are 1.4 to 3, and k is unknown here. The 2/5
+    // power of the flow is therefore linear in the width.
     const double narrow = flow(0.10, 14), wide = flow(0.16, 14), wider = flow(0.20, 14);
     INFO(narrow << ", " << wide << ", " << wider << " a second");
     const auto root = [](double a_second) { return std::pow(a_second, 0.4); };
@@ -609,7 +609,7 @@ TEST_CASE("grids are those of Algorithm 1, and their quality that of equation 5"
     CHECK(grids.error == Approx(cells - spheres));
     CHECK(grids.excess == Approx((cells - cut) / cut));
 
-    // By default each holds radii down to half of its largest, whatever the others are.
+    // By default each grid holds radii down to half of its largest, independently of the others.
     const std::vector<float> sizes = {10, 5.1f, 3, 1.6f, 0.3f, 0.2f};
     const RadiusGrids halves({sizes.data(), 1}, sizes.size(), {}, 8);
     REQUIRE(halves.grids.size() == 3);

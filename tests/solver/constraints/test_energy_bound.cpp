@@ -1,4 +1,4 @@
-// The bound on energy, whatever constraints have made of velocities and places.
+// The energy bound, for any result of constraints in velocities and positions.
 #include "runtime/solver/constraints/energy_bound.h"
 
 #include <rapidcheck.h>
@@ -35,7 +35,7 @@ struct FoundPairs {
     }
 
     Vec3d any() { return {number_(random_), number_(random_), number_(random_)}; }
-    // An impulse between the two of each pair, and a shift of both.
+    // Applies an impulse between the two points of each pair, and a shift of both.
     void push(double size, double shift)
     {
         for (std::size_t i = 0; i + 1 < v.size(); i += 2) {
@@ -126,7 +126,7 @@ TEST_CASE("a pair that corrections of positions lift out of all proportion moves
     CHECK(pairs.points[2].P == other);
 }
 
-// A gain of 0.8 of what the spring had is of less than half of what it has afterwards, which was not available.
+// A gain of 0.8 of the spring's initial energy is less than half of its energy afterwards, which was not available.
 TEST_CASE("a pair that corrections of positions move farther off what a spring draws it to has no solution",
           "[energy_bound]")
 {
@@ -195,7 +195,7 @@ TEST_CASE("what a point drives has no more energy than before, as it is seen fro
         const double shift = *rc::gen::elementOf(std::vector<double>{0, 1e-3});
         std::vector<Vec3d> v(pairs.v);
         pairs.push(3, shift);
-        for (std::size_t i = 1; i < pairs.v.size(); i += 2) pairs.v[i] = v[i];  // it goes its own way
+        for (std::size_t i = 1; i < pairs.v.size(); i += 2) pairs.v[i] = v[i];  // follows its own motion
         const std::vector<Vec3d> pushed(pairs.v);
         const double dt = pairs.step.dt;
         const auto link = [&](EnergyIslands& islands) {
@@ -208,7 +208,7 @@ TEST_CASE("what a point drives has no more energy than before, as it is seen fro
         for (std::size_t i = 0; i < pairs.v.size(); i += 2) {
             const double rounding = 1e-9 * (1 + std::abs(before[i / 2]));
             if (seen(i) <= before[i / 2] + rounding) continue;
-            // Where the shift has raised it: the least that is on the way from the velocity before to that after.
+            // If the shift has raised it: the minimum on the line from the old velocity to the new one.
             RC_ASSERT(shift > 0);
             const Vec3d change = pushed[i] - v[i], u = v[i] - v[i + 1];
             const double t = std::clamp(-u.dot(change) / change.squaredNorm(), 0.0, 1.0);

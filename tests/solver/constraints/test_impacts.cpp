@@ -1,5 +1,5 @@
-// Impacts between points, and of points that impacts drive into shapes: the closed form of one, cradles, gases, Haff's
-// law, and that no impact adds energy.
+// Impacts between points, and of points that impacts drive into shapes: the closed form of a single one, cradles,
+// gases, Haff's law; no impact adds energy.
 #include "runtime/solver/constraints/impact.h"
 
 #include <tbb/global_control.h>
@@ -61,7 +61,7 @@ TEST_CASE("an oblique impact is that of its closed form, at any angle, ratio of 
     Vec3d impulse = p * n;
     if (sliding.norm() > 1e-9) impulse -= std::min(friction * p, reduced * sliding.norm()) * sliding.normalized();
     const Vec3d va1 = va + impulse, vb1 = vb - impulse / ratio;
-    // A glancing impact turns its normal by 1/cos(angle) of the rounding of positions.
+    // A glancing impact amplifies the rounding of positions in its normal by 1/cos(angle).
     const double rounding = 3e-7 / std::cos(angle) * std::max(1.0, 1 / ratio);
     CHECK_THAT(scene.v(0), close_to(va1, 10 * rounding));
     CHECK_THAT(scene.v(1), close_to(vb1, 10 * rounding));
@@ -101,7 +101,7 @@ TEST_CASE("a ball that hits a row of balls sends the last away with all of its v
     CHECK(kinetic_energy(scene) <= 0.5 * (1 + 1e-6));
 }
 
-// n³ points on a lattice, in all directions at `speed`.
+// n³ points on a lattice, moving in random directions at `speed`.
 Granular gas(int n, float speed, float bounce)
 {
     std::mt19937 random(5);
@@ -180,7 +180,7 @@ public:
 private:
     struct Event {
         double time;
-        std::size_t with;  // a point, or from size() on an axis whose wall it is
+        std::size_t with;  // a point or, from size() on, an axis of a wall
     };
 
     void advance(double to)
@@ -249,7 +249,8 @@ TEST_CASE("balls that bounce on one that lies on the ground gain no energy", "[i
     }
 }
 
-// Clusters that fly into each other, of any masses, friction and iterations, some born overlapping, some between walls.
+// Clusters that fly into each other, with any masses, friction and iterations, some born overlapping, some between
+// walls.
 TEST_CASE("impacts of random clusters add no energy, and keep the momentum where there are no walls", "[impacts][slow]")
 {
     std::mt19937 random(11);
@@ -288,7 +289,7 @@ TEST_CASE("impacts of random clusters add no energy, and keep the momentum where
 
 TEST_CASE("a sleeper on the ground that an impact passes on to rises no faster than it is hit", "[impacts][sleep]")
 {
-    // The second is hit within the sub-step in which the first is; until then it is none that the ball may touch.
+    // The second sleeper is hit in the same substep as the first; before that it is no candidate for a contact.
     Granular scene(points({{0, 0.1f, 0}, {0.2f, 0.1f, 0}, {0.4f, 0.1f, 0}}).set<float>("pscale", alike(3, 0.1f)), 1);
     scene.gravity().floor(0.5f).substeps(2).sleep().run(24);
     REQUIRE(scene.last.asleep == 3);

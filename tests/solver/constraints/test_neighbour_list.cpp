@@ -1,5 +1,5 @@
-// NeighbourList and StrayPairs: together they miss no contact as long as the list is valid, and a common motion makes
-// no strays.
+// NeighbourList and StrayPairs: together they miss no contact while the list is valid, and a common motion creates no
+// strays.
 #include "runtime/solver/constraints/neighbour_list.h"
 
 #include <random>
@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// Moving points, and the pairs of them that a search has not listed.
+// Moving points, and the pairs that a search has not listed.
 struct Swarm {
     std::vector<ProjectedPoint> at;
     std::vector<Vec3d> v;
@@ -49,8 +49,8 @@ struct Swarm {
 
 TEST_CASE("no points touch that a valid list does not hold", "[contacts]")
 {
-    const float largest = GENERATE(0.02f, 0.3f);    // m; the least is 0.02
-    const double wild = GENERATE(0.0, 3.0, 100.0);  // m/s, besides the common motion
+    const float largest = GENERATE(0.02f, 0.3f);    // m; the smallest is 0.02
+    const double wild = GENERATE(0.0, 3.0, 100.0);  // m/s, in addition to the common motion
     CAPTURE(largest, wild);
     std::mt19937 random(3);
     std::uniform_real_distribution<double> in(-1, 1);
@@ -58,7 +58,7 @@ TEST_CASE("no points touch that a valid list does not hold", "[contacts]")
     for (int k = 0; k < 400; ++k) {
         swarm.at.push_back({Vec3d(in(random), in(random), in(random)), 1});
         swarm.radius.push_back(k % 20 == 0 ? largest : 0.02f);
-        // A fall, a shear and a spin; and each its own way.
+        // A fall, a shear and a spin, plus an individual motion.
         const Vec3d& P = swarm.at.back().P;
         swarm.v.push_back(Vec3d(4 * P.y(), -20 - 3 * P.x(), 0) + wild * Vec3d(in(random), in(random), in(random)));
     }
@@ -90,7 +90,8 @@ TEST_CASE("a common motion does not expire the list, whatever others do far away
 
 TEST_CASE("of a few points that stray the pairs are found apart, of many the list expires", "[contacts]")
 {
-    // A lattice, out of reach of each other; in some rows the first and the third point come to the second.
+    // A lattice with points out of reach of each other; in some rows the first and the third point approach the
+    // second.
     const std::uint32_t side = 12, rows = GENERATE(0u, 1u, 17u, 18u);  // two strays each, of 1,728 points
     CAPTURE(rows);
     Swarm swarm;

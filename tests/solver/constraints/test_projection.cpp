@@ -1,4 +1,4 @@
-// What the projection of all constraints of a sub-step does together.
+// The joint projection of all constraints of a substep.
 #include <string>
 
 #include "runtime/base/error.h"

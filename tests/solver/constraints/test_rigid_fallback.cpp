@@ -38,7 +38,7 @@ struct Body {
     }
 
     Vec3d any() { return {number_(random_), number_(random_), number_(random_)}; }
-    // The velocities of a turn about the middle.
+    // Sets the velocities of a rotation about the center.
     void turn(const Vec3d& omega)
     {
         for (const std::uint32_t i : all) v[i] = omega.cross(start[i] - mean(start));

@@ -1,5 +1,5 @@
-// Energy and momentum of points that rods and springs link, where nothing else acts: random chains, trees and nets, of
-// masses over decades, at any number of sub-steps.
+// Energy and momentum of points linked by rods and springs, without other forces: random chains, trees and nets, with
+// masses over decades, at any number of substeps.
 #include <rapidcheck.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ struct Linked {
     Links links;
 };
 
-// n points in a ball, each linked to one before it; and so many links more.
+// n points in a ball, each linked to an earlier one, and `more` additional links.
 Linked random_links(unsigned seed, int n, int more, double decades)
 {
     std::mt19937 random(seed);
@@ -45,7 +45,7 @@ Linked random_links(unsigned seed, int n, int more, double decades)
     return made;
 }
 
-// A rod as long as it is at first.
+// A rod with its own discrete gradient.
 struct OwnRod : test::Rod {
     void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
                            std::array<Vec3d, 2>& gradient) const
@@ -98,7 +98,7 @@ TEST_CASE("rods give no energy, whatever they link and however they turn", "[con
         for (int f = 0; f < 12; ++f) {
             scene.run(1);
             const double now = energy_of_links(scene, linked);
-            // Positions and velocities are rounded once a frame.
+            // Positions and velocities are rounded once per frame.
             RC_ASSERT(now <= before * (1 + 1e-5));
             before = now;
         }
@@ -129,7 +129,7 @@ TEST_CASE("springs between points give no energy, however stiff", "[constraints]
         const double first = energy();
         for (int f = 0; f < 12; ++f) {
             scene.run(1);
-            // A place that is rounded by 6e-8 stretches a spring.
+            // A position rounded by 6e-8 stretches a spring.
             RC_ASSERT(energy() <= first * (1 + 1e-4) + 1e-14 * n / compliance);
         }
     });
@@ -142,7 +142,7 @@ TEST_CASE("two heavy points with a light hub between them lose less than 1 % a s
                         {1, 0.001f, 1},
                         links_of_chain(2)};
     Scene scene = scene_of(linked, 0, 16);
-    scene.run(1);  // takes off what is along the rods at first
+    scene.run(1);  // removes the initial velocities along the rods
     const double first = energy_of_links(scene, linked);
     scene.run(120);
     CHECK(energy_of_links(scene, linked) <= first * (1 + 1e-5));

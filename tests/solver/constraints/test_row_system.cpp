@@ -1,4 +1,4 @@
-// The linear system of rows in nets: the solution is that of a dense solver, and no iterate does work.
+// The linear system of rows in nets: the solution equals that of a dense solver, and no iterate does work.
 #include <Eigen/Dense>
 
 #include <random>

@@ -1,5 +1,5 @@
-// Sleep: piles at rest have the same bits from frame to frame; points that are hit, pushed, moved or unsupported wake,
-// and then moves as if it had never slept.
+// Sleep: piles at rest are bit-identical between frames; points that are hit, pushed, moved or unsupported wake and
+// then move as if they had never slept.
 #include "runtime/solver/constraints/sleep.h"
 
 #include <tbb/global_control.h>
@@ -20,7 +20,7 @@ using test::same_bits;
 using test::g;
 constexpr float r = 0.05f;
 
-// n spheres that fall into a box of the floor's friction, from a loose lattice.
+// n spheres that fall from a loose lattice into a box with the floor's friction.
 class Box : public Granular {
 public:
     explicit Box(std::size_t n, unsigned seed = 1) : Granular(lattice(n, seed), 0, 0.4f)
@@ -32,7 +32,7 @@ public:
         sleep();
     }
 
-    double energy() const  // J, of points of 1 kg
+    double energy() const  // J, for points of 1 kg
     {
         double sum = 0;
         for (std::size_t i = 0; i < points.size(); ++i) sum += 0.5 * v(i).squaredNorm() + g * P(i).y();
@@ -55,7 +55,7 @@ private:
     }
 };
 
-// Points of radius r on the floor, at rest for as long as it takes to sleep.
+// Points of radius r on the floor, after being at rest long enough to sleep.
 Granular asleep_on_floor(const std::vector<Vec3f>& at, float bounce = 0, float friction = 0)
 {
     Granular scene(points(at).set<float>("pscale", std::vector<float>(at.size(), r)), bounce, friction);
@@ -152,7 +152,7 @@ TEST_CASE("a shock wakes all points that it reaches: a sleeping cluster takes al
     scene.points.v().write()[0] = Vec3f(3, 0, 0);
     scene.run(10);
     CHECK(scene.momentum().x() == Approx(150).epsilon(0.02));
-    CHECK(scene.v(0).x() == Approx(2.5).epsilon(0.02));  // 150/56 where all stay together: the others fly off
+    CHECK(scene.v(0).x() == Approx(2.5).epsilon(0.02));  // 150/56 if all stay together: the others fly off
 }
 
 TEST_CASE("a sleeper that loses its support falls", "[sleep]")
@@ -197,11 +197,11 @@ TEST_CASE("a sleeper wakes when forces change, and moves by them", "[sleep]")
     scene.force([&](const Chunk&, std::size_t) { return Vec3d(push, 0, 0); });
     scene.sleep().run(12);
     REQUIRE(scene.last.asleep == 1);
-    push = 0.005;  // half a thousandth of its weight: it sleeps on
+    push = 0.005;  // half a thousandth of its weight: it continues to sleep
     scene.run(1);
     CHECK(scene.v().norm() == 0);
     push = 0.5;    // a twentieth, without friction
-    scene.run(1);  // all but the first of 8 sub-steps
+    scene.run(1);  // all except the first of 8 substeps
     CHECK(scene.v().x() == Approx(0.5 / 24 * 7 / 8).epsilon(1e-4));
     push = 4;
     scene.run(1);
@@ -254,7 +254,7 @@ TEST_CASE("a sleeper wakes under a larger load, and bears it", "[sleep]")
     Granular scene = asleep_on_floor({{0, r, 0}});
     scene.sleep().run(12);
     REQUIRE(scene.last.asleep == 1);
-    // Another is laid on it, a little to the side: both roll apart and come to lie on the floor.
+    // Another is placed on it, a little to the side: both roll apart and come to rest on the floor.
     scene.points.append(1);
     scene.points.id().write()[1] = 1;
     scene.points.P().write()[1] = Vec3f(0.2f * r, 2.9f * r, 0);

@@ -1,7 +1,7 @@
--- sleep, as scenes meet it: a heap that rests stays as it is, to the bit, and what comes to it wakes it.
+-- Sleep in scenes: a heap at rest stays bit-identical, and points that reach it wake it.
 local scene = require "testing.scene"
 
--- 100 grains of 0.1 m on a floor, by what stands after :contact.
+-- 100 grains of 0.1 m on a floor; `more` follows :contact.
 local function heap(more, solve)
   return ([[
 local function rising(frame)
@@ -28,7 +28,7 @@ local function same(a, b)
   return true
 end
 
--- A net of 36 knots in air that hangs on pins at its corners, by frames; with what is given in place of the default.
+-- A net of 36 knots in air that hangs on pins at its corners, by frames; `with` replaces defaults.
 local function net(with, last)
   local text = [[
 local places = {}
@@ -94,7 +94,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}}, 
 end)
 
 describe("sleep of linked points", function()
-  -- Whether the net of these frames sleeps at frame 300, and has moved again 24 frames later, by how much at most.
+  -- Asserts that the net sleeps at frame 300. Returns its largest motion in the 24 frames after that, and the result.
   local function moved(with)
     local result = net(with, 324)
     for f = 276, 300 do
@@ -113,7 +113,7 @@ describe("sleep of linked points", function()
     for i = 1, 36 do low = math.min(low, result[300][i].P.y) end
     assert.truthy(low < -0.05, low)
     for _, i in ipairs { 0, 5, 30, 35 } do assert.equal(0, result[300][i + 1].P.y) end
-    -- As it hangs without pins that hold it still: its mirror image in both axes is itself.
+    -- It hangs symmetrically, as it would without sleep.
     for i = 0, 5 do
       for j = 0, 5 do
         assert.near(result[300][6 * i + j + 1].P.y, result[300][6 * (5 - i) + j + 1].P.y, 1e-3)
@@ -175,7 +175,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
   end)
 end)
 
--- A grain of radius r on a plane that is turned by 20 degrees, for four seconds; friction in parts of the tangent.
+-- A grain of radius r on a plane that is tilted by 20 degrees, for four seconds; friction relative to the tangent.
 local function slope(with)
   local text = [[
 local angle, late = math.rad(20), function(frame) return frame.number > 48 end
@@ -195,7 +195,7 @@ end
 describe("what lies on a slope", function()
   local tangent = math.tan(math.rad(20))
 
-  -- How far it has slid after frame 48.
+  -- Returns the distance that it has slid after frame 48.
   local function slid(with)
     local result = slope(with)
     return (result[97][1].P - result[48][1].P):length(), result
@@ -220,7 +220,7 @@ describe("what lies on a slope", function()
       GRAVITY = ("function(f) local t = late(f) and %.17g or 0 return {9.81 * math.sin(t), -9.81 * math.cos(t), 0} end")
         :format(angle) }
     local along = 9.81 * (math.sin(math.rad(20) + angle) - 1.005 * tangent * math.cos(math.rad(20) + angle))
-    local expected = 0.5 * along * (48.4 / 24) ^ 2 -- gravity turns through frame 49, and is enough at a fifth of it
+    local expected = 0.5 * along * (48.4 / 24) ^ 2 -- gravity turns through frame 49, and suffices at a fifth of it
     assert.truthy(expected > 0.1)
     assert.near(expected, way, 0.02 * expected)
   end)

@@ -1,5 +1,5 @@
-// Sleep of points that rows link: they fall asleep in balance, and only there; all of an island wakes when any of it is
-// moved, hit, pulled or let go.
+// Sleep of points that rows link: they fall asleep only in balance, and a whole island wakes when any of it is moved,
+// hit, pulled or released.
 #include <tbb/global_control.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ double fastest(const Scene& scene)
     return most;
 }
 
-// A rope of links of 0.1 m that hangs from an immovable point, a little off, in air.
+// A rope of links of 0.1 m that hangs from an immovable point, slightly deflected, in air.
 Scene rope(std::size_t links, double compliance = 0)
 {
     std::vector<Vec3f> at;
@@ -71,7 +71,7 @@ void fall_asleep(Scene& scene, std::uint64_t all, int frames = 480)
 
 TEST_CASE("a pendulum of a long period never falls asleep, and keeps its phase", "[sleep]")
 {
-    // So small a swing that at its ends it is slower for half a second than what lies in a heap may be.
+    // The swing is so small that at its ends it is slower, for half a second, than the limit for points in a heap.
     const double length = 100, width = 0.1, omega = std::sqrt(g / length);
     const int substeps = GENERATE(1, 12);
     CAPTURE(substeps);
@@ -143,7 +143,7 @@ TEST_CASE("all of a sleeping rope wakes when any part of it changes", "[sleep]")
     {
         scene.gravity({0.01 * g, 0, 0}).run(240);
         CHECK(scene.P(10).x() == Approx(0.01).epsilon(0.05));
-        CHECK(scene.last.asleep == 10);  // there
+        CHECK(scene.last.asleep == 10);  // in the new position
     }
     SECTION("one of its points dies")
     {
@@ -151,7 +151,7 @@ TEST_CASE("all of a sleeping rope wakes when any part of it changes", "[sleep]")
         keep[5] = 0;
         scene.points.keep(keep);
         scene.run(1);
-        CHECK(scene.v(9).y() == Approx(-g / 24).epsilon(0.15));  // by drag
+        CHECK(scene.v(9).y() == Approx(-g / 24).epsilon(0.15));  // with drag
         CHECK(scene.P(4).y() == Approx(-0.4).margin(1e-3));
     }
     SECTION("its only row goes")
@@ -187,7 +187,7 @@ TEST_CASE("a rope wakes with the forces that it fell asleep with", "[sleep]")
     }
 }
 
-// What has slept has no free motion in the sub-step in which it is woken.
+// A woken sleeper has no free motion in the substep in which it wakes.
 TEST_CASE("a rope whose end a force wakes moves as an awake one", "[sleep]")
 {
     bool pulls = false;
@@ -259,7 +259,7 @@ TEST_CASE("a ball wakes all of a sleeping net, and is caught as by an awake one"
 {
     const auto caught = [](bool sleeps) {
         Granular scene = net(8, {0.3f, -10, 0.3f});
-        scene.points.column<float>("mass").write()[64] = immovable;  // held there at first
+        scene.points.column<float>("mass").write()[64] = immovable;  // held in place at first
         if (sleeps) fall_asleep(scene, 60, 720);
         scene.run(720 - static_cast<int>(scene.options.frame));
         CHECK(scene.last.asleep == (sleeps ? 60 : 0));
@@ -278,7 +278,7 @@ TEST_CASE("a ball wakes all of a sleeping net, and is caught as by an awake one"
     for (std::size_t f = 0; f < by_awake.size(); ++f) CHECK(by_sleeping[f] == Approx(by_awake[f]).margin(0.01));
 }
 
-// Pairs of grains, each a rod, that fall into a box, side by 2 side of them a layer.
+// Pairs of grains, each a rod, that fall into a box, with side by 2 side of them per layer.
 Granular dumbbells(std::int64_t n, std::int64_t side)
 {
     const float r = 0.05f;

@@ -1,5 +1,5 @@
-// Points that turn, against the closed forms of solid spheres: sliding that becomes rolling, slopes, rolling friction,
-// impacts; momentum, angular momentum and energy.
+// Points that turn, compared with closed forms of solid spheres: sliding that becomes rolling, slopes, rolling
+// friction, impacts; momentum, angular momentum and energy.
 #include "runtime/solver/constraints/spin.h"
 
 #include <tbb/global_control.h>
@@ -45,7 +45,7 @@ public:
     {
         return sum([&](std::size_t i) { return Vec3d(mass(i) * P(i).cross(v(i)) + inertia(i) * w(i)); });
     }
-    // In gravity, too.
+    // Optionally includes gravity.
     double energy(double gravity = 0) const
     {
         return sum([&](std::size_t i) {
@@ -159,10 +159,10 @@ TEST_CASE("friction that sticks leaves the surfaces of two spheres at one speed"
     Spinning scene(points({{-0.15f, 0, 0}, {0.15f, 0, 0}}).v({{4, 2, 0}, {0, 0, 0}}).set<float>("pscale", {0.1f, 0.1f}),
                    1, 10);
     scene.substeps(1).run(1);
-    // They touch with their middles in the direction n, at d - u s with |d - u s| = 0.2.
+    // Their centers touch in the direction n, at d - u s with |d - u s| = 0.2.
     const double s = (4 * 0.3 - std::sqrt(16 * 0.09 - 20 * (0.09 - 0.04))) / 20;
     const Vec3d n = Vec3d(-0.3 + 4 * s, 2 * s, 0) / 0.2, u(4, 2, 0), along = u - u.dot(n) * n;
-    const Vec3d impulse = -u.dot(n) * n - along / 7;  // of effective masses 1/2 and 1/7
+    const Vec3d impulse = -u.dot(n) * n - along / 7;  // effective masses 1/2 and 1/7
     CHECK_THAT(scene.v(0), close_to(Vec3d(u + impulse), 2e-6));
     CHECK_THAT(scene.v(1), close_to(Vec3d(-impulse), 2e-6));
     for (const std::size_t i : {0, 1}) CHECK_THAT(scene.w(i), close_to(Vec3d(2.5 / 0.1 * n.cross(along) / 7), 2e-5));
@@ -221,7 +221,7 @@ TEST_CASE("a cloud of spinning grains keeps its momenta, and gains no energy", "
         energy = scene.energy();
     }
     CHECK((scene.momentum() - momentum).norm() < 1e-5 * scale);
-    // Impacts keep it; an overlap that is recovered moves grains that pass each other.
+    // Impacts conserve it; recovering an overlap moves grains that pass each other.
     CHECK((scene.angular_momentum() - angular).norm() < 1e-4 * scale);
 }
 

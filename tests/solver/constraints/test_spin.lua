@@ -26,7 +26,7 @@ describe("spin of contact", function()
     assert.near({2, 0, 0}, scene.run(spun, { frames = {25, 25} })[25][1].v, 1e-4)
   end)
 
-  -- A disc in y <= 0 that turns about the y axis by 3 rad/s, and what is on it.
+  -- A disc in y <= 0 that turns about the y axis at 3 rad/s, with these points on it.
   local function on_disc(points, contact, frames)
     return scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { %s } } :gravity {} :attribute { pscale = 0.1 }
@@ -36,7 +36,7 @@ return rapid.create { fps = 24, points = rapid.points.from { %s } } :gravity {} 
       { frames = {1, frames} })
   end
 
-  -- The path of a ball that rolls on a disc is a circle, which it goes through at 2/7 of the disc's angular velocity.
+  -- A ball that rolls on a disc moves in a circle at 2/7 of the disc's angular velocity.
   it("rolls in circles on a disc that turns", function()
     -- Rolling: r ω = n × (v - V), V = Ω × P of the disc.
     local result = on_disc("P = {{1, 0.1, 0}}, v = {{0.5, 0, 0}}, w = {{30, 0, -5}}", "rolling = 0", 49)
@@ -55,7 +55,7 @@ return rapid.create { fps = 24, points = rapid.points.from { %s } } :gravity {} 
     end
   end)
 
-  -- From rest, friction that sticks gives a ball on top of another that is turned v = 2/7 of the speed of its surface.
+  -- From rest, sticking friction gives a ball on top of a turned one v = 2/7 of its surface speed.
   it("feels the speed of the surface, not that of its middle", function()
     local point = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.75, 0}} } }

@@ -22,7 +22,7 @@ PointSet row_of(std::size_t n, float spacing)
     return points;
 }
 
-// A chain whose first point is turned about the others, and falls.
+// A chain whose first point is turned around the others, and falls.
 Scene falling_chain(int substeps)
 {
     Scene scene(row_of(6, 0.1f));
@@ -32,7 +32,7 @@ Scene falling_chain(int substeps)
     return scene;
 }
 
-// Balls in a row that are pressed on a floor: what they remember decides what the next frame does.
+// Balls in a row pressed onto a floor: their memory determines the next frame.
 struct Pile {
     ShapeLoads loads;
     Scene scene;
@@ -96,7 +96,7 @@ TEST_CASE("changes by nodes, births and deaths are those of the shadows, too", "
     for (int f = 0; f < 12; ++f) {
         both([&](PointSet& points) {
             for (Vec3f& v : points.v().write()) v += Vec3f(0, 0, 0.25f);
-            if (f == 4) {  // one goes, and one comes that nothing holds
+            if (f == 4) {  // one point is removed, and an unconnected one is added
                 std::vector<std::uint8_t> keep(points.size(), 1);
                 keep[2] = 0;
                 points.keep(keep);
@@ -109,7 +109,7 @@ TEST_CASE("changes by nodes, births and deaths are those of the shadows, too", "
         const std::vector<double> found = errors_of_frame(errors, coarse).since_birth,
                                   expected = twice_the_distances(coarse, fine.run(1));
         REQUIRE(found.size() == expected.size());
-        // Velocities are added to in single precision, here and there.
+        // Velocities are sometimes added in single precision.
         for (std::size_t i = 0; i < found.size(); ++i) CHECK(found[i] == Approx(expected[i]).margin(1e-5));
         CHECK(*std::max_element(found.begin(), found.end()) > (f < 1 ? 0 : 1e-4));
     }

@@ -1,13 +1,13 @@
--- The error that a run reports, accumulated since birth, against the true one: that from a run of many sub-steps, of
--- all points, on scenes of different kinds.
+-- The error that a run reports, accumulated since birth, compared with the true error of all points, from a run with
+-- many substeps, on different kinds of scenes.
 local scene = require "testing.scene"
 local command = require "testing.command"
 local json = require "dkjson"
 
-local last = 25 -- a second
+local last = 25 -- one second
 local grid = "local start = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2, center = {0, 1, 0} } "
 
--- Each with the sub-steps of its run; %d stands for them.
+-- Each with the substeps of its run, inserted for %d.
 local scenes = {
   orbit = { 2, [[
 local P, v = {}, {}
@@ -106,11 +106,11 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { s
       .. "center = {0, 2, 0} } } "
     assert.same({ mean = 0, max = 0 }, told(points .. ":gravity {} :solve {}"))
     for _, chain in ipairs {
-      ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve {}", -- which takes half of 20 J/kg
+      ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve {}", -- which removes half of 20 J/kg
       ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve { tolerance = 1e-3 }",
       ":spring { stiffness = 1000 } :solve {}",
     } do
-      assert.truthy(told(points .. chain).max < 2e-3, chain) -- of up to 3 kJ/kg, to single precision
+      assert.truthy(told(points .. chain).max < 2e-3, chain) -- of up to 3 kJ/kg, in single precision
     end
   end)
 

@@ -1,7 +1,8 @@
--- What Rapid calls exact, over random scenes, against closed forms: drags and springs of which advice says that they
--- are treated exactly, springs to planes, quadratic drag alone, balls that bounce on planes, and what slides on them.
--- EXACT_SCENES=2000 EXACT_SEED=7 rapid test tests/solver/estimate
--- runs more, and others.
+-- Motions that Rapid calls exact, compared with closed forms over random scenes: drags and springs that the advice
+-- reports as treated exactly, springs to planes, quadratic drag alone, balls that bounce on planes, and points that
+-- slide on them.
+--   EXACT_SCENES=2000 EXACT_SEED=7 rapid test tests/solver/estimate
+-- runs more scenes with another seed.
 local ffi = require "ffi"
 local scene = require "testing.scene"
 local amount = require "tests.amount"
@@ -13,15 +14,15 @@ local scenes = amount.of("EXACT_SCENES", 20)
 local seed = tonumber(os.getenv "EXACT_SEED") or 1
 local fps, frames = 24, 12
 
--- As columns and parameters of points hold it.
+-- Round values as columns and parameters of points do.
 local function single(x) return tonumber(ffi.new("float[1]", x)[0]) end
 local function text(x) return ("%.9g"):format(x) end
 local function vector(size) return { single(between(-size, size)), single(between(-size, size)),
   single(between(-size, size)) } end
 local function list(v) return ("{%s, %s, %s}"):format(text(v[1]), text(v[2]), text(v[3])) end
 
--- x'' = G - k x' - w2 x, G constant, from x and v: x and v after t, along one axis. All by its two roots, or by complex
--- ones; without a spring by that of the drag.
+-- x'' = G - k x' - w2 x, G constant: returns x and v after t, from x and v, along one axis. Uses real or complex
+-- roots; without a spring, the closed form of the drag.
 local function moved(x, v, G, k, w2, t)
   if w2 == 0 and k == 0 then return x + v * t + G * t * t / 2 end
   if w2 == 0 then
@@ -42,7 +43,7 @@ local function moved(x, v, G, k, w2, t)
   return rest + a * math.exp(slow * t) + (y - a) * math.exp(fast * t)
 end
 
--- The nodes of a scene of linear forces, and what they add up to for a point: G, k and w2, w2q within G.
+-- Returns the nodes of a scene of linear forces, and their sum for a point: G, k and w2, with w2q included in G.
 local function linear_forces(points)
   local nodes, parts = {}, {}
   for _ = 1, pick { 1, 2, 3, 4 } do
@@ -122,14 +123,14 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
       local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
       for i, p in ipairs(points) do
         local D = p.k * p.k / 4 - p.w2
-        -- Near critical damping the roots of this closed form cancel.
+        -- Near critical damping, the roots of this closed form cancel.
         if p.w2 == 0 or math.abs(D) > 1e-3 * p.w2 then
           local x, off, size = set[i].P, 0, 0
           for axis, name in ipairs { "x", "y", "z" } do
             local expected = moved(p.P[axis], p.v[axis], p.G[axis], p.k, p.w2, frames / fps)
             off, size = math.max(off, math.abs(x[name] - expected)), math.max(size, math.abs(expected), 1)
           end
-          -- The rounding of P and v in each frame, of a motion that may turn in it.
+          -- The rounding of P and v in each frame, for a motion that may turn within it.
           if off > frames * 2 ^ -22 * (size + p.v[1] ^ 2 ^ 0.5) then
             faults[#faults + 1] = ("scene %d: point %d is off by %g m\n%s"):format(number, i - 1, off, source)
           end
@@ -140,7 +141,7 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
     assert.truthy(told > scenes / 3, told)
   end)
 
-  -- A unit vector and single numbers of its direction.
+  -- Returns a unit vector, and single-precision components of its direction.
   local function direction()
     local n = vector(1)
     n[2] = single(between(0.5, 2))
@@ -148,7 +149,7 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
     return all:normalized(), list(n), all:length()
   end
   local function as_vec3(v) return vec3(v[1], v[2], v[3]) end
-  -- Where the points of a scene are in its last frame, each beside where it must be: expected(p).
+  -- Compares the positions in a scene's last frame with the expected ones: expected(p).
   local function compare(source, points, expected, number, faults)
     local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
     for i, p in ipairs(points) do
@@ -258,7 +259,7 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
         end
         y = y + v * left + a * left * left / 2
         local off = math.abs(height { set[i].P.x, set[i].P.y, set[i].P.z } - surface - y)
-        for axis, name in ipairs { "x", "y", "z" } do -- along the plane nothing acts but g
+        for axis, name in ipairs { "x", "y", "z" } do -- along the plane only g acts
           local free = p.P[axis] + p.v[axis] * along + g[axis] * along ^ 2 / 2
           local slid = free - n[axis] / length * (height { p.P[1] + p.v[1] * along + g[1] * along ^ 2 / 2,
             p.P[2] + p.v[2] * along + g[2] * along ^ 2 / 2, p.P[3] + p.v[3] * along + g[3] * along ^ 2 / 2 })

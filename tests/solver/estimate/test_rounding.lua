@@ -1,8 +1,8 @@
--- What rounding of positions to single precision takes, and what a run tells of it.
+-- The effect of rounding positions to single precision, and the report of it.
 local scene = require "testing.scene"
 local json = require "dkjson"
 
--- The positions and the told rounding of the last frame of a run of these points.
+-- Returns the positions and the reported rounding of the last frame of a run of these points.
 local function run(points, nodes, frames)
   local head = "return rapid.create { fps = 24, points = rapid.points.from { %s } } %s :solve {}"
   local text = head:format(points, nodes)

@@ -22,7 +22,7 @@ PointSet points_with_ids(std::int64_t first, std::int64_t last)
     return points;
 }
 
-// A solver that takes every point `way` metres on.
+// A solver that moves every point by `way` metres.
 auto by(float way)
 {
     return [way](PointSet& points) {
@@ -37,7 +37,7 @@ std::vector<double> shadow_frame(Shadows& shadows, PointSet& points, float way, 
     return shadows.advance(points, by(finer_way));
 }
 
-// The same of a frame that is exact: the finer solver would find what the other has found.
+// The same for an exact frame: the finer solver would find the same result.
 std::vector<double> exact_frame(Shadows& shadows, PointSet& points, float way, int& solved)
 {
     shadows.begin(points, true);
@@ -58,7 +58,7 @@ TEST_CASE("errors of frames accumulate from a point's birth on", "[shadow]")
         const std::vector<double> errors = shadow_frame(shadows, points, 1, 1.25f);
         CHECK(errors == std::vector<double>(10, 2 * 0.25 * f));
     }
-    // Those born now have been off for one frame.
+    // Points born now have had errors for one frame.
     PointSet both = points_with_ids(0, 13);
     std::copy_n(points.P().read().data, 10, both.P().write().begin());
     std::vector<double> errors = shadow_frame(shadows, both, 1, 1.25f);
@@ -116,7 +116,7 @@ TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
         PointSet points = points_with_ids(0, next);
         shadow_frame(shadows, points, 0, 0);
         for (int f = 0; f < 4; ++f) {
-            // Of a stretch many die, elsewhere few.
+            // Many points of one stretch die, few elsewhere.
             const auto first = *rc::gen::inRange<std::size_t>(0, points.size());
             const auto odds = *rc::gen::container<std::vector<int>>(points.size(), rc::gen::inRange(0, 10));
             std::vector<std::uint8_t> keep(points.size());
@@ -136,9 +136,9 @@ TEST_CASE("points with shadows are found again wherever others die", "[shadow]")
 
 TEST_CASE("what a position loses by rounding is what is left of its way beyond whole spacings", "[shadow]")
 {
-    const float spacing = 0x1p-23f;  // of places from 1 to 2
+    const float spacing = 0x1p-23f;  // of positions from 1 to 2
     const double h = 0.5, part = GENERATE(0.0, 0.25, -0.375);
-    const int more = GENERATE(0, 3, -2);  // spacings, by what no velocity tells: a contact, a node
+    const int more = GENERATE(0, 3, -2);  // spacings due to something other than the velocity: a contact, a node
     CAPTURE(part, more);
     Shadows shadows;
     PointSet points = points_with_ids(0, 1);
@@ -158,7 +158,7 @@ TEST_CASE("exact frames are not solved again while no shadow differs from its po
     int solved = 0;
     CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>{0});
     CHECK(solved == 0);
-    // From here on the errors that there are go on being told, of those too that were born in between.
+    // From here on, existing errors continue to be reported, including those of points born in between.
     CHECK(shadow_frame(shadows, points, 1, 1.25f) == std::vector<double>(20, 0.5));
     CHECK(exact_frame(shadows, points, 1, solved) == std::vector<double>(20, 0.5));
     CHECK(solved == 1);

@@ -12,7 +12,7 @@ namespace {
 using namespace test;
 using Catch::Matchers::Equals;
 
-// A drag and a spring to the origin that the integrator solves.
+// A drag and a spring to the origin, which the integrator solves.
 class LinearForce : public Force {
 public:
     LinearForce(double k, double w2, double c = 0) : k_(k), w2_(w2), c_(c) { node = "linear1"; }
@@ -80,7 +80,7 @@ TEST_CASE("an attraction is reported by its omega dt, with the errors of a frame
     CHECK(found[0].kind == Stiffness::Oscillation);
     CHECK(found[0].step == Approx(1.9).epsilon(1e-6));
     REQUIRE(found[0].cure);
-    CHECK(found[0].cure->substeps == 8);  // 1.9 / 8 is the first half of a half that is below 1/4
+    CHECK(found[0].cure->substeps == 8);  // the first halving of 1.9 that falls below 1/4
 
     const Vec3d right(std::cos(omega * h), 0, 0.5 / omega * std::sin(omega * h));
     for (const auto& [substeps, error] :

@@ -1,9 +1,9 @@
--- solve{ tolerance }: sub-steps by each point's own estimated error; and the error that every run reports.
+-- solve{ tolerance }: substeps from each point's own estimated error; and the error that every run reports.
 local scene = require "testing.scene"
 local command = require "testing.command"
 local json = require "dkjson"
 
--- Points on ellipses about an attractor: far ones are easy, near ones stiff.
+-- Points on ellipses around an attractor: far ones are easy, near ones stiff.
 local orbits = [[
 return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} } }
   :attract { strength = 5 } :solve { %s }]]
@@ -32,7 +32,7 @@ describe("a tolerance", function()
     end
   end)
 
-  -- Runs of 1 and 2 sub-steps find a contact of the second half at the same place, and agree on what is wrong with it.
+  -- Runs of 1 and 2 substeps find a contact in the second half at the same position, and agree on its error.
   for _, method in ipairs { "project", "backtrack" } do
     it("holds for contacts that " .. method .. " finds after the step", function()
       local text = [[
@@ -57,7 +57,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } } :g
       assert.equal(all[i].P, alone[1].P)
       assert.equal(all[i].v, alone[1].v)
     end
-    -- What one and two sub-steps tend to is enough for the first, and not for the last.
+    -- The limit of one and two substeps suffices for the first point, and not for the last.
     local one, two = frame_two "substeps = 1", frame_two "substeps = 2"
     local function tends_to(i) return two[i].P + (two[i].P - one[i].P) / 3 end
     assert.truthy((all[1].P - tends_to(1)):length() < 1e-6)

@@ -1,4 +1,4 @@
-// The check of what a tolerance promises: what it finds that doubling does not, when it looks, and how much it solves.
+// The check of a tolerance: errors that doubling does not find, its timing, and its cost.
 #include "runtime/solver/estimate/tolerance_check.h"
 
 #include <atomic>
@@ -21,12 +21,13 @@ PointSet line_of(std::size_t n)
     return test::points(places);
 }
 
-// How often points were asked for their force.
+// Number of times that points were queried for their force.
 struct Work {
     std::uint64_t in_run = 0, in_check = 0;
 };
 
-// One step of a scene as Solve takes it; the sample is what would have shadows. Returns the points beyond.
+// Runs one step of a scene like Solve; the sample holds the points that would have shadows. Returns the number of
+// points beyond the tolerance.
 std::uint64_t step(Scene& scene, ToleranceCheck& check, const std::atomic<std::uint64_t>& asked, Work& work)
 {
     std::vector<std::uint32_t> chosen;
@@ -71,7 +72,7 @@ TEST_CASE("the check of a tolerance finds a force that halved steps meet at one 
 {
     std::atomic<std::uint64_t> asked = 0;
     Scene scene(line_of(2000));
-    const double wave = 2 * M_PI * 24 * 4;  // by frames of 1/24 s: zero in the middles of one and two sub-steps
+    const double wave = 2 * M_PI * 24 * 4;  // for frames of 1/24 s: zero at the middles of one and two substeps
     scene.force([&](const Chunk& chunk, std::size_t i) {
         return Vec3d(chunk.P[i].x() < 0.05 ? 0 : 1000 * std::sin(wave * chunk.time[i]), 0, 0);
     });

@@ -33,7 +33,7 @@ struct Crowd {
     OwnTime time(bool own) const { return own ? OwnTime{h, {dt.data(), 1}} : OwnTime{h}; }
 };
 
-// Whether a parabola, sampled along it, comes within a margin of a box.
+// Returns true if a parabola, sampled along its length, comes within a margin of a box.
 bool comes_near(const Vec3d& P, const Vec3d& v, double t, const Box3d& box, double margin)
 {
     for (int k = 0; k <= 256; ++k) {
@@ -66,7 +66,7 @@ TEST_CASE("points fall along their parabolas, each for its own time", "[ballisti
 TEST_CASE("points that come near a box are not advanced, and are listed in order", "[ballistic]")
 {
     const double radius = GENERATE(0.0, 0.1);
-    const double away = GENERATE(0.0, 1.0, 1.2, 1.3, 1.34, 1.5, 4.0);  // the fastest come by a third of a metre
+    const double away = GENERATE(0.0, 1.0, 1.2, 1.3, 1.34, 1.5, 4.0);  // the fastest move by a third of a metre
     CAPTURE(radius, away);
     const std::size_t n = 1003;
     const Crowd crowd(n);
@@ -77,7 +77,7 @@ TEST_CASE("points that come near a box are not advanced, and are listed in order
     BallisticBatch batch(gravity, 0);
     for (const Box3d& box : boxes) batch.avoid(box, radius);
     std::vector<Vec3f> P = crowd.P, v = crowd.v;
-    std::vector<std::uint32_t> near{42};  // entries of before are kept
+    std::vector<std::uint32_t> near{42};  // earlier entries are kept
     batch.advance(P, v, crowd.time(true), 0, n, near);
 
     REQUIRE(near.front() == 42);
@@ -94,12 +94,12 @@ TEST_CASE("points that come near a box are not advanced, and are listed in order
         if (comes) REQUIRE(stays[i]);
         met += comes;
     }
-    // The bounding boxes of paths are larger than paths, but not so much that all points are listed.
+    // The bounding boxes of paths are larger than the paths, but only so much that not all points are listed.
     if (away == 0) CHECK(met > 100);
     CHECK(near.size() - 1 <= 2 * met + 8);
 }
 
-// v' = gravity - k v, by its closed form; k t not so small that it cancels.
+// v' = gravity - k v, by its closed form; k t is large enough that it does not cancel.
 struct DraggedPoint {
     Vec3d P, v;
 

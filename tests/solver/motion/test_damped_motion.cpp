@@ -1,4 +1,4 @@
-// The damped oscillator, against its closed forms in long double.
+// The damped oscillator, compared with its closed forms in long double.
 #include "runtime/solver/motion/damped_motion.h"
 
 #include <cmath>
@@ -8,7 +8,7 @@
 namespace rapid {
 namespace {
 
-// Of drag alone; for small k t by series, where the closed forms cancel.
+// Drag alone; for small k t by series, because the closed forms cancel.
 struct Exact {
     long double x_of_v, x_of_G, v_of_v;
 
@@ -85,7 +85,7 @@ TEST_CASE("a damped spring has its closed form below, at and above critical damp
     }
 
     const Propagator found = respond(k, w2, t);
-    const double phase = 1e-15 * std::max(1.0, std::sqrt(w2) * t);  // of a rounded angle
+    const double phase = 1e-15 * std::max(1.0, std::sqrt(w2) * t);  // due to a rounded angle
     CHECK(found.x_of_v == Approx(double(S)).epsilon(1e-13).margin(phase / std::sqrt(w2)));
     CHECK(found.v_of_v == Approx(double(slope)).epsilon(1e-13).margin(4 * phase));
     CHECK(found.v_of_G == Approx(double(S)).epsilon(1e-13).margin(phase / std::sqrt(w2)));
@@ -98,7 +98,7 @@ TEST_CASE("responses compose: two half times are the whole", "[damped]")
     const double t = GENERATE(1e-3, 1.0 / 24, 1.0);
     CAPTURE(k, w2, t);
     const Propagator half = respond(k, w2, t / 2), whole = respond(k, w2, t);
-    // G is the acceleration at rest at the position of the point: less by w2 x.
+    // G is the acceleration at rest at the position of the point: lower by w2 x.
     const auto twice = [&](double v, double G) {
         const double x1 = v * half.x_of_v + G * half.x_of_G, v1 = v * half.v_of_v + G * half.v_of_G;
         const double G1 = G - w2 * x1;

@@ -27,7 +27,7 @@ State after(const Vec3d& v, const Vec3d& G, double k, double c, double t, int st
     return now;
 }
 
-// By Runge-Kutta steps of order 4.
+// Runge-Kutta steps of order 4.
 State reference(const Vec3d& v, const Vec3d& G, double k, double c, double t)
 {
     const auto a = [&](const Vec3d& u) { return Vec3d(G - (k + c * u.norm()) * u); };
@@ -103,7 +103,7 @@ TEST_CASE("with linear and quadratic drag and an acceleration along the motion, 
         CAPTURE(k, c, t, speed, g);
         const State whole = after(speed * along, g * along, k, c, t);
         const State parts = after(speed * along, g * along, k, c, t, 7);
-        // Of accelerations far below the drag the closed form loses a few digits.
+        // For accelerations far below the drag, the closed form loses a few digits.
         CHECK((whole.x - parts.x).norm() <= 1e-7 * parts.x.norm() + 1e-8 * speed / (k + c * speed));
         CHECK((whole.v - parts.v).norm() <= 1e-7 * parts.v.norm() + 1e-9 * speed);
     }
@@ -193,7 +193,7 @@ TEST_CASE("a fast point slides on a floor as far as its drag lets it", "[quadrat
     scene.dynamics.add(std::make_shared<Air>(c));
     const double distance = scene.run(1).P().x(), alone = std::log1p(c * speed / 24) / c;
     CHECK(distance <= alone * 1.001);
-    CHECK(distance >= alone * (speed > 1000 ? 0.75 : 0.995));  // slower than it could fall, it counts as falling
+    CHECK(distance >= alone * (speed > 1000 ? 0.75 : 0.995));  // below terminal speed, it counts as falling
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ private:
     Vec3d a_;
 };
 
-// The dynamics of a chain that adds these, in this order.
+// Returns the dynamics of a chain that adds these, in order.
 template <class... D>
 Dynamics chain(const D&... added)
 {

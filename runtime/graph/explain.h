@@ -45,7 +45,7 @@ struct Explanation {
     std::vector<ExplainedNode> nodes;
     // Kept ones first, by simulation and in order of name.
     std::vector<ExplainedAttribute> attributes;
-    std::vector<ExplainedFunction> functions;  // parameters of kept nodes, in the order of these
+    std::vector<ExplainedFunction> functions;  // parameters of kept nodes, in their order
     std::vector<ExplainedStage> stages;
     std::vector<std::vector<std::string>> passes;  // names of nodes
     // Reasons that no subset of the points can be simulated alone; empty if one can.

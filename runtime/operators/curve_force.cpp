@@ -103,7 +103,7 @@ struct CurveForce {
         const Strided<float> along = chunk.read(speed), towards = chunk.read(pull), rate = chunk.read(drag);
         const Strided<float> reach = radius ? chunk.read(*radius) : Strided<float>{nullptr, 0};
         std::vector<Vec3d> P, v;
-        double time = std::numeric_limits<double>::quiet_NaN();  // of these
+        double time = std::numeric_limits<double>::quiet_NaN();  // of P and v
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             if (curve.step && chunk.time[i] != time) curve.step->at(time = chunk.time[i], P, v);
             const Nearest nearest = nearest_to(chunk.P[i], *lines, curve.step ? P : curve.P, v);

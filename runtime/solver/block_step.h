@@ -1,6 +1,6 @@
-// The sub-steps of one block of points: forces, motion among the colliders, actions.
+// The substeps of one block of points: forces, motion among the colliders, actions.
 //
-//   no actions     x(t + dt) by the forces at the middle of the sub-step
+//   no actions     x(t + dt) by the forces at the middle of the substep
 //   with actions   half a drift, all actions, half a drift: second order (numerics.md, Motion)
 //
 // This exists alongside the ballistic batch, which needs no substeps, because forces that vary between points, actions

@@ -44,7 +44,7 @@ void at_node(const Dynamic& dynamic, const F& f)
     }
 }
 
-// A force: called once per sub-step for each chunk, from any thread.
+// A force: called once per substep for each chunk, from any thread.
 class Force : public Dynamic {
 public:
     virtual void contribute(const Chunk& chunk, Forces& forces) const = 0;
@@ -76,7 +76,7 @@ public:
     virtual void act(const Chunk& chunk, std::span<Vec3d> force, std::span<std::uint8_t> dead) = 0;
 };
 
-// An action operator (paper §2.3): changes points at every sub-step, inside Solve, while they are in cache.
+// An action operator (paper §2.3): changes points at every substep, inside Solve, while they are in cache.
 class Action : public Dynamic {
 public:
     // Is called before a step, on one thread. Makes the columns that act() writes writable.

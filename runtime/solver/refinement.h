@@ -14,7 +14,7 @@ struct Obstacle;
 
 // The kind of a point's path through the frame, by how its error decreases with the substeps.
 enum class PathKind : std::uint8_t {
-    Exact,   // a closed form for the whole frame: sub-steps would only repeat it
+    Exact,   // a closed form for the whole frame: substeps would only repeat it
     Smooth,  // forces alone: second order
     Acted,   // actions as well: first or second order
     Broken,  // by contacts

@@ -1,10 +1,10 @@
-// Advances points by one frame: forces, integration, collision and constraints, at each sub-step (paper §2.1, §2.3,
+// Advances points by one frame: forces, integration, collision and constraints, at each substep (paper §2.1, §2.3,
 // §4).
 //
 //   step_scene       the dynamics of the chain, resolved for the points
 //   uncoupled_step   without constraints: each block goes through the whole frame while it is in cache
-//   coupled_step     with constraints: the sub-step is the barrier
-//   block_step       one sub-step of a block: forces, motion, collision, actions
+//   coupled_step     with constraints: the substep is the barrier
+//   block_step       one substep of a block: forces, motion, collision, actions
 #pragma once
 
 #include <cstdint>

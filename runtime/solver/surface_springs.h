@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-// The potential energy of springs to the surfaces of shapes, and the velocities of these.
+// The potential energy of springs to the surfaces of shapes, and the velocities of the surfaces.
 
 // Returns the potential energy of a point at P, J/kg: w2 φ²/2, with the shape's distance φ at the spring's time, if
 // its gradient is defined.

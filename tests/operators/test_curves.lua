@@ -113,7 +113,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
     -- Tolerance for the positions of the line in single precision: 1e-7 m per frame.
     assert.near(1.5, p.P.y, 5e-6)
     assert.near(2 * (1 - (1 - math.exp(-6)) / 6), p.P.x, 2e-5)
-    assert.near({2 * (1 - math.exp(-6)), 1.5, 0}, p.v, 1e-4) -- of second order in the sub-step
+    assert.near({2 * (1 - math.exp(-6)), 1.5, 0}, p.v, 1e-4) -- of second order in the substep
   end)
 
   it("is that of a spring to where it is at the time of each sub-step", function()

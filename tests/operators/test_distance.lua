@@ -171,7 +171,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.
       end
       assert.equal(2, #ends)
       assert.same({ 0, 1 }, { ends[1].id, ends[2].id })
-      assert.near(-part * 0.5, ends[2].Py, 0.01) -- a sub-step is a hundredth of the swing
+      assert.near(-part * 0.5, ends[2].Py, 0.01) -- a substep is a hundredth of the swing
       assert.near(math.sqrt(2 * 9.81 * 0.5 * part), math.sqrt(ends[2].vx ^ 2 + ends[2].vy ^ 2), 0.02)
       assert.matches("broken   1 pair, the first in frame %d", result.stderr .. result.stdout)
       assert.matches('"broken":1', (scene.folder:read "s.json"):gsub("%s", ""), 1, true)

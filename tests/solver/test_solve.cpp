@@ -153,7 +153,7 @@ TEST_CASE("the energy of an orbit stays bounded", "[solve]")
 TEST_CASE("forces are evaluated at the middle of each point's own sub-step", "[solve]")
 {
     Scene scene(points({{0, 0, 0}, {0, 0, 0}}).v({{1, 0, 0}, {1, 0, 0}}).set<float>("dt", {1, 0.5f}));
-    std::vector<std::array<double, 3>> heard[2];  // time, dt, x of each sub-step
+    std::vector<std::array<double, 3>> heard[2];  // time, dt, x of each substep
     scene.force([&](const Chunk& chunk, std::size_t i) {
         heard[i].push_back({chunk.time[i], chunk.dt[i], chunk.P[i].x()});
         return Vec3d(0, 0, 0);

@@ -161,7 +161,7 @@ void Collisions::limit_energy(std::size_t displaced)
         Vec3d &P = block_.P[i], &v = block_.v[i], by = Vec3d::Zero();
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
-        // As seen from the shape that a spring attaches the point to, which moves with V.
+        // The frame is that of the shape that a spring attaches the point to, which moves with V.
         const Vec3d from = motion_.initial_P(i) + by, V = motion_.frame_velocity(i, from), way = block_.dt[i] * V;
         const Vec3d v0 = motion_.initial_v(i) - V;
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);

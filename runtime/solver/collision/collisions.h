@@ -71,7 +71,7 @@ private:
     TouchedPoints& touched_;
     ContactAudit& audit_;
     bool is_used_ = false;
-    std::vector<Vec3d> initial_P_;        // at the beginning of the sub-step
+    std::vector<Vec3d> initial_P_;        // at the beginning of the substep
     std::vector<double> position_error_;  // m
     DistanceQuery query_;
 };

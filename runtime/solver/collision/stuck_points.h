@@ -50,7 +50,7 @@ public:
         Vec3d P, v;  // before
         Vec3d to_P, to_v;
     };
-    const std::vector<Carried>& carried() const { return carried_; }  // in this sub-step
+    const std::vector<Carried>& carried() const { return carried_; }  // in this substep
 
     // has() returns true if a point is glued, holds_for_good() if in addition nothing can tear it off, and takes() if
     // it is glued or released.

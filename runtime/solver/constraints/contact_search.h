@@ -90,9 +90,9 @@ private:
     CellSorter sorter_;
     std::vector<std::uint32_t> members_;        // of a grid
     std::vector<std::vector<Found>> found_;     // by grids and chunks of spheres; keeps its memory for reuse
-    std::size_t used_ = 0;                      // number of these in use
+    std::size_t used_ = 0;                      // parts of found_ in use
     Found pairs_;                               // by buckets of points
-    std::vector<std::uint32_t> starts_, ends_;  // of these, by bucket and source
+    std::vector<std::uint32_t> starts_, ends_;  // of pairs_, by bucket and source
 };
 
 }  // namespace rapid

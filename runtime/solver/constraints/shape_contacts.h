@@ -47,7 +47,7 @@ std::vector<ShapeGrip> shape_grips(std::span<const std::uint32_t> points, std::s
 struct ShapeQuery {
     std::span<const Vec3d> free;             // positions after the points' free motion
     std::size_t begin = 0;                   // the chunk's first point
-    double since = 0;                        // s, from the beginning of the frame to the end of the sub-step
+    double since = 0;                        // s, from the beginning of the frame to the end of the substep
     std::vector<std::uint32_t> open;         // points that may be near some shape
     std::vector<double> moved, since_asked;  // m, in this substep, and since distances were first queried; by chunk
 

@@ -84,7 +84,7 @@ public:
     // inverse_mass: 1/kg; 0 for points that do not move and thus do not sleep. after: s.
     Sleep(PointSet& points, std::span<const double> inverse_mass, double after);
 
-    // Before the first sub-step, from constraints:
+    // Before the first substep, from constraints:
     void keep_awake(std::size_t i) { kept_awake_[i] = 1, wake(i); }  // in this frame; may be called later, too
     void keep_all_awake();
     void link(std::span<const std::uint32_t> points) { islands_.link(points); }  // by a row between them

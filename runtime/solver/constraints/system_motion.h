@@ -319,7 +319,7 @@ private:
     std::vector<std::uint32_t> points_;              // of the rows, ascending
     std::vector<Vec3d> from_, to_, moved_, free_v_;  // by point: beginning, estimate of the end, m; m/s
     std::vector<double> inverse_mass_;               // by point, 1/kg
-    std::vector<double> stretch_;                    // by row, m: that goes with its force
+    std::vector<double> stretch_;                    // by row, m: stretch that fits its force
 };
 
 }  // namespace rapid

@@ -57,7 +57,7 @@ private:
     void advance_blocks()
     {
         const std::span<Vec3f> P = points_.P().write(), v = points_.v().write();
-        std::map<int, UnfinishedPoints> left;  // by the sub-steps of their next run
+        std::map<int, UnfinishedPoints> left;  // by the substeps of their next run
         const auto collect = [&](StepDoubling& run) {
             for (const auto& [substeps, rest] : run.unfinished()) left[substeps].append(rest);
             dead_.insert(dead_.end(), run.dead().begin(), run.dead().end());

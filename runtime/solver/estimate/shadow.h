@@ -1,4 +1,4 @@
-// Global error estimate by step halving: a sample of the points has shadows, which take twice the sub-steps, and the
+// Global error estimate by step halving: a sample of the points has shadows, which take twice the substeps, and the
 // difference of point and shadow accumulates since the point's birth.
 //
 // The sample is every point while there are up to 1,000, and then the points whose ids come first in a fixed random

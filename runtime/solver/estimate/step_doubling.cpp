@@ -100,7 +100,7 @@ private:
         open_.resize(open);
     }
 
-    // Ends the block, after a run with this many sub-steps.
+    // Ends the block, after a run with this many substeps.
     void finish(int substeps)
     {
         for (std::size_t i = 0; i < indices_.size(); ++i) {

@@ -1,4 +1,4 @@
-// Step doubling: runs of points through a frame with n, 2n, 4n, ... sub-steps, until each point's result is good enough
+// Step doubling: runs of points through a frame with n, 2n, 4n, ... substeps, until each point's result is good enough
 // (error_control.h). The runs of a block are taken while it is in cache.
 #pragma once
 
@@ -89,7 +89,7 @@ public:
         constexpr double infinity = std::numeric_limits<double>::infinity();
         Difference off{infinity, infinity};
         if (lives && runs_ > 1)
-            // Runs that find a contact at the end of the same sub-step share its error.
+            // Runs that find a contact at the end of the same substep share its error.
             off.run = off.best = std::max(distance2(P - P_[0][i], v - v_[0][i]), squared(end.put_off[i]));
         else if (dies && died_[i])
             off = {0, 0};

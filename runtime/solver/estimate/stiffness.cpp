@@ -56,7 +56,7 @@ struct Jacobians {
     Eigen::Matrix3d by_position, by_velocity;
 };
 
-// The sample points in the middle of their first sub-step.
+// The sample points in the middle of their first substep.
 class Sample {
 public:
     Sample(const PointSet& points, std::span<const std::uint32_t> indices, const SolveOptions& options)

@@ -17,7 +17,7 @@ namespace rapid {
 
 class FreePaths {
 public:
-    // Shapes [n]; m, m/s, m/s², s. The accelerations are constant within the sub-step.
+    // Shapes [n]; m, m/s, m/s², s. The accelerations are constant within the substep.
     void begin(std::span<const Vec3d> P, std::span<const Vec3d> v, Strided<Vec3d> a, std::span<const double> dt);
 
     // Replaces the end of a point whose final state is not that of its parabola.

@@ -174,7 +174,7 @@ TEST_CASE("a body without a solution goes as a surface that accelerates and draw
     const std::vector<Mobility> mobility(4, {0.1, 0.005});
     const Vec3d a(3, -2, 5);
     const ShapePtr falls = moving(make_sphere_shape(0.3, Vec3d::Zero()), Falling(a), {1, 0}, 0, 1);
-    const std::vector<SurfaceSpring> springs(4, {1, falls.get(), 0.5});  // at the end of a sub-step of 0.1 s
+    const std::vector<SurfaceSpring> springs(4, {1, falls.get(), 0.5});  // at the end of a substep of 0.1 s
     body.step.mobility = mobility;
     body.step.surface_springs = springs;
     const std::vector<Vec3d> start = body.start;

@@ -1,4 +1,4 @@
-// The ballistic batch, against the parabola in double precision, and against the sub-steps of other points.
+// The ballistic batch, against the parabola in double precision, and against the substeps of other points.
 #include "runtime/solver/motion/ballistic_batch.h"
 
 #include <cmath>

@@ -69,7 +69,8 @@ private:
     Substep now_;
     std::optional<ContactForces> forces_;  // set if they are recorded
     std::optional<SpinState> spin_;        // set if points turn
-    // Obstacles without friction, for the free motion of turning points; their friction also turns them.
+    // Obstacles without friction on turning points, for their free motion; the projection applies that friction, which
+    // also turns them.
     std::vector<Obstacle> smooth_;
     std::vector<std::vector<float>> smooth_friction_;
     std::optional<Sleep> sleep_;   // set if points may sleep

@@ -157,7 +157,7 @@ TEST_CASE("the error of edits that go together is that of the first edit that fa
                                     static_cast<std::size_t>(GENERATE(1, 2, 7)));
     std::mt19937 random(3);
     for (int round = 0; round < 50; ++round) {
-        // The indices at which each of four edits fails, in random order; the last edit never fails.
+        // Up to three random indices at which each of four edits fails.
         std::vector<std::vector<std::size_t>> fails(4);
         for (auto& at : fails)
             for (int n = static_cast<int>(random() % 4); n > 0; --n) at.push_back(random() % 20500);

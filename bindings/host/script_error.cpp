@@ -46,6 +46,8 @@ std::optional<EngineError> engine_error(lua_State* L, const std::string& message
             lua_getfield(L, -1, "message");
             found = {text_at(L, -1), full_stack, is_memory};
         }
+    } else if (message.ends_with("not enough memory")) {  // while a state is made there is no table yet
+        found = {message, false, true};
     }
     lua_settop(L, top);
     return found;

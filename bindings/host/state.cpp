@@ -67,14 +67,19 @@ std::filesystem::path bytecode_description(lua_State* L)
     return {};
 }
 
+// Pushes a chunk of Rapid's own Lua. Throws Error if it does not compile or memory runs out.
+void load_own(lua_State* L, const std::string& text, const std::string& name)
+{
+    if (const int status = luaL_loadbuffer(L, text.data(), text.size(), name.c_str()); status != 0)
+        throw Error(lua_tostring(L, -1), status == LUA_ERRMEM ? ErrorKind::OutOfMemory : ErrorKind::Fault);
+}
+
 // Makes require(name) run the file.
 void preload(lua_State* L, const std::string& name, const std::filesystem::path& file)
 {
     lua_getglobal(L, "package");
     lua_getfield(L, -1, "preload");
-    const std::string text = read_text(file);
-    if (luaL_loadbuffer(L, text.data(), text.size(), fmt::format("=[rapid {}]", name).c_str()) != 0)
-        throw Error(lua_tostring(L, -1));
+    load_own(L, read_text(file), fmt::format("=[rapid {}]", name));
     lua_setfield(L, -2, name.c_str());
     lua_pop(L, 2);
 }
@@ -205,9 +210,7 @@ void State::open_libraries()
 void State::run_host_file()
 {
     const std::filesystem::path folder = lua_folder();
-    const std::string text = read_text(folder / "host.lua");
-    if (const int status = luaL_loadbuffer(L_, text.data(), text.size(), "=[rapid host]"); status != 0)
-        throw Error(lua_tostring(L_, -1), status == LUA_ERRMEM ? ErrorKind::OutOfMemory : ErrorKind::Fault);
+    load_own(L_, read_text(folder / "host.lua"), "=[rapid host]");
     push_natives(*this, read_text(folder / "chunk.h"));
     call(1, 1);
     entries_ = luaL_ref(L_, LUA_REGISTRYINDEX);

@@ -143,7 +143,6 @@ TEST_CASE("the folders of the architecture are those that there are", "[docs]")
     for (const auto& match : matches(layers, std::regex(R"re(\n\| `((?:runtime|bindings)/[\w/]*)`)re")))
         described.insert(match[1]);
     for (const char* top : {"runtime", "bindings"}) {
-        if (top == std::string("runtime")) found.insert("runtime/");
         for (const auto& entry : fs::recursive_directory_iterator(project / top))
             if (entry.is_directory() && entry.path().filename() != "__pycache__")
                 found.insert(fs::relative(entry.path(), project).string() + '/');

@@ -9,9 +9,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A cube of 1 m on the ground stands in for the reader's model.
-const char* const cube =
-    "v -.5 0 -.5\nv .5 0 -.5\nv .5 1 -.5\nv -.5 1 -.5\nv -.5 0 .5\nv .5 0 .5\nv .5 1 .5\nv -.5 1 .5\n"
+// A box on the ground stands in for the reader's model.
+const char* const box =
+    "v -1 0 -1\nv 1 0 -1\nv 1 1 -1\nv -1 1 -1\nv -1 0 1\nv 1 0 1\nv 1 1 1\nv -1 1 1\n"
     "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n";
 
 }  // namespace
@@ -24,7 +24,7 @@ TEST_CASE("each scene of the guide emits points and names its camera", "[docs]")
     for (const auto& scene : scenes) {
         CAPTURE(scene[1]);
         const test::TemporaryFolder folder;
-        folder.write("statue.obj", cube);
+        folder.write("statue.obj", box);
         const fs::path file = folder.write(scene[1], scene[2]);
         const Session session(file, {});
         const Plan plan(session.graph(), {});

@@ -544,7 +544,7 @@ TEST_CASE("the kind of an error does not follow from its words", "[scene]")
             "return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }\n"
             "  :points('fails', function(p) " +
             script + " end) :solve {}");
-        CHECK(scene.advance().error().kind == SceneError::FailedFrame);
+        CHECK(scene.advance_to(2).error().kind == SceneError::FailedFrame);
     }
 }
 

@@ -147,7 +147,7 @@ struct CFace {
     }
     Answer inspect(Scene scene, const Frame* frame, std::int64_t& next)
     {
-        return answer([&](rapid_error** e) {
+        return answer([&](rapid_error** e) -> int {
             const char* text = nullptr;
             int same = 0;
             if (frame)

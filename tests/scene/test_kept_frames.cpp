@@ -93,7 +93,7 @@ TEST_CASE("points alone are those of their frame, and have no statistics", "[kep
 {
     Scene scene = test::opened(two_outputs);
     const SceneFrame frame = good(scene.advance_to(2));
-    const SceneFrame points = good(good(frame.output("right")).without_statistics());
+    const SceneFrame points = good(SceneInside::without_statistics(good(frame.output("right"))));
     check_same_bits(frame, points);
     CHECK(points.column("P")->data == good(frame.output("right")).column("P")->data);
     CHECK(frame.statistics().seconds > 0);

@@ -95,7 +95,7 @@ TEST_CASE("arguments are told as texts, those of functions for a frame", "[inspe
     Scene wrong = opened(
         "return rapid.create {} :gravity { g = function(frame) if frame.number > 1 then error 'no g' end "
         "return vec3(0, 0, 0) end } :solve {}");
-    const auto arguments = wrong.arguments(2);
+    const auto arguments = SceneInside::arguments(wrong, 2);
     REQUIRE_FALSE(arguments);
     CHECK_THAT(arguments.error().message, Contains("no g"));
 }
@@ -181,7 +181,7 @@ TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
     CHECK_THAT(SceneInside::origin(scene, frame, 99).error().message, Contains("not in this frame"));
 
     Scene single = opened(warm);
-    const PointOrigin same = good(single.origin(good(single.advance_to(2)), 1));
+    const PointOrigin same = good(SceneInside::origin(single, good(single.advance_to(2)), 1));
     CHECK(same.create == "create1");
     CHECK(same.id == 1);
 }
@@ -189,14 +189,15 @@ TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
 TEST_CASE("a point of a merge that is not known by its place is an error that says why", "[inspection]")
 {
     Scene twice = opened(std::string(merged) + "return chain('a', 0):merge(chain('b', 0))");
-    CHECK_THAT(twice.origin(good(twice.advance_to(2)), 0).error().message,
+    CHECK_THAT(SceneInside::origin(twice, good(twice.advance_to(2)), 0).error().message,
                Contains("several points are at this place"));
     Scene moved =
         opened(std::string(merged) +
                "return chain('a', 0):merge(chain('b', 7)) :points('up', function(p) p.P = p.P + vec3(0, 0.3, 0) end)");
-    CHECK_THAT(moved.origin(good(moved.advance_to(2)), 0).error().message, Contains("have moved it"));
+    CHECK_THAT(SceneInside::origin(moved, good(moved.advance_to(2)), 0).error().message, Contains("have moved it"));
     Scene other = opened("return { sparks = rapid.create { points = rapid.points.grid {} } :solve {} }");
-    CHECK_THAT(moved.origin(good(other.advance_to(2)), 0).error().message, Contains("no output \"sparks\""));
+    CHECK_THAT(SceneInside::origin(moved, good(other.advance_to(2)), 0).error().message,
+               Contains("no output \"sparks\""));
 }
 
 TEST_CASE("a graph without places has the nodes of the one that is laid out", "[inspection]")

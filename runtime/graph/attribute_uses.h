@@ -20,7 +20,6 @@ namespace rapid {
 // Finds the attributes that points have at each node, regardless of pruning: those made by earlier nodes, and those
 // that a Solve feeds back from the previous frame. A node that needs an attribute made only by later nodes fails when
 // it is evaluated.
-
 class AttributeFlow {
 public:
     explicit AttributeFlow(const std::vector<PlannedNode>& nodes);

@@ -20,7 +20,6 @@ namespace rapid {
 //
 // A point keeps its adopted id in every later frame and through every merge. Points are born in runs of consecutive
 // ids, so the table stores runs: a few words per frame, not eight bytes per point.
-
 class AdoptedIds {
 public:
     // Returns the adopted id of the point `id` of the other simulation. A new point takes `next`, the next free id
@@ -76,7 +75,7 @@ struct Simulation {
     bool trial = false;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
     bool estimates_errors = true;                             // if false, Solve estimates none
-    bool tells_points = false;  // Solve stores per-point figures as attributes (solve/point_figures.h)
+    bool tells_points = false;  // Solve stores per-point figures as attributes (solve/step_observers.cpp)
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }

@@ -12,7 +12,6 @@
 namespace rapid {
 
 // The mass of points without the attribute.
-
 inline constexpr float unit_mass = 1;  // kg
 
 class Shape;

@@ -35,7 +35,6 @@ namespace rapid {
 
 // The paper's methods, `backtrack` (§4.2) and `project` (§4.1): points inside a shape at the end of a substep are
 // moved out of it (numerics.md, Collision).
-
 class DiscreteMethods {
 public:
     DiscreteMethods(const CollisionBlock& block, const FreeMotion& motion, StuckPoints& stuck, TouchedPoints& touched,

@@ -18,7 +18,7 @@ constexpr double valley = 1e-6;
 // Limit of impacts of a point in one substep that follow soon after another, after which it rests for the remaining
 // time: between closing shapes, impacts never end. Impacts of a fast point that crosses a room, or of one that comes
 // to rest on a surface, are farther apart, or fewer.
-constexpr int max_impacts = 2000;  // larger than the event count of a chatter check (path_planner.cpp)
+constexpr int max_impacts = 2000;  // larger than the event count of a chatter check (contact_rounds.cpp)
 constexpr double soon = 1e-4;      // relative to the substep
 
 // Counts an impact towards max_contacts with the weight that makes the limit max_impacts. Chatter checks ignore that

@@ -20,7 +20,6 @@ namespace rapid {
 
 // Plans the next path of a point that has met a shape: a free parabola, a slide along a flat surface or an edge, or a
 // piece along a curved surface.
-
 class PathPlanner {
 public:
     PathPlanner(const CollisionBlock& block, FreeMotion& motion, ContactAudit& audit)
@@ -51,7 +50,6 @@ private:
 // The piece d = v s + a s²/2 is tangential at its beginning. At its end the surface has turned by θ, so the chord of
 // an arc of this length is d (1 - θ²/24), halfway between the tangents of both ends. The remaining distance from the
 // surface is removed along the gradient.
-
 class CurvedMotion {
 public:
     CurvedMotion(const CollisionBlock& block, const FreeMotion& motion, ContactResolver& resolver)

@@ -21,7 +21,6 @@ namespace rapid {
 // It gives the result of ContactRounds at a twentieth of the cost.
 //
 // Layout: structure of arrays; coordinates are shape [3, capacity].
-
 class PlaneBatch {
 public:
     static constexpr std::size_t capacity = 64;

@@ -14,7 +14,7 @@ struct ContactOptions {
     std::optional<PerPoint<float>> radius;  // default: the attribute pscale if present, else 0
     PerPoint<float> bounce{0.0f};           // ε in [0, 1]; a pair uses the larger
     PerPoint<float> friction{0.0f};         // μ >= 0; a pair uses the geometric mean
-    std::optional<double> max_difference;   // m, between radii in one grid (radius_grids.h)
+    std::optional<double> max_difference;   // m, between radii in one grid (contact_search.h)
     int max_grids = 8;
     double mass_scaling = 0;        // at least 0: a point counts as e^mass_scaling times lighter than its support
     bool record = false;            // contact forces (contact_forces.h)

@@ -1,7 +1,7 @@
 // Finds all pairs of touching spheres with sparse cell grids (paper §5.1, §5.2).
 //
 // Spheres of one size share a grid whose cells are as wide as they are, so the two of a pair are in the same cell or
-// in neighbouring cells. Several sizes use several grids (radius_grids.h); a pair from different grids is found from
+// in neighbouring cells. Several sizes use several grids (RadiusGrids); a pair from different grids is found from
 // its smaller sphere.
 #pragma once
 
@@ -19,7 +19,6 @@ namespace rapid {
 
 // Assigns points to grids of cells by their radii (paper §5.2, Algorithm 1). Cells as wide as the largest sphere in
 // them hold too many of the smallest, so several sizes use several grids.
-
 class RadiusGrids {
 public:
     // max_difference: m, between the radii in a grid; default: half of its largest radius. Points of radius 0 touch

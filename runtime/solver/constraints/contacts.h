@@ -38,7 +38,6 @@ namespace rapid {
 //
 // under a stack of any height, w = 1/m. A warm-start impulse beyond that, as left by a fall, is dropped: its release
 // would throw the light points upwards, like the end of a whip.
-
 class MassScaling {
 public:
     // Sets k, at least 0.

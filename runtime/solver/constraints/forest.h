@@ -1,4 +1,4 @@
-// Rows over two points that form trees (chains, ropes, branches) and are solved directly (tree_solver.h).
+// Rows over two points that form trees (chains, ropes, branches) and are solved directly (tree_motion.h).
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ public:
         std::uint32_t above;               // the parent's own link, as an index in `links`; itself at the root
         bool flipped;                      // the child is the row's first point
 
-        // For the solution of the tree (tree_solver.h).
+        // For the solution of the tree (tree_motion.h).
         Vec3d gradient, gradient_above;  // of the residual, by the child's and the parent's position
         double e, s;                     // residual and compliance; after elimination, including the subtree's
         double lambda;                   // multiplier

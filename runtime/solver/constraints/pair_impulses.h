@@ -13,9 +13,8 @@
 
 namespace rapid {
 
-// Constraints that start a substep with the impulses of the previous one and act alongside rods and springs.
-
-// An interface that such a Coupling also implements.
+// Interface of a Coupling that starts a substep with the impulses of the previous one and acts alongside rods and
+// springs.
 class CarriedImpulses {
 public:
     virtual ~CarriedImpulses() = default;

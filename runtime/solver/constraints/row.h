@@ -3,7 +3,7 @@
 //   Δv = w ∇C p
 //
 // with w their inverse masses. Two-sided rows apply their own force over a substep first, without adding or removing
-// energy (tree_motion.h, row_system.h). The code here then accounts for contacts, shapes and other constraints that
+// energy (tree_motion.h, system_motion.h). The code here then accounts for contacts, shapes and other constraints that
 // pushed their points since. One-sided rows do all of their work here, like contacts.
 #pragma once
 

@@ -18,7 +18,6 @@ namespace rapid {
 //
 // Gauss-Seidel does not depend on the order within a colour. The rows of a colour can therefore be projected in
 // parallel, bit-identically for any number of threads.
-
 struct GraphColouring {
     std::vector<std::uint32_t> order;  // row indices, colour by colour
     std::vector<std::uint32_t> begin;  // index in `order` of each colour's first row, then the end of the last

@@ -15,7 +15,7 @@
 //   };
 //
 // Two-sided rows first apply their forces as part of the points' free motion: rows over two points that form trees are
-// solved directly (tree_motion.h), all others by conjugate gradients (row_system.h). They then take part in the
+// solved directly (tree_motion.h), all others by conjugate gradients (system_motion.h). They then take part in the
 // projection alongside contacts and shapes, by Gauss-Seidel in colours (row_schedule.h). One-sided rows act only in
 // the projection.
 #pragma once
@@ -42,7 +42,6 @@
 namespace rapid {
 
 // Sleep of points that rows hold together: finds sleeping rows and wakes their points.
-
 template <class Function>
 class RowSleep {
 public:

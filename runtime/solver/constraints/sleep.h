@@ -6,16 +6,16 @@
 //
 //   when another point hits it: immediately, and with it those that the shock reaches (contact_sleep.h);
 //   when its load, or the acceleration on it, differs from the one with which it fell asleep;
-//   when a shape that touches it is added, removed or moved (shape_grip.h);
+//   when a shape that touches it is added, removed or moved (shape_contacts.h);
 //   when a node moves it, gives it a velocity, or changes its properties;
-//   when a row that acts on it is added, removed or changed, or its anchor moves (row_sleep.h).
+//   when a row that acts on it is added, removed or changed, or its anchor moves (rows.h).
 //
-// Points that rows link (islands.h) fall asleep when the whole island is still, and wake when any of it wakes. An
+// Points that rows link (Islands) fall asleep when the whole island is still, and wake when any of it wakes. An
 // island that hangs must be stiller than one that lies and is held by friction, because a pendulum is also slow at its
 // turning points. Points of rows whose function does not declare `rests` (rows.h) never sleep.
 //
 // The column `still` (s) holds how long a point has been still, and alone decides which points sleep. The conditions
-// under which a point fell asleep are stored by id between frames (sleep_records.h); if they are lost, the current
+// under which a point fell asleep are stored by id between frames (SleepRecords); if they are lost, the current
 // ones are used.
 #pragma once
 
@@ -33,7 +33,6 @@
 namespace rapid {
 
 // The conditions under which sleeping points fell asleep, stored between frames.
-
 struct SleepRecords {
     struct Record {
         std::int64_t id;
@@ -47,7 +46,6 @@ struct SleepRecords {
 };
 
 // Islands: points that fall asleep and wake together, because rows carry forces between them.
-
 class Islands {
 public:
     // weight: inverse masses. A point of infinite mass separates the points linked to it, like a wall.

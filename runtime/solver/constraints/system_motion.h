@@ -1,5 +1,5 @@
 // The motion of points that two-sided rows link into nets, over a substep: as in trees (tree_motion.h), but with all
-// rows solved at once by conjugate gradients (row_system.h), to a relative 1e-8 or as far as `iterations` allow. The
+// rows solved at once by conjugate gradients (RowSystem), to a relative 1e-8 or as far as `iterations` allow. The
 // discrete gradient points to the positions that the previous substep's forces would give.
 #pragma once
 
@@ -22,7 +22,6 @@ namespace rapid {
 // Conjugate gradients, with Jacobi's preconditioner, because every iterate is orthogonal to its residual. If s is 0,
 // the resulting forces therefore do no work even after few iterations (tree_motion.h), and impulses that stop the
 // points along the rows only lose energy.
-
 class RowSystem {
 public:
     // Sets up the rows of a substep: `arity` point indices each, out of `size` points. Gradients of inactive rows are

@@ -1,7 +1,7 @@
 // Adaptive substeps: each point takes as many as a given tolerance requires.
 //
 // No point depends on another, so each takes an individual number of substeps: n, 2n, 4n, ... The runs are
-// extrapolated to a step of zero (extrapolation.h). The extrapolation, in position and velocity, is the result as soon
+// extrapolated to a step of zero (step_doubling.h). The extrapolation, in position and velocity, is the result as soon
 // as the last power of the step changes it by at most the tolerance. That estimates the error before this correction,
 // so the result is well within the tolerance. A velocity error displaces the point in the next frame: it may be as
 // large as the tolerance per frame. (With drag and position-dependent forces there are odd powers from the third on,

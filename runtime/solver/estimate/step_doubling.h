@@ -25,7 +25,6 @@ namespace rapid {
 // restart.
 //
 // Layout: column c of the table holds, for each point, the latest extrapolation from c + 1 runs; shape [points].
-
 class Extrapolation {
 public:
     // Begins with no runs. h: frame length, s.

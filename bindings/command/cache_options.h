@@ -11,7 +11,7 @@ namespace rapid {
 
 class CacheOptions {
 public:
-    // docs: what the folder and --again are for.
+    // docs: the purposes of the folder and of --again.
     void declare(Options& options, const std::string& doc_of_folder, const std::string& doc_of_again);
     // Throws Error if --cache-every is given without --cache.
     void check() const;

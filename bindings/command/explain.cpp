@@ -1,4 +1,5 @@
-// rapid explain: which parts of a scene are kept or left out, and why; and which ones a scene needs over another one.
+// rapid explain: shows which parts of a scene are kept or pruned, and why; and which ones a scene needs over another
+// one.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -22,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// Slurm, by its commands: sbatch, squeue, scancel.
+// Slurm's commands: sbatch, squeue, scancel.
 
-// Returns its standard output. Throws Error with what it says if it fails.
+// Returns its standard output. Throws Error with its message if it fails.
 std::string said_by(const std::vector<std::string>& words)
 {
     const ProgramOutput output = output_of(words);
@@ -44,7 +44,7 @@ std::int64_t submit(const FarmJob& job, const fs::path& script, std::vector<std:
     return id;
 }
 
-// The jobs that were submitted, each once.
+// Returns the ids of the submitted jobs, without duplicates.
 std::set<std::int64_t> jobs_of(const SubmittedJob& submitted)
 {
     std::set<std::int64_t> jobs(submitted.arrays.begin(), submitted.arrays.end());
@@ -53,7 +53,7 @@ std::set<std::int64_t> jobs_of(const SubmittedJob& submitted)
     return jobs;
 }
 
-// Throws Error with what is missing of it.
+// Throws Error if a command of Slurm is missing.
 void require_slurm()
 {
     std::vector<std::string> missing;
@@ -66,7 +66,7 @@ void require_slurm()
                         fmt::join(missing, " and "), missing.size() == 1 ? "is" : "are"));
 }
 
-// "1-3,7" of numbers in order.
+// Returns sorted numbers as "1-3,7".
 std::string ranges_of(const std::vector<std::size_t>& numbers)
 {
     std::vector<std::string> ranges;
@@ -84,7 +84,7 @@ std::int64_t submit_tasks(const FarmJob& job, const std::vector<std::size_t>& ta
     return submit(job, job.scripts() / "tasks.sh", {"--array=" + ranges_of(tasks)});
 }
 
-// Submits the last one, which waits for jobs: "17", or "17_3" of an array.
+// Submits the last job, which waits for others: "17", or "17_3" of an array.
 std::int64_t submit_last(const FarmJob& job, const std::vector<std::string>& waits_for)
 {
     std::vector<std::string> words;
@@ -94,8 +94,8 @@ std::int64_t submit_last(const FarmJob& job, const std::vector<std::string>& wai
     return submit(job, job.scripts() / "last.sh", std::move(words));
 }
 
-// What is queued or runs, of these jobs: its state and the reason ("PENDING", "Resources"), by job and number in an
-// array; of a job that is none the number is 0.
+// The state and reason ("PENDING", "Resources") of each queued or running task of these jobs, by job and number in an
+// array; the number is 0 outside of arrays.
 struct QueuedTask {
     std::string state, reason;
 };
@@ -104,7 +104,7 @@ Queue queued(const std::set<std::int64_t>& jobs)
 {
     Queue queue;
     if (jobs.empty()) return queue;
-    // Of a job that Slurm has forgotten squeue complains; it is not queued.
+    // squeue complains about jobs that Slurm has forgotten; they are not queued.
     const ProgramOutput output = output_of(
         {"squeue", "--noheader", "--array", "--format=%F|%K|%T|%r", "--jobs", fmt::format("{}", fmt::join(jobs, ","))});
     if (output.status != 0 && output.errors.find("Invalid job id") == std::string::npos)
@@ -120,7 +120,7 @@ Queue queued(const std::set<std::int64_t>& jobs)
         std::int64_t id = 0;
         std::size_t number = 0;
         std::from_chars(job.data(), job.data() + job.size(), id);
-        std::from_chars(task.data(), task.data() + task.size(), number);  // "N/A" of one that is in no array
+        std::from_chars(task.data(), task.data() + task.size(), number);  // "N/A" outside of arrays
         queue[{id, number}] = {state, reason};
     }
     return queue;
@@ -133,7 +133,7 @@ void cancel(const std::set<std::int64_t>& jobs)
     if (words.size() > 1) said_by(words);
 }
 
-// The words of a text, as a shell splits them at spaces; a part in quotes is one word.
+// Splits a text into words as a shell does at spaces; a part in quotes is one word.
 std::vector<std::string> split_words(const std::string& text)
 {
     std::vector<std::string> words;
@@ -157,7 +157,7 @@ std::vector<std::string> split_words(const std::string& text)
     return words;
 }
 
-// Error: tasks of a job of this folder are still to come, or run.
+// Throws Error if tasks of a job in this folder are still queued or running.
 void require_free(const FarmJob& job)
 {
     std::error_code none;
@@ -170,9 +170,9 @@ void require_free(const FarmJob& job)
                         queue.size(), job.file().string(), job.file().string()));
 }
 
-// rapid farm: what became of a job that --farm submitted.
+// rapid farm: reports the state of a job that --farm submitted.
 
-// Lost: neither queued nor ended, as when it was cancelled before it ran.
+// Lost: neither queued nor ended, for example because it was cancelled before it ran.
 enum class Stage { Done, Failed, Running, Waiting, Lost };
 constexpr std::string_view state_names[] = {"done", "failed", "running", "waiting", "lost"};
 
@@ -222,7 +222,7 @@ public:
     }
 
 private:
-    // Of the tasks, then of the last one.
+    // Returns the states of the tasks, then of the last job.
     static std::vector<TaskState> states_of(const SubmittedJob& submitted)
     {
         const Queue queue = queued(jobs_of(submitted));
@@ -235,7 +235,7 @@ private:
 
     static bool is_open(const TaskState& task) { return task.state == Stage::Running || task.state == Stage::Waiting; }
 
-    // Status 1 where something has failed or is lost.
+    // Returns status 1 if a task has failed or is lost.
     int tell(const SubmittedJob& submitted, const std::vector<TaskState>& states) const
     {
         const FarmJob& job = submitted.job;
@@ -377,7 +377,7 @@ int FarmOptions::submit(FarmJob job) const
     std::iota(all.begin(), all.end(), std::size_t{1});
     const std::int64_t array = submit_tasks(submitted.job, all);
     submitted.arrays.assign(all.size(), array);
-    submitted.write();  // what is submitted is known, whatever happens next
+    submitted.write();  // records the submission, whatever happens next
     print(fmt::format("job {}: {} tasks\n", array, all.size()));
     if (!last.empty()) {
         submitted.last = submit_last(submitted.job, {fmt::format("{}", array)});

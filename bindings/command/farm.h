@@ -1,4 +1,4 @@
-// --farm: submits to a scheduler what would be run here. `rapid farm` tells what became of it.
+// Implements --farm, which submits the work to a scheduler. `rapid farm` reports its state.
 #pragma once
 
 #include <functional>
@@ -14,15 +14,15 @@ class FarmOptions {
 public:
     void declare(Options& options);
 
-    // Error: an option that needs --farm without it.
+    // Throws Error if an option that needs --farm is given without it.
     void check() const;
     bool asked() const { return !farm_.empty(); }
 
-    // The arguments of the command, as they were given: without those above, without --threads, and without `others`.
+    // Returns the arguments of the command as given, without those above, without --threads, and without `others`.
     std::vector<std::string> words(const Options& options, const std::vector<std::string>& others) const;
 
-    // Submits the job and tells its ids; with --dry-run prints its scripts. Error: no Slurm; what sbatch says; a job of
-    // the same folder that still runs.
+    // Submits the job and prints its ids; with --dry-run prints its scripts. Throws Error if Slurm is missing, if
+    // sbatch fails (with its message), or if a job of the same folder is still running.
     int submit(FarmJob job) const;
 
 private:

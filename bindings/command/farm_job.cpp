@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr int job_version = 1;
 
-// As one word of the shell, quoted where it must be.
+// Returns a text as one word of the shell, quoted if necessary.
 std::string shell_word(const std::string& text)
 {
     constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
@@ -45,7 +45,7 @@ bool limits_memory(const std::vector<std::string>& words)
                        [](const std::string& word) { return word.starts_with("--memory="); });
 }
 
-// A line of a script that begins with # ends at a newline, and what follows would be run.
+// Keeps a text in one line: a script's comment ends at a newline, and the rest would be executed.
 std::string one_line(std::string text)
 {
     std::replace_if(
@@ -58,8 +58,8 @@ void check_one_line(const std::string& what, const std::string& text)
     if (one_line(text) != text) throw Error(fmt::format("--farm: {} \"{}\" has a control character", what, text));
 }
 
-// A job that is preempted or whose node is lost begins again. On SIGTERM, which all its processes get, this program
-// ends by itself; the shell waits for it.
+// The script restarts a job that is preempted or whose node is lost. On SIGTERM, which all its processes get, this
+// program ends by itself; the shell waits for it.
 std::string head(const FarmJob& job, const std::string& log)
 {
     check_one_line("the name of the job", job.name);
@@ -75,8 +75,8 @@ std::string head(const FarmJob& job, const std::string& log)
         shell_word(job.name), shell_word((job.scripts() / log).string()), shell_word(job.folder.string()));
 }
 
-// Runs commands of this program and notes how they ended. Threads are those that the job was given; Slurm says how many
-// by the first name where --cpus-per-task is an option of the job, else by the second.
+// Runs commands of this program and records their exit statuses. The number of threads is the job's: in Slurm's first
+// variable if --cpus-per-task is an option of the job, else in the second.
 std::string body(const std::string& status, const std::string& program, const std::vector<std::string>& commands)
 {
     std::string text = fmt::format(
@@ -98,7 +98,7 @@ fs::path FarmJob::status_file(std::size_t task) const
 std::optional<int> read_status(const fs::path& status_file)
 {
     std::error_code none;
-    if (!fs::is_regular_file(status_file, none)) return {};  // reading a pipe would wait
+    if (!fs::is_regular_file(status_file, none)) return {};  // reading a pipe would block
     std::ifstream file(status_file);
     int status = 0;
     if (!(file >> status)) return {};
@@ -114,7 +114,7 @@ std::string script_of_tasks(const FarmJob& job, const std::string& program)
     text += "esac\n";
     const std::string status = shell_word(job.scripts().string() + '/') + "$SLURM_ARRAY_TASK_ID.status";
     std::string words = shell_words(job.words) + " \"$@\"";
-    // What the job was given of the node's memory, in MiB.
+    // The job's share of the node's memory, in MiB.
     if (!limits_memory(job.words) && !limits_memory(job.tasks.front().words)) {
         text += "memory=${SLURM_MEM_PER_NODE:-${SLURM_MEM_PER_CPU:+$((SLURM_MEM_PER_CPU * SLURM_CPUS_ON_NODE))}}\n";
         words += " ${memory:+--memory=${memory}M}";
@@ -153,7 +153,7 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
         return submitted;
     } catch (Error& error) {
         throw error.at({file.string(), 0});
-    } catch (const nlohmann::json::parse_error& error) {  // its text holds what can't be parsed, all of it
+    } catch (const nlohmann::json::parse_error& error) {  // its text holds all of the unparsable input
         throw Error(fmt::format("is no FARM.json: byte {} is none of JSON", error.byte)).at({file.string(), 0});
     } catch (const nlohmann::json::exception& error) {
         throw Error(fmt::format("is no FARM.json: {}", error.what())).at({file.string(), 0});

@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// "1,2.5,-3": numbers alone, between commas.
+// Reads "1,2.5,-3": only numbers, separated by commas.
 std::vector<double> read_numbers(const std::string& text)
 {
     std::vector<double> numbers;
@@ -53,7 +53,7 @@ void read_camera(const std::string& text, PictureSettings& pictures)
 
 PictureSize read_size(const std::string& text)
 {
-    constexpr int most = 16384;  // pixels an edge: of a picture that takes 10 GiB to draw
+    constexpr int most = 16384;  // pixels per edge; such a picture takes 10 GiB to draw
     PictureSize size;
     const char* const end = text.data() + text.size();
     const auto width = std::from_chars(text.data(), end, size.width);

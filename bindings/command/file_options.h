@@ -1,4 +1,4 @@
-// -o, --camera, --size: the files of a graph's frames.
+// Options -o, --camera and --size for the files of a graph's frames.
 #pragma once
 
 #include <string>
@@ -14,9 +14,9 @@ public:
     void declare(Options& options);
 
     const FileOutputs& files() const { return files_; }
-    // The -o as the user gave them.
+    // Returns the -o as the user gave them.
     const std::vector<std::string>& names() const { return files_.outputs; }
-    // Whether one is a film, which a program of its own writes. Error: an unknown format.
+    // Returns true if one is a film, which a separate program writes. Throws Error if the format is unknown.
     bool makes_films() const;
 
 private:

@@ -1,4 +1,4 @@
-// A signal that ends a run: with snapshots, the frame that is being computed may end within a time of grace.
+// Handles a signal that ends a run: with snapshots, the current frame may complete within a grace period.
 #pragma once
 
 #include <condition_variable>
@@ -10,17 +10,18 @@ namespace rapid {
 
 class GracefulEnd {
 public:
-    // too_late: called with the signal from a thread of its own when the grace is over; it must not return.
+    // too_late: called with the signal from another thread when the grace period is over; it must not return.
     GracefulEnd(double grace, std::function<void(int signal)> too_late);
     ~GracefulEnd();
     GracefulEnd(const GracefulEnd&) = delete;
     GracefulEnd& operator=(const GracefulEnd&) = delete;
 
-    // From now on there is something that can be kept.
+    // Allows a graceful end from now on: there is something to save.
     void allow();
-    // From the signals' thread. False for the second signal, and where there is nothing to keep: the run is to end now.
+    // Called from the signals' thread. Returns false for the second signal, and if there is nothing to save: the run
+    // must end now.
     bool ask(int signal);
-    // The signal that was asked for; 0: none.
+    // Returns the received signal; 0: none.
     int signal() const;
 
 private:

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t most_of_warning = 4000;  // bytes that are printed
+constexpr std::size_t most_of_warning = 4000;  // bytes printed at most
 
 class Info : public Command, public Confined {
 public:

@@ -1,4 +1,4 @@
-// rapid merge: puts the parts of a run together.
+// rapid merge: merges the parts of a run.
 #include <fmt/format.h>
 
 #include <filesystem>

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A file of lua/new, with the scene's name for NAME.
+// Returns a file of lua/new, with NAME replaced by the scene's name.
 std::string fill_in(const fs::path& lua, const char* file, const std::string& name)
 {
     const fs::path path = lua / "new" / file;
@@ -33,7 +33,7 @@ std::string fill_in(const fs::path& lua, const char* file, const std::string& na
     return filled;
 }
 
-// Makes a file. Returns false if it exists already. Error: it can't be written; nothing is left of it.
+// Makes a file. Returns false if it exists already. Throws Error if it cannot be written; nothing is left of it then.
 bool make_file(const std::string& path, const std::string& text)
 {
     try {
@@ -95,7 +95,7 @@ private:
                             name_));
     }
 
-    // An existing file is kept: a second scene in a folder finds .luacheckrc and .luarc.json.
+    // Existing files are kept: a second scene in a folder finds .luacheckrc and .luarc.json.
     static void make(const std::string& file, const std::string& text)
     {
         if (make_file(file, text)) print(fmt::format("made {}\n", file));

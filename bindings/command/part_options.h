@@ -1,4 +1,4 @@
-// --part and --sample: some of the points.
+// Options --part and --sample, which select some of the points.
 #pragma once
 
 #include <optional>

@@ -31,7 +31,7 @@ using nlohmann::json;
 void signal_at_end_of(int parent, int signal)
 {
     prctl(PR_SET_PDEATHSIG, signal);
-    if (getppid() != parent) _exit(status_failed);  // it ended before the line above
+    if (getppid() != parent) _exit(status_failed);  // the parent ended before the line above
 }
 
 [[noreturn]] void become(const std::string& program, const std::vector<std::string>& words, int out, int errors)
@@ -64,14 +64,14 @@ int wait_for(pid_t child)
 
 int code_of(int status) { return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status); }
 
-// Empty: status 0.
+// Describes how a process ended; empty for status 0.
 std::string ending_of(int status)
 {
     if (WIFSIGNALED(status)) return fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
     return WEXITSTATUS(status) == status_done ? "" : fmt::format("status {}", WEXITSTATUS(status));
 }
 
-// What a process writes.
+// Captures the output of a process.
 class Capture {
 public:
     Capture() : file_(memfd_create("output", MFD_CLOEXEC))
@@ -79,7 +79,7 @@ public:
         if (!file_) throw file_error("no memory for what a process says", errno);
     }
     int descriptor() const { return file_.number(); }
-    // The last bytes, without the newlines at the end.
+    // Returns the last bytes, without trailing newlines.
     std::string text(off_t most = std::numeric_limits<off_t>::max()) const
     {
         const off_t size = std::max<off_t>(lseek(file_.number(), 0, SEEK_END), 0);
@@ -94,7 +94,7 @@ private:
     Descriptor file_;
 };
 
-// A process ends with its error; warnings come before.
+// Returns the result of a process. Its error is its last output; warnings come before.
 EndedProcess ended_process(int status, const Capture& errors)
 {
     std::string failure = ending_of(status), last = errors.text(4096);
@@ -190,7 +190,7 @@ std::string run_in_child(const std::function<void(const TellParent& tell)>& work
     std::size_t capacity = 0;
     while (getline(&text, &capacity, pipe.get()) > 0) {
         const json event = json::parse(text, nullptr, false);
-        if (event.is_discarded()) break;  // cut off with the process
+        if (event.is_discarded()) break;  // truncated when the process ended
         hear(event);
     }
     std::free(text);

@@ -10,13 +10,14 @@
 namespace rapid {
 
 struct EndedProcess {
-    std::string failure;  // empty: status 0; else what it said last on standard error, or the signal that ended it
-    int status = 0;       // of the exit; 128 + the number of a signal
+    std::string failure;  // empty for status 0; else its last message on standard error, or the signal that ended it
+    int status = 0;       // exit status; 128 + the number of a signal
 };
 
-// Runs `rapid` `count` times, at most `jobs` at a time, in order; `words` gives the arguments of each. `ended`
-// hears how each ended, in this thread. What they print goes nowhere. A signal that ends this process (Ctrl-C, SIGTERM,
-// ...) is passed on to those that run; then it returns 128 + its number, when all have ended; else 0.
+// Runs `rapid` `count` times, at most `jobs` at a time, in order; `words` returns the arguments of each. `ended` is
+// called on this thread with the result of each. Their standard output is discarded. A signal that ends this process
+// (Ctrl-C, SIGTERM, ...) is passed on to the running ones; it then returns 128 + its number when all have ended; else
+// 0.
 //
 // Must be called before this process starts a thread, which would take the signals.
 int run_processes(std::size_t count, int jobs, const std::function<std::vector<std::string>(std::size_t)>& words,
@@ -24,8 +25,8 @@ int run_processes(std::size_t count, int jobs, const std::function<std::vector<s
 
 using TellParent = std::function<void(const nlohmann::json& event)>;
 
-// Forks. The child does `work`, tells events and ends; this process hears each as it comes. Returns an empty text, or
-// how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
+// Forks. The child does `work`, reports events and ends; this process hears each as it arrives. Returns an empty text,
+// or how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
 //
 // This process must have no other threads (a child would inherit locks that are never freed), so sessions and the
 // runtime, which start threads, belong in children. A child's standard output goes to standard error, so that output of
@@ -37,11 +38,11 @@ std::string run_in_child(const std::function<void(const TellParent& tell)>& work
 void end_with_parent(int parent);
 
 struct ProgramOutput {
-    int status;  // 127: it can't be started
+    int status;  // 127: it cannot be started
     std::string out, errors;
 };
 
-// Runs a program that is found on PATH.
+// Runs a program found on PATH.
 ProgramOutput output_of(const std::vector<std::string>& words);
 
 }  // namespace rapid

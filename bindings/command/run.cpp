@@ -63,7 +63,7 @@ public:
             "the same");
         options.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
         untrusted_.declare(options, "graph");
-        options.add_option("--claims", options_.claims).internal();  // where rows of a wedge note what they write
+        options.add_option("--claims", options_.claims).internal();  // where rows of a wedge claim their output files
         options.add_flag("--watch", watch_,
                          "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
         farm_.declare(options);
@@ -81,7 +81,7 @@ public:
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
         if (watch_ && cache_.asked())
             throw Error("--watch runs a graph that changes, of which --cache holds nothing; give one of them");
-        if (!farm_.asked()) cache_.check();  // each task of a farm has one
+        if (!farm_.asked()) cache_.check();  // on a farm each task has its own
         if (cache_.again() && !cache_.asked())
             throw Error("--again says what to do with a --cache; give one, or leave it out");
         if (untrusted_.asked() && files_.makes_films())
@@ -96,17 +96,17 @@ public:
         options_.sample = part_.sample();
         untrusted_.confine([&] { return access(); }, common);
     }
-    // --watch runs the graph in processes of its own.
+    // --watch runs the graph in separate processes.
     bool takes_plugins() const override { return !watch_ || tell_; }
 
     int run(const CommonOptions& common) override
     {
         if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
         if (durable_) make_files_durable();
-        std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may go before it ends
+        std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may close the pipe
         Threads threads(common.threads);
         RunTerminal terminal(quiet_, common.verbose);
-        std::optional<SceneRun> run;  // until the others have ended
+        std::optional<SceneRun> run;  // lives until the others have ended
         std::atomic<SceneRun*> made = nullptr;
         const auto abandon = [&](int status, const std::string& why) {
             if (SceneRun* const it = made) terminal.abandon(*it, status, why);
@@ -150,11 +150,11 @@ private:
                 "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
                 "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
             .type_name("SECONDS");
-        // Of wedge: another run's is no error.
+        // For wedge: a cache of another run is not an error.
         options.add_flag("--cache-replace", options_.cache.replace).internal();
     }
 
-    // end: called from another thread where a limit is reached and the run does not end; it must not return.
+    // end: called from another thread if a limit is reached and the run does not end; it must not return.
     SceneRun make(const std::function<void(const std::string& message)>& end, RunListener listener) const
     {
         SceneOptions scene = graph_.scene_options();
@@ -179,7 +179,7 @@ private:
         if (parts_ > 1 && part_.part()) throw Error("--parts and --part are given together; keep one of them");
     }
 
-    // What would be found wrong before the first frame has been.
+    // Submits the run. Errors that are detectable before the first frame have already been reported.
     int submit(SceneRun& run) const
     {
         FarmJob job;

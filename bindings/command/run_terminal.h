@@ -1,5 +1,5 @@
-// `rapid run` on the terminal: frames, progress and summary go to standard output, warnings and errors to standard
-// error.
+// The output of `rapid run` on the terminal: frames, progress and summary go to standard output, warnings and errors to
+// standard error.
 #pragma once
 
 #include <cstdint>
@@ -19,18 +19,18 @@ class RunTerminal {
 public:
     RunTerminal(bool quiet, bool verbose) : quiet_(quiet), verbose_(verbose) {}
 
-    // The lines of a run, and its warnings. begins: as RunListener's.
+    // Returns the listener that prints a run's lines and warnings. begins: as in RunListener.
     RunListener listener(std::function<void(bool keeps_snapshots)> begins);
-    // The frames that will be computed are known: there is progress from now on.
+    // Starts the progress display, when the frames to compute are known.
     void begin(std::int64_t first, std::int64_t last);
-    // Tells how the run ended. signal: that it was ended by; 0: none. Returns the status of the process.
+    // Prints how the run ended. signal: the one that ended it; 0: none. Returns the exit status of the process.
     int end(const RunOutcome& outcome, int signal);
-    // From another thread, at any moment: says why the run ends, has it write its statistics, removes unfinished files,
-    // and ends the process.
+    // Ends the process from any thread, at any time: prints why, lets the run write its statistics, and removes
+    // unfinished files.
     [[noreturn]] void abandon(SceneRun& run, int status, const std::string& why);
 
 private:
-    // Under the lock.
+    // Precondition: the lock is held.
     void erase_progress();
     void print_unwritten(const std::vector<std::string>& unwritten) const;
 

@@ -180,18 +180,19 @@ StudyRow row_of(const json& told, const Knobs& knobs)
             ""};
 }
 
-// Holds the result of a child, or why there is none.
+// The result of a child, or the reason why there is none.
 struct Outcome {
     json result;
     std::string failed;
     bool refused = false;  // no frame was computed
 };
 
-// Opens a scene and computes its frames. `progress` hears how many runs are done, 0 when the first frame is due.
+// Opens a scene and computes its frames. `progress` is called with the number of completed runs, 0 before the first
+// frame.
 using ChildWork = std::function<json(const StudySource& source, const StudyScene::Progress& progress)>;
 
-// Does the work in the child. Tells the parent {"run": how many are done} after each run, and at the end
-// {"result": ...} or {"failed": why, "refused": whether no frame was computed}.
+// Does the work in the child. Reports {"run": number of completed runs} to the parent after each run, and at the end
+// {"result": ...} or {"failed": why, "refused": true if no frame was computed}.
 void do_work(StudySource source, int threads, const ChildWork& work, const TellParent& tell)
 {
     bool started = false;
@@ -298,7 +299,7 @@ public:
     }
 
 private:
-    // The study of a graph that the options describe.
+    // Returns the study of a graph that the options describe.
     Study asked() const
     {
         Study study;
@@ -365,7 +366,7 @@ private:
         return outcome;
     }
 
-    // Error: the file, the graph or the options are wrong; found before any scene is run.
+    // Throws Error if the file, the graph or the options are wrong, before any scene is run.
     Study describe() const
     {
         if (!is_scene())
@@ -392,7 +393,7 @@ private:
         return described;
     }
 
-    // Error: it can't be written to; better found before the runs than after.
+    // Throws Error if the folder cannot be written, which is better found before the runs than after.
     void open_folder() const
     {
         std::error_code failure;
@@ -430,7 +431,7 @@ private:
         Outcome outcome;
     };
 
-    // Rows of one line share a reference, which is kept until another one is needed.
+    // Rows of one line share a reference, which is cached until another one is needed.
     const Reference& reference_of(const Study& study, const Knobs& knobs, RowProgress& progress)
     {
         const Knobs wanted = study.reference ? study.reference_of(knobs) : Knobs();

@@ -1,4 +1,4 @@
-// "NAME=A,B,C" of --sweep and --vary: a parameter and the values that it takes.
+// Parses "NAME=A,B,C" of --sweep and --vary: a parameter and its values.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@ struct SweptSetting {
     std::vector<std::string> values;
 };
 
-// Commas within braces do not part values: "wind={1,0,0},{2,0,0}" has two. Error: the text is not of this form; it
-// names the option, and `names`, the kind of name that it takes.
+// Commas within braces do not separate values: "wind={1,0,0},{2,0,0}" has two. Throws Error if the text does not have
+// this form; the error names the option, and `names`, the kind of name that it takes.
 SweptSetting read_swept_setting(const std::string& option, const std::string& text, const std::string& names);
 
 }  // namespace rapid

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// test_*.lua below a folder, sorted by path; any other file as it is.
+// Returns test_*.lua below a folder, sorted by path; any other file unchanged.
 std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
 {
     std::vector<fs::path> files;
@@ -29,7 +29,7 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
         std::error_code none;
         if (!fs::exists(argument, none)) throw Error("no such file or folder").at({argument, 0});
         if (!fs::is_directory(argument)) {
-            // Each process of a file reads it again, and a pipe would be waited for.
+            // Each process of a file reads it again, and a pipe would block.
             if (!fs::is_regular_file(argument)) throw Error("it is not a regular file").at({argument, 0});
             files.emplace_back(argument);
             continue;
@@ -70,7 +70,7 @@ public:
                 "lists the N slowest tests with their seconds; text only")
             .type_name("N");
         untrusted_.declare(options, "test");
-        // Internal: the process of one file.
+        // Internal options, for the process of one file.
         options.add_option("--child-of", parent_).internal();
         options.add_option("--already-run", already_run_).internal();
     }
@@ -115,7 +115,7 @@ private:
                 }};
     }
 
-    // Files are started in their order, and reported in it as soon as those before them have ended.
+    // Starts the files in order, and reports each as soon as those before it have ended.
     void run_files(const std::vector<fs::path>& files, const CommonOptions& common)
     {
         const auto processors = static_cast<std::int64_t>(std::max(1u, std::thread::hardware_concurrency()));
@@ -144,7 +144,7 @@ private:
         }
     }
 
-    // The arguments of the process of a file, but for those that differ between files.
+    // Returns the arguments of a file's process, except those that differ between files.
     std::vector<std::string> words_of_child(const CommonOptions& common) const
     {
         std::vector<std::string> words = {"rapid", "test", fmt::format("--child-of={}", getpid()),

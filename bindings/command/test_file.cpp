@@ -22,7 +22,7 @@ using nlohmann::json;
 
 void run_tests_as_child(const std::string& file, const SceneTestOptions& options)
 {
-    fcntl(test_report_descriptor, F_SETFD, FD_CLOEXEC);  // programs that tests start would keep the pipe open
+    fcntl(test_report_descriptor, F_SETFD, FD_CLOEXEC);  // otherwise programs started by tests would keep the pipe open
     const auto send = [](const json& report) {
         const std::string line = report.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
         if (write(test_report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
@@ -36,7 +36,7 @@ void run_tests_as_child(const std::string& file, const SceneTestOptions& options
               {"name", event.name},
               {"message", event.message},
               {"seconds", std::chrono::duration<double>(now - began).count()},
-              // How much of the captured output belongs to what has happened so far.
+              // The length of the captured output up to this event.
               {"out", lseek(STDOUT_FILENO, 0, SEEK_CUR)},
               {"err", lseek(STDERR_FILENO, 0, SEEK_CUR)}});
         began = now;
@@ -151,7 +151,7 @@ void TestFile::end_process()
     }
     if (all_reported_ && WIFEXITED(status) && WEXITSTATUS(status) == status_done) return end_file(std::nullopt);
 
-    // The process has printed its reason, if it had one.
+    // The process has printed its reason, if any.
     const std::string how = WIFSIGNALED(status)
                                 ? fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)))
                                 : fmt::format("status {}", WEXITSTATUS(status));
@@ -178,7 +178,7 @@ void TestFile::take_results(const std::function<void(const TestResult&)>& add)
         std::fwrite(next.out.data(), 1, next.out.size(), stdout);
         std::fwrite(next.err.data(), 1, next.err.size(), stderr);
         if (next.result) add(*next.result);
-        std::fflush(stdout);  // a run of minutes shows its failures as they come
+        std::fflush(stdout);  // long runs show failures as they occur
     }
 }
 

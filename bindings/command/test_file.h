@@ -39,12 +39,12 @@ public:
     void take_results(const std::function<void(const TestResult&)>& add);
 
 private:
-    // What the process writes to one of its standard streams.
+    // Output of the process on one of its standard streams.
     class Capture {
     public:
         void open();
         int descriptor() const { return file_.number(); }
-        std::string take(off_t end);  // from where the last call ended
+        std::string take(off_t end);  // from the end of the last call
         std::string take_all();
 
     private:
@@ -67,7 +67,7 @@ private:
     Capture out_, err_;
     std::deque<Received> received_;
 
-    // The present process.
+    // State of the current process.
     pid_t child_ = 0;
     Descriptor reports_;
     std::string unread_;         // the beginning of a report

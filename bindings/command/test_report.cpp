@@ -40,7 +40,7 @@ public:
     {
         std::sort(durations_.begin(), durations_.end(), std::greater<>());
         durations_.resize(std::min(durations_.size(), slowest_));
-        // As Catch2 prints them.
+        // The format is Catch2's.
         for (const auto& [seconds, name] : durations_) print(fmt::format("{:.3f} s: {}\n", seconds, name));
         print(fmt::format("{} passed, {} failed, {} skipped\n", counts.passed, counts.failed, counts.skipped));
     }

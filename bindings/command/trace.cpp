@@ -1,4 +1,4 @@
-// rapid trace: the lives of single points.
+// rapid trace: shows the lives of single points.
 #include <fmt/format.h>
 
 #include <sstream>

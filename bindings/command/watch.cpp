@@ -85,7 +85,7 @@ int Watch::run()
     bool running = true;
     while (true) {
         std::array<pollfd, 3> ready = {{{notify_, POLLIN, 0}, {signals_, POLLIN, 0}, {told_, POLLIN, 0}}};
-        // First the run that is being stopped must end, then the changes settle.
+        // Waits first for the stopped run to end, then for the changes to settle.
         const bool settling = !changed_.empty() && child_ == 0;
         const int events = poll(ready.data(), ready.size(), settling ? settle_time : -1);
         if (events < 0 && errno != EINTR) throw Error(fmt::format("--watch: {}", std::strerror(errno)));

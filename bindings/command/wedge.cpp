@@ -1,4 +1,4 @@
-// rapid wedge: one scene at many settings, each run in a process of its own.
+// rapid wedge: runs one scene at many settings, each in a process of its own.
 #include <fmt/format.h>
 #include <tbb/info.h>
 
@@ -43,7 +43,7 @@ using nlohmann::ordered_json;
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-// What a run gave, as far as it got.
+// The result of a run, as far as it got.
 struct WedgeResult {
     // The error since birth of the frame where its 95 % quantile is largest.
     struct PositionError {
@@ -108,7 +108,7 @@ std::vector<Settings> combinations(const std::vector<SweptSetting>& settings, bo
     return rows;
 }
 
-// By the name in braces: the place of its setting. A PARAM that several nodes have is left out.
+// Maps each name in braces to the index of its setting. A PARAM that several nodes have is skipped.
 std::map<std::string, std::size_t> names_in_braces(const std::vector<SweptSetting>& settings)
 {
     std::map<std::string, std::size_t> names;
@@ -157,7 +157,7 @@ std::string with_values(const std::string& pattern, const Settings& row,
     return result;
 }
 
-// "{rate} and {substeps}": what is varied and not in the pattern.
+// Returns "{rate} and {substeps}": the varied names that are missing in the pattern.
 std::string missing_names(const std::string& pattern, const std::vector<SweptSetting>& settings)
 {
     std::map<std::size_t, std::string> shortest;
@@ -183,10 +183,10 @@ std::string missing_names(const std::string& pattern, const std::vector<SweptSet
                             missing.empty() ? "leave one out" : fmt::format("put {} into the pattern", missing)));
 }
 
-// All combinations, of which the last setting changes fastest; zip: the n-th values together. In a pattern {NAME}, or
-// for NODE.PARAM also {PARAM}, stands for the value; {output} stays. Error: a setting twice; lists of different
-// lengths with zip; a name in braces that is not varied; a value that can't be a part of a file's name; rows that
-// write the same files.
+// Returns all combinations, with the last setting changing fastest; with zip, the n-th values together. In a pattern
+// {NAME}, or for NODE.PARAM also {PARAM}, is replaced by the value; {output} stays. Throws Error for a duplicate
+// setting; lists of different lengths with zip; a name in braces that is not varied; a value that cannot be part of a
+// file name; or rows that write the same files.
 std::vector<WedgeRow> wedge_rows(const std::vector<SweptSetting>& settings, bool zip,
                                  const std::vector<std::string>& patterns)
 {
@@ -208,11 +208,11 @@ std::vector<WedgeRow> wedge_rows(const std::vector<SweptSetting>& settings, bool
 
 // The report: a line for each row as it ends, a table, wedge.json, and wedge.png, a contact sheet.
 
-// Reads the file of --stats of a run. Nothing has changed if there is none.
+// Reads a run's --stats file. Leaves the result unchanged if there is none.
 void read_statistics(const fs::path& file, WedgeResult& result)
 {
     std::error_code none;
-    if (!fs::is_regular_file(file, none)) return;  // reading a pipe would wait
+    if (!fs::is_regular_file(file, none)) return;  // reading a pipe would block
     std::ifstream text(file);
     const CheckedJson all = CheckedJson::parse(text, nullptr, false);
     if (all.is_discarded()) return;
@@ -234,7 +234,7 @@ void read_statistics(const fs::path& file, WedgeResult& result)
     }
 }
 
-// The picture of the last frame up to `last` that has one; empty: there is none, or the files are no pictures.
+// Returns the last picture at or before frame `last`; empty if there is none, or if the files are not pictures.
 fs::path last_picture(const std::string& output, std::optional<std::int64_t> last)
 {
     const FramePattern pattern(parse_output_target(output).pattern);
@@ -287,7 +287,7 @@ ordered_json row_json(const WedgeRow& row)
     return json;
 }
 
-// Writes the contact sheet, of the last pictures of the first -o that is one. Returns false if there are none.
+// Writes the contact sheet from the last pictures of the first -o that makes pictures. Returns false if there are none.
 bool write_sheet(const fs::path& file, const std::vector<SweptSetting>& varied, const std::vector<WedgeRow>& rows)
 {
     std::vector<SheetPicture> pictures;
@@ -303,7 +303,7 @@ bool write_sheet(const fs::path& file, const std::vector<SweptSetting>& varied, 
                                                         duration_text(result.seconds))
                                           : "failed"};
     }
-    // Of combinations those that differ by the last setting alone belong together.
+    // Combinations that differ only in the last setting form a series.
     const std::size_t of_last = varied.back().values.size(), series = of_last < rows.size() ? of_last : 1;
     if (drawn) write_whole(file, picture_sheet(pictures, series).value());
     return drawn;
@@ -343,11 +343,11 @@ public:
                        "computes rows that are done, too");
         options.add_flag("--quiet", quiet_, "no progress and no table");
         farm_.declare(options);
-        options.add_option(collect_option, collect_).internal();  // what comes last on a farm
+        options.add_option(collect_option, collect_).internal();  // the last job on a farm
         untrusted_.declare(options, "graph");
     }
 
-    // The processes of the rows confine themselves; this one runs no script but in a copy of itself.
+    // The processes of the rows confine themselves; this one runs scripts only in a copy of itself.
     void confine(const CommonOptions&) override {}
     bool takes_plugins() const override { return false; }
 
@@ -376,7 +376,7 @@ public:
 private:
     static constexpr const char* collect_option = "--collect";
 
-    // A task for each row, then the report of all.
+    // Submits a task for each row, then the report of all.
     int submit(const CommonOptions& common) const
     {
         FarmJob job;
@@ -386,7 +386,7 @@ private:
         for (std::size_t row = 0; row < rows_.size(); ++row) {
             std::vector<std::string> words = words_of(row, folder, common);
             words.erase(words.begin());  // the name of the program
-            // A task that begins again goes on behind its last snapshot.
+            // A restarted task continues after its last snapshot.
             std::erase_if(words, [](const std::string& word) {
                 return word.starts_with("--threads=") || word == "--cache-every=0";
             });
@@ -404,7 +404,7 @@ private:
         return folder / fmt::format("{}.json", row + 1);
     }
 
-    // The rows have run on a farm.
+    // Collects the rows that have run on a farm.
     int collect()
     {
         for (std::size_t row = 0; row < rows_.size(); ++row) {
@@ -420,7 +420,7 @@ private:
         return report();
     }
 
-    // statistics: the folder of the statistics of all rows, where one may be missing that failed.
+    // statistics: the folder of all rows' statistics; that of a failed row may be missing.
     void end_row(std::size_t row, std::string failure, const fs::path& statistics)
     {
         WedgeResult& result = rows_[row].result;
@@ -435,7 +435,7 @@ private:
         std::fflush(stdout);
     }
 
-    // Returns the exit status. Error: a file can't be written.
+    // Returns the exit status. Throws Error if a file cannot be written.
     int report() const
     {
         const bool drawn = write_sheet(folder_ / "wedge.png", settings_, rows_);
@@ -455,7 +455,7 @@ private:
         return all_done ? status_done : status_failed;
     }
 
-    // What a misspelt setting is wrong with is found before any row runs. Error: that of `rapid check`.
+    // Finds misspelt settings before any row runs. Throws the error of `rapid check`.
     void check(const CommonOptions& common) const
     {
         std::string failure;
@@ -464,7 +464,7 @@ private:
             [&](std::size_t) {
                 std::vector<std::string> words = {"rapid", "check", graph_.file()};
                 add_shared(words, rows_.front(), common);
-                // check takes it that there are several frames.
+                // check assumes that there are several frames.
                 if (!frames_ || !frames_->single()) add_outputs(words, rows_.front());
                 return words;
             },
@@ -473,7 +473,7 @@ private:
         if (!failure.empty()) throw Error(failure);
     }
 
-    // `rapid run` of the row.
+    // Returns the words of `rapid run` for the row.
     std::vector<std::string> words_of(std::size_t number, const fs::path& statistics, const CommonOptions& common) const
     {
         const WedgeRow& row = rows_[number];
@@ -485,7 +485,7 @@ private:
                                           "--stats=" + statistics_of(statistics, number).string(),
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
         for (const std::string& frames : given_->values_of("--frames")) words.push_back("--frames=" + frames);
-        // What a row has done is known by its journal: one of the same fingerprint is not run again.
+        // A row's journal records its work: one with the same fingerprint is not run again.
         const fs::path of_rows = cache_.asked() ? fs::path(cache_.folder()) : folder_ / "wedge.cache";
         words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
         words.push_back("--cache-replace");
@@ -502,7 +502,7 @@ private:
         for (const std::string& output : row.outputs) words.push_back("--output=" + output);
     }
 
-    // The options that check and run take alike.
+    // Adds the options that check and run share.
     void add_shared(std::vector<std::string>& words, const WedgeRow& row, const CommonOptions& common) const
     {
         for (const std::string& plugin : common.plugins) words.push_back("--plugin=" + plugin);

@@ -80,7 +80,7 @@ PointSet points_of(std::span<const Event> events, std::int64_t frame)
     return points;
 }
 
-// Of a frame, as a log has them.
+// Returns the record of a frame's events, as in a log.
 std::string record_of(std::int64_t frame, const std::vector<Event>& events)
 {
     std::string record(sizeof frame + events.size() * sizeof(Event), '\0');

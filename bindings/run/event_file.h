@@ -1,4 +1,4 @@
-// The events of a run, as points in a file: --events.
+// Writes the events of a run as points in a file: --events.
 #pragma once
 
 #include <filesystem>
@@ -14,32 +14,33 @@ namespace rapid {
 
 class EventFile {
 public:
-    // path: empty where nobody asks for it.
+    // path: empty if events are not requested.
     explicit EventFile(std::string path) : path_(std::move(path)) {}
 
     const std::string& path() const { return path_; }
-    // Before the first frame. Error: no format that can be one file of points; a file that can't be written.
+    // Called before the first frame. Throws Error if the format cannot be a single file of points, or the file cannot
+    // be written.
     void begin();
 
-    // The events of a frame, in the order of their times.
+    // Adds the events of a frame, in the order of their times.
     void add(const FrameResult& result);
-    // Names the file, which there is not before.
+    // Gives the file its name, which does not exist before.
     void finish();
 
-    // From now on events go to this file, too, from which another run takes them up. Error: it can't be opened.
+    // Also writes events to this log from now on, for a later run to continue. Throws Error if it cannot be opened.
     void log_to(const std::filesystem::path& log);
-    // How far the log is, in bytes; nothing where there is none, or not any more.
+    // Returns the length of the log in bytes; nothing if there is no log, or no longer one.
     std::optional<std::uint64_t> logged() const;
-    // Why there is none any more, once.
+    // Returns why the log has stopped, once.
     std::string take_failure() { return std::exchange(failure_, {}); }
-    // Error: what the log has up to there is not whole.
+    // Throws Error if the log is not complete up to there.
     void check_log(std::uint64_t bytes) const;
-    // The events so far are those of the log up to there; it goes on behind them.
+    // Takes the events from the log up to there, and continues after them.
     void go_on_behind(std::uint64_t bytes);
 
 private:
     void check() const;
-    // Calls f with the events of each record of the log up to there. Throws Error if the log is not whole.
+    // Calls f with the events of each record of the log up to there. Throws Error if the log is not complete.
     template <class F>
     void read_log(std::uint64_t bytes, const F& f) const;
 

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 const std::string content = "content of ", code = "code of ";
 
-// To the bit, unlike describe().
+// Distinguishes values bitwise, unlike describe().
 std::string fingerprint_text(const Value& value);
 
 std::string fingerprint_text(const Table& table)
@@ -34,7 +34,7 @@ std::string fingerprint_text(const Table& table)
 
 std::string fingerprint_text(const Value& value)
 {
-    constexpr std::size_t most = 100;  // bytes; what is longer is known by its hash
+    constexpr std::size_t most = 100;  // bytes; longer texts are represented by their hash
     std::string text = "nothing";
     if (const bool* is = value.get<bool>()) text = *is ? "true" : "false";
     if (const double* number = value.get<double>()) text = fmt::format("{}", *number);
@@ -95,8 +95,8 @@ std::vector<std::string> words_of(const std::string& text)
     return words;
 }
 
-// Of the functions of a file; those that only stand in another line are the same. The body's difference follows from
-// others that are known by name: of_body says whether it is told.
+// Describes the difference between the functions of a file; functions that only moved to another line are equal. A
+// change of the body follows from others that are known by name: of_body is true if it is reported.
 std::string difference_of_code(const std::string& file, const std::string& was, const std::string& is, bool of_body)
 {
     const std::vector<std::string> before = words_of(was), now = words_of(is);
@@ -116,7 +116,7 @@ Fingerprint fingerprint_of(const Session& session, const Plan& plan, const fs::p
 {
     Fingerprint fingerprint = options;
     fingerprint["Rapid"] = RAPID_ABI;
-    // Plugins of several folders may share a name.
+    // Plugins in several folders may have the same name.
     for (const std::string& file : loaded_plugins()) {
         std::string& hashes = fingerprint["the plugin " + fs::path(file).filename().string()];
         hashes += (hashes.empty() ? "" : " ") + hash_text(file_hash(file));
@@ -136,7 +136,7 @@ std::string hash_of(const Fingerprint& fingerprint)
 {
     std::string text;
     for (const auto& [name, value] : fingerprint)
-        // Lines are left out of the code.
+        // Lines are omitted from the code.
         if (name.starts_with(code)) {
             text += fmt::format("{}:{}", name.size(), name);
             for (const std::string& word : words_of(value)) text += word.substr(word.find(':'));
@@ -198,7 +198,7 @@ void InputContents::add(const fs::path& file)
     try {
         hash = hash_text(file_hash(file));
     } catch (const Error&) {
-        return;  // who reads it says why it can't be
+        return;  // the reader of the file reports why it cannot be read
     }
     const std::lock_guard lock(mutex_);
     known_[name] = fresh_[name] = hash;

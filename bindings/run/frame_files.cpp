@@ -93,7 +93,7 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
     return merges;
 }
 
-// Notes a frame of a part. A part that was complete has no record while it is written again.
+// Records a frame of a part. A part that was complete has no record while it is written again.
 void FrameFiles::note_frame(const std::string& pattern, const std::string& output, const FrameInfo& info,
                             std::uint64_t points)
 {
@@ -117,8 +117,8 @@ void FrameFiles::write_part_records() const
         for (std::int64_t frame = record.frames.first; frame <= record.frames.last; frame += record.frames.step) {
             const std::string path = pattern.expand(frame_number(frame), sequence.output);
             std::error_code none;
-            if (!std::filesystem::exists(path, none)) continue;  // `rapid merge` says that it is missing
-            // A run that continues from a cache has not computed the frames before.
+            if (!std::filesystem::exists(path, none)) continue;  // `rapid merge` reports that it is missing
+            // A run that continues from a cache has not computed the earlier frames.
             const auto computed = sequence.points.find(frame);
             const bool is_read = computed == sequence.points.end() && format_of(path).read;
             record.files[frame] = {is_read                             ? read_points(path).size()
@@ -163,7 +163,7 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
     const auto check = [&](const std::string& pattern) {
         check_part(pattern);
         const Format& format = format_of(pattern);
-        // Each pattern of pictures keeps what it has drawn of the scene.
+        // Each pattern of pictures caches its drawing of the scene.
         if (format.film || format.extension == ".png")
             require_picture_memory(picture_->width, picture_->height, scene_->may_have_colliders(),
                                    static_cast<double>(++of_pictures),
@@ -281,7 +281,7 @@ std::string FrameFiles::how_of(const OutputTarget& to, const RunFrames& frames) 
     for (const auto& place : {picture_->position, picture_->target})
         if (place) how += fmt::format(" {},{},{}", place->x(), place->y(), place->z());
     if (picture_->fov) how += fmt::format(" {}", *picture_->fov);
-    // The camera of a picture depends on those before it.
+    // The camera of a picture depends on earlier pictures.
     how += fmt::format("; from {} in steps of {}", frames.first, frames.step);
     if (format.film) how += fmt::format(" to {}", frames.last);
     return how;
@@ -337,7 +337,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
     writer->submit(std::move(points), std::move(info), output, std::move(before));
 }
 
-// Once for each attribute that a file does not get.
+// Warns once for each attribute that a file cannot store.
 void FrameFiles::warn_of_texts(const OutputTarget& to, const PointSet& points)
 {
     const Format& format = format_of(to.pattern);
@@ -355,7 +355,7 @@ void FrameFiles::warn_of_texts(const OutputTarget& to, const PointSet& points)
     }
 }
 
-// Empty where the format of the extension writes.
+// Returns an empty function if the format of the extension writes by itself.
 FrameWriter::Write FrameFiles::write_of(const std::string& pattern) const
 {
     const auto volume = volumes_.find(pattern);
@@ -386,7 +386,7 @@ void FrameFiles::write_node(const std::string& pattern, const PointSet& points, 
 
 void FrameFiles::finish(bool complete)
 {
-    // All writers, even after a failure, so that the frames that the others hold are not lost.
+    // Finishes all writers, even after a failure, so that the frames that the others hold are not lost.
     std::exception_ptr first;
     for (auto& [key, writer] : writers_) try {
             writer->frames.finish(complete);

@@ -1,4 +1,4 @@
-// The output files of a run: those of -o, and of `:write` and `:rasterize` nodes. Each pattern has a writer of its own.
+// The output files of a run: those of -o, and of `:write` and `:rasterize` nodes. Each pattern has its own writer.
 #pragma once
 
 #include <filesystem>
@@ -22,71 +22,72 @@ namespace rapid {
 
 struct Rasterize;
 
-// The folders that files of -o go to, which are made where they are missing; of a pattern with a part that changes from
-// output to output, the one above. Error: one can't be made; a text that is no -o.
+// Returns the folders of the files of -o, which are created if missing; for a pattern with a folder that depends on the
+// output, the one above. Throws Error if one cannot be created, or if a text is not a -o.
 std::vector<std::filesystem::path> folders_of(const std::vector<std::string>& outputs);
 
 class FrameFiles {
 public:
-    // outputs: texts of -o. Error: one is none.
+    // outputs: texts of -o. Throws Error if one is invalid.
     FrameFiles(const std::vector<std::string>& outputs, std::shared_ptr<const PictureOptions> picture);
 
-    // The files are those of a part. Before all below. record: what is known of it before the run; its
-    // identity may grow until finish().
+    // Makes the files those of a part. Call it before all functions below. record: the identity known before the run;
+    // it may grow until finish().
     void take_part(std::shared_ptr<const PartRecord> record);
 
-    // Options of the plan, which must keep all attributes that -o names.
+    // Returns options of the plan, which must keep all attributes that -o names.
     PlanOptions plan_options(std::optional<std::uint64_t> seed) const;
 
-    // What `rapid merge` makes of the parts of a run: its -o, and the pattern of the parts. After resolve(). Error: a
-    // picture, which can't be put together; a name with {part}.
+    // Returns the results of `rapid merge` for the parts of a run: its -o, and the pattern of the parts. Call it after
+    // resolve(). Throws Error for a picture, which cannot be merged, or a name with {part}.
     std::vector<std::pair<std::string, std::string>> merges() const;
 
-    // Error: an unknown format; a name that nothing makes; a pattern that stands for one file but gets several frames,
-    // or for no output of the graph; two that write the same files.
+    // Throws Error for an unknown format; a name that nothing makes; a pattern for one file that gets several frames,
+    // or for no output of the graph; or two that write the same files.
     void resolve(const Plan& plan, bool several_frames);
 
-    // Adds the names of all files. After resolve(). Error: one that another has, or that is read.
+    // Adds the names of all files. Call it after resolve(). Throws Error if another writer has the name, or if the file
+    // is read.
     void claim(WrittenNames& names, const RunFrames& frames) const;
-    // The same of the files of nodes, among processes (claim_among_processes).
+    // Does the same for the files of nodes, among processes (claim_among_processes).
     void claim(const std::filesystem::path& folder, const std::string& who) const;
 
-    // The files of -o that a frame has, and how they are made besides: two of one path that are made alike are the
-    // same.
+    // The files of -o for a frame, and how they are made: two with the same path that are made alike are the same.
     struct FrameFile {
         std::string path, how;
-        bool film = false;  // one of all frames
+        bool film = false;  // one file for all frames
     };
     std::vector<FrameFile> files_of(std::int64_t frame, const RunFrames& frames) const;
 
-    // What an earlier run has left whole: it is not written again. By frame and absolute path; films by absolute path.
+    // Complete files of an earlier run, which are not written again. By frame and absolute path; films by absolute
+    // path.
     struct WholeFiles {
         struct File {
             std::string how;
             std::shared_ptr<const PictureFit> fit;  // of a picture
         };
         std::map<std::int64_t, std::map<std::string, File>> frames;
-        std::map<std::string, std::string> films;  // and how they are made
+        std::map<std::string, std::string> films;  // with how they are made
     };
     void go_on_behind(WholeFiles whole, const RunFrames& frames);
 
-    // Queues the files of a frame. Error: one of an earlier frame that could not be written.
+    // Queues the files of a frame. Throws Error if one of an earlier frame could not be written.
     void write(const FrameResult& result);
     // Queues the file of a `:write` or `:rasterize` node.
     void write_node(const std::string& pattern, const PointSet& points, const Frame& frame, double fps);
 
-    // Waits until all files are written; complete: with all frames, else there are no films and no records of a part.
-    // Error: one could not be.
+    // Waits until all files are written. complete: all frames are there; otherwise films and records of a part are not
+    // made. Throws Error if one could not be written.
     void finish(bool complete = true);
 
-    // The first name of each pattern and output, once it is known; then no more.
+    // Returns the first name of each pattern and output, once.
     std::vector<std::string> take_first_names() { return std::exchange(first_names_, {}); }
 
-    // Of what files do not hold, once for each.
+    // Returns warnings about data that files do not hold, each once.
     std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
 
-    // The files that are complete since the last call; the first frame of which one is still to come, of those that
-    // have been queued. From any thread.
+    // Return the files completed since the last call, and the first queued frame that has an unfinished file. Callable
+    // from any thread.
     struct Written : FrameWriter::Written {
         std::string how;
         bool of_node;  // a `:write` or `:rasterize`
@@ -98,7 +99,7 @@ private:
     struct Target {
         OutputTarget to;
         std::string text;                  // as the user gave it
-        std::vector<std::string> outputs;  // whose points it takes
+        std::vector<std::string> outputs;  // the outputs whose points it takes
     };
     void resolve(Target& target, const Plan& plan) const;
     void warn_of_texts(const OutputTarget& to, const PointSet& points);
@@ -129,7 +130,7 @@ private:
     std::shared_ptr<const PictureOptions> picture_;
     std::unique_ptr<SceneOfPlan> scene_;
 
-    std::shared_ptr<const PartRecord> part_;  // null where all points are simulated
+    std::shared_ptr<const PartRecord> part_;  // null if all points are simulated
     struct Sequence {
         std::string pattern, output;
         double fps;
@@ -137,7 +138,7 @@ private:
         std::map<std::int64_t, std::uint64_t> points = {};  // numbers of points, by frame
     };
     std::map<std::filesystem::path, Sequence> of_part_;  // by the file of the record
-    std::set<std::filesystem::path> begun_;              // likewise: those of which a frame was written
+    std::set<std::filesystem::path> begun_;              // likewise: those with a frame written
 
     std::set<std::string> named_;
     std::vector<std::string> first_names_;
@@ -158,7 +159,7 @@ private:
     std::map<std::string, std::unique_ptr<Writer>> writers_;
 
     WholeFiles whole_;
-    RunFrames selection_{0, 0};  // where files are whole, or are to be known as such
+    RunFrames selection_{0, 0};  // files in this range may be complete, or become known as such
 };
 
 }  // namespace rapid

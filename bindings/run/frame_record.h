@@ -1,4 +1,4 @@
-// What `--cache` keeps of each frame besides snapshots: its statistics and warnings, and which files it has written.
+// A frame's data in `--cache` besides snapshots: its statistics and warnings, and the files that it has written.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace rapid {
 
-// A file that was written, as it was then.
+// A written file, in its state at that time.
 struct WrittenFile {
     std::string path, how;  // absolute; how it is made (FrameFiles)
     bool of_node = false;   // a `:write`
@@ -20,9 +20,9 @@ struct WrittenFile {
     std::int64_t modified = 0;  // ns
     std::optional<PictureFit> fit;
 
-    // Takes bytes and modified from the file. False where it is not there.
+    // Takes bytes and modified from the file. Returns false if it does not exist.
     bool look();
-    // Whether it is there and nobody has changed it.
+    // Returns true if it exists and is unchanged.
     bool is_whole() const;
 
     template <class Archive>
@@ -36,7 +36,7 @@ struct FrameRecord {
     FrameStatistics statistics;
     std::vector<Stiffness> stiff;
     std::vector<std::string> warnings;
-    Fingerprint read;              // contents of files, since the frame before
+    Fingerprint read;              // contents of files since the previous frame
     double seconds = 0;            // of the run, until this frame's files were written
     std::uint64_t peak_bytes = 0;  // likewise
     std::vector<WrittenFile> files;

@@ -1,5 +1,5 @@
-// How statistics of frames are written down (frame_record.h): by all their members, so that one that is added does not
-// compile before it is here.
+// Serializes statistics of frames (frame_record.h) by all their members, so that a new member does not compile until it
+// is added here.
 #pragma once
 
 #include "bindings/run/frame_record.h"
@@ -45,8 +45,7 @@ void serialize(Archive& keep, ContactEnergy& energy)
     keep(added, lost);
 }
 
-// As cereal has it, which clang refuses for a class within a class: it takes that for one without a default
-// constructor.
+// Replaces cereal's version, which clang rejects for a nested class: it believes that this has no default constructor.
 template <StateArchive Archive, class T>
 void keep_optional(Archive& keep, std::optional<T>& value)
 {

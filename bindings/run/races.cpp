@@ -95,10 +95,10 @@ std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
     return std::nullopt;
 }
 
-// The first difference in the bits of two sets that should be the same.
+// Returns the first bitwise difference of two sets that should be equal.
 std::optional<Difference> compare(const PointSet& a, const PointSet& b)
 {
-    // Where ids differ, as points were killed or sorted, their values are of no interest.
+    // If ids differ, because points were killed or sorted, their values are irrelevant.
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         if (a.id()[i] != b.id()[i])
             return Difference{nullptr, fmt::format("the id at place {}", i + 1), shown(a.id()[i]), shown(b.id()[i])};
@@ -158,9 +158,9 @@ bool has_kernel(const Node& node)
     return false;
 }
 
-// The effect of an action shows only after its Solve, and that of a kernel may show only in later nodes. So each kernel
-// of the plan is run in the other order alone: the first one that makes a difference is the culprit. Failing that, it
-// is the node after which a difference was seen.
+// The effect of an action shows only after its Solve, and that of a kernel may show only in later nodes. Therefore each
+// kernel of the plan is run alone in the other order: the first one that makes a difference is the culprit. Failing
+// that, it is the node after which a difference was seen.
 std::pair<Difference, const Node*> find_culprit(const Trials& trials, const Plan& plan, const Difference& seen,
                                                 KernelOrder order)
 {

@@ -15,12 +15,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view snapshot = "snapshot";
-const std::string errors_estimated = "the estimate of errors";  // in a fingerprint
+const std::string errors_estimated = "the estimate of errors";  // name in a fingerprint
 
-// What a snapshot's file holds.
+// Contents of a snapshot's file.
 struct KeptRun {
     Snapshot snapshot;
-    std::uint64_t events = 0;  // how far the log of events was
+    std::uint64_t events = 0;  // length of the log of events
 
     template <class Archive>
     void serialize(Archive& keep)
@@ -160,7 +160,7 @@ void RunCache::read_journal()
         check_contents();
 }
 
-// Of the files that were read in frames: those of the graph are in the fingerprint.
+// Checks the files that were read in frames; those of the graph are in the fingerprint.
 void RunCache::check_contents()
 {
     std::vector<std::string> changed;
@@ -238,7 +238,7 @@ void RunCache::find_due(const Plan& plan, FrameFiles& files)
     FrameFiles::WholeFiles whole;
     for (const auto& [path, film] : known_.films)
         if (film.is_whole()) whole.films[path] = film.how;
-    std::set<std::int64_t> torn;  // frames with a file of a node that is not whole
+    std::set<std::int64_t> torn;  // frames with an incomplete file of a node
     for (const auto& [frame, record] : known_.frames) {
         if (!frames_.contains(frame)) continue;
         for (const WrittenFile& file : record.files) {
@@ -271,7 +271,7 @@ void RunCache::find_due(const Plan& plan, FrameFiles& files)
     files.go_on_behind(std::move(whole), frames_);
 }
 
-// Pictures before the first points wait for these, and then have the same camera: all of them are drawn again, or none.
+// Pictures before the first points wait for these, and then share their camera: all of them are drawn again, or none.
 void RunCache::leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const
 {
     const std::size_t series = files.files_of(frames_.first, frames_).size();
@@ -342,7 +342,7 @@ void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffnes
     record.warnings = std::exchange(warnings_, {});
     record.read = read_->take();
     for (const auto& [name, hash] : record.read) contents_[name] = hash;
-    // Files that are left as they are.
+    // Files that stay as they are.
     if (const auto known = known_.frames.find(frame.frame); known != known_.frames.end())
         for (const WrittenFile& file : known->second.files)
             if (file.is_whole()) record.files.push_back(file);

@@ -1,4 +1,4 @@
-// `--cache DIR`: snapshots of a run and a journal of its frames, from which it goes on where it was.
+// `--cache DIR`: snapshots of a run and a journal of its frames, from which a later run continues.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,7 @@ namespace rapid {
 
 class RunCache {
 public:
-    // estimates_errors: if the cache begins with this run.
+    // estimates_errors: applies if the cache begins with this run.
     RunCache(const RunCacheOptions& options, bool estimates_errors)
         : archive_(options.folder),
           every_(options.every),
@@ -34,70 +34,70 @@ public:
     bool keeps_snapshots() const { return asked() && every_ > 0; }
     const std::filesystem::path& folder() const { return archive_.folder(); }
 
-    // A file that the graph reads, before it is read.
+    // Reports a file that the graph reads, before it is read.
     void was_read(const std::filesystem::path& file);
     void set_graph(const std::filesystem::path& graph);
 
-    // What is asked for, and what the folder has of it. options: of the fingerprint. Error: another run has the folder,
-    // or it is of a run of another fingerprint.
+    // Compares the request with the folder's contents. options: for the fingerprint. Throws Error if another run uses
+    // the folder, or if its fingerprint differs.
     void begin(const Session& session, const Plan& plan, const RunFrames& frames, const Fingerprint& options,
                FrameFiles& files, EventFile& events);
 
-    // After begin(): whether this run estimates errors. All runs of a cache do, or none, as its first one has decided:
-    // estimates accumulate from frame to frame.
+    // Returns true if this run estimates errors; valid after begin(). Either all runs of a cache do or none, as decided
+    // by its first one: estimates accumulate from frame to frame.
     bool estimates_errors() const { return estimates_errors_; }
 
-    // The frames that are to be computed; nothing: all that was asked for is there.
+    // Return the frames to compute; nothing if all requested ones exist.
     std::optional<std::int64_t> first_due() const { return first_due_; }
     std::int64_t last_due() const { return last_due_; }
-    // Takes an evaluator as near to the first frame as a snapshot does.
+    // Advances an evaluator as near to the first frame as a snapshot allows.
     void restore(Evaluator& evaluator, EventFile& events);
-    // Of frames that are not computed, in order.
+    // Returns the records of frames that are not computed, in order.
     std::vector<const FrameRecord*> records(std::int64_t first, std::int64_t last) const;
 
-    // Of the frames that are computed, as RunReport hears of them. complete_before: frames of whose files none is to
-    // come; all, where none is to come of any. The seconds and the peak are those of the run until now.
+    // Report computed frames, as in RunReport. complete_before: all files of earlier frames are complete; without a
+    // value, all files are. The seconds and the peak are those of the run so far.
     void warned(const std::string& text) { warnings_.push_back(text); }
     void computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff);
     void written(const FrameFiles::Written& file);
     void complete_before(std::optional<std::int64_t> frame, double seconds, std::uint64_t peak_bytes);
 
-    // After a frame: a snapshot, where one is due, or in any case.
+    // Takes a snapshot after a frame, if one is due or in_any_case.
     void keep(const Evaluator& evaluator, EventFile& events, bool in_any_case);
-    // The frame of the last snapshot that was submitted.
+    // Returns the frame of the last submitted snapshot.
     std::optional<std::int64_t> last_kept() const { return last_kept_; }
-    // Waits for the snapshots. complete: films are, too.
+    // Waits for the snapshots. complete: films are complete, too.
     void finish(bool complete);
-    // For the user, since the last call.
+    // Returns warnings for the user since the last call.
     std::vector<std::string> take_warnings();
 
 private:
-    // What the folder has of the run.
+    // The folder's contents for the run.
     struct Known {
         Fingerprint fingerprint;
         std::map<std::int64_t, FrameRecord> frames;
         std::map<std::string, WrittenFile> films;  // by path
     };
-    // Whether a fingerprint is of this run.
+    // Returns true if a fingerprint belongs to this run.
     bool is_of_run(const Fingerprint& other) const;
     void read_journal();
     // Throws Error if the record is damaged, or of another version.
     void read_record(const std::string& record, bool is_first);
-    // fingerprint_ with the estimate of errors of another run.
+    // Returns fingerprint_ with the estimate of errors of another run.
     Fingerprint with_errors_as_in(const Fingerprint& other) const;
     void refuse(const std::vector<std::string>& differences);
     void check_contents();
     void begin_anew();
     void go_on_as_before();
-    // What is whole of the frames, and the frames that are not.
+    // Finds the complete files of the frames, and the frames to compute.
     void find_due(const Plan& plan, FrameFiles& files);
     void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;
     std::filesystem::path events_log() const { return folder() / "events"; }
     bool load(std::int64_t frame, const std::filesystem::path& file, Evaluator& evaluator, EventFile& events);
-    // Adds a record to the journal. If it can't be written, that is a warning with what follows from it.
+    // Adds a record to the journal. If it cannot be written, warns with the consequence.
     void add(const std::string& record, const char* so);
 
-    Descriptor lock_;  // until the archive has written all
+    Descriptor lock_;  // held until the archive has written everything
     FrameArchive archive_;
     const std::int64_t every_;
     bool again_;
@@ -111,7 +111,7 @@ private:
     RunFrames frames_{0, 0};
     std::int64_t first_frame_ = 0, last_due_ = 0;
     std::optional<std::int64_t> first_due_, last_kept_;
-    std::map<std::int64_t, FrameRecord> open_;  // frames whose files are to come
+    std::map<std::int64_t, FrameRecord> open_;  // frames with files still to come
     std::map<std::string, WrittenFile> films_;  // by path, that are being written
     std::vector<std::string> warnings_, failures_;
 };

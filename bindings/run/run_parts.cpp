@@ -20,19 +20,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Bytes of a frame's files beyond which its points are not all held in memory, and of them that then are.
+// Bytes of a frame's files above which its points are not all held in memory, and bytes of points that then are.
 constexpr std::uintmax_t most_in_memory = 24 << 20;
 constexpr std::size_t resident = 32 << 20;
 
-// Bytes of the files of parts that are read at the same time; in memory they take several times as much.
+// Bytes of parts' files that are read at the same time; in memory they take several times as much.
 constexpr std::uintmax_t most_read_at_once = 48 << 20;
 
-// Parts or frames that are said to be missing; a record of others may promise any number.
+// Missing parts or frames that are listed; a foreign record may promise any number.
 constexpr std::size_t most_missing = 1000;
 
 fs::path folder_above(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
-// "1-3, 7": frames that follow each other by a step of the run.
+// Returns "1-3, 7" for frames that follow each other by a step of the run.
 std::string list_of_frames(const std::vector<int>& frames, std::int64_t step)
 {
     std::vector<std::string> runs;
@@ -44,7 +44,7 @@ std::string list_of_frames(const std::vector<int>& frames, std::int64_t step)
     return fmt::format("{}", fmt::join(runs, ", "));
 }
 
-// The patterns that {part} stands for: those of which there is a record, in order of name.
+// Returns the patterns that {part} stands for: those with a record, ordered by name.
 std::vector<std::string> found_parts(const std::string& pattern)
 {
     constexpr std::string_view variable = "{part}";
@@ -71,8 +71,8 @@ std::vector<std::string> found_parts(const std::string& pattern)
     return found;
 }
 
-// Reads the file of a part. Throws Error if its bytes are not those that the part has written: it may be of another run
-// or frame, or lack its last points.
+// Reads the file of a part. Throws Error if its bytes are not those that the part has written: it may belong to another
+// run or frame, or lack its last points.
 PointSet read_part(const std::string& file, const PartRecord::File& written)
 {
     PointSet points = read_points(file);
@@ -116,7 +116,7 @@ RunParts::RunParts(const std::vector<std::string>& given)
     }
     std::vector<std::string> problems;
     std::map<int, PartFiles> parts;
-    std::string first;  // the text of the part that the others are compared with
+    std::string first;  // the text of the part with which the others are compared
     const PartRecord* with = nullptr;
     for (const std::string& pattern : patterns) {
         const fs::path file = part_record_file(pattern);

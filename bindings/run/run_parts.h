@@ -1,4 +1,4 @@
-// The parts of a run, put together frame by frame.
+// Merges the parts of a run, frame by frame.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,23 @@ namespace rapid {
 
 class RunParts {
 public:
-    // patterns: of the parts, as -o of their runs had them; {part} stands for all parts. Error: what is missing,
-    // doubled or does not fit, all of it; files that hold no points.
+    // patterns: of the parts, as in -o of their runs; {part} stands for all parts. Throws Error with everything that is
+    // missing, duplicate or inconsistent, or if the files do not hold points.
     explicit RunParts(const std::vector<std::string>& patterns);
 
     std::size_t count() const { return parts_.size(); }
-    // In order.
+    // Returns the frames in order.
     std::vector<int> frames() const;
 
-    // Error: a pattern for files that hold no points, that all frames would go to, or that would replace a part.
+    // Throws Error for a pattern whose files do not hold points, that all frames would share, or that would replace a
+    // part.
     void check_output(const std::string& output) const;
-    // Writes a frame of the whole to its file of the pattern, and gives the number of its points. Meanwhile large
-    // columns of the whole process may lie in files (column_files.h).
+    // Writes a merged frame to its file of the pattern, and returns its number of points. Meanwhile large columns of
+    // the whole process may be stored in files (column_files.h).
     std::uint64_t write_frame(int frame, const std::string& output) const;
 
 private:
-    // One part: its sequence, and what is known of it.
+    // A part: its sequence and its record.
     struct PartFiles {
         std::string text;  // the pattern
         PartRecord record;

@@ -74,7 +74,7 @@ std::string row_name(int row, const std::string& name)
     return json.text();
 }
 
-// An event with a length, in µs.
+// Returns an event with a duration, in µs.
 std::string complete(const std::string& name, const char* category, int row, double begin, double length,
                      const auto&... args)
 {
@@ -263,7 +263,7 @@ std::string RunReport::finish_early()
 
 std::optional<RunReport::Abandoned> RunReport::abandon()
 {
-    // The run's own thread holds the lock only briefly, unless the program does not return from what it is told.
+    // The run's own thread holds the lock only briefly, unless a callback of the program does not return.
     const std::unique_lock lock(mutex_, std::chrono::seconds(1));
     if (!lock) return std::nullopt;
     is_abandoned_ = true;

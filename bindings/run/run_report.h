@@ -1,5 +1,5 @@
-// What is told of a run while it goes on and when it ends, however it ends: its frames, its warnings, the files of its
-// statistics and its profile; and what a cache keeps of all that.
+// Reports on a run while it goes on and when it ends, however it ends: its frames, its warnings, the files of its
+// statistics and its profile; and the cached form of these.
 #pragma once
 
 #include <chrono>
@@ -24,20 +24,21 @@
 
 namespace rapid {
 
-// The file of --stats, written while the run goes on: a run of many frames keeps none of them.
+// The file of --stats, written during the run, so that frames need not be held in memory.
 
-// What fails is told at the end: the frames of the run are worth more.
+// Failures are reported at the end: the frames of the run are more important.
 class StatisticsFile {
 public:
     StatisticsFile(std::string path, const RunStatistics& run);
 
-    // A frame waits for the time of writing its files, which come later.
+    // A frame waits for the time of writing its files, which is known later.
     void add(const FrameStatistics& frame);
     void add_writing(std::int64_t frame, double seconds);
-    // Writes the frames before this one, of whose files none is to come; all, where none is to come of any.
+    // Writes the frames before this one, whose files are all complete; without a value, all frames.
     void write_before(std::optional<std::int64_t> frame);
 
-    // Writes all frames and the end, and names the file; a second call does nothing. Error: it could not be written.
+    // Writes all frames and the end, and names the file; a second call does nothing. Throws Error if it could not be
+    // written.
     void finish(const RunStatistics& run);
 
 private:
@@ -50,10 +51,10 @@ private:
     bool is_first_ = true, is_finished_ = false;
 };
 
-// The file of --profile: what each pass, frame and file took, in the trace format of Chrome, which the browser
+// The file of --profile: the time of each pass, frame and file, in Chrome's trace format, which the browser
 // (chrome://tracing) and Perfetto open.
 
-// Written while the run goes on. What fails is told at the end: the frames of the run are worth more.
+// Written during the run. Failures are reported at the end: the frames of the run are more important.
 class ProfileFile {
 public:
     explicit ProfileFile(std::string path);
@@ -61,7 +62,7 @@ public:
     void add(const FrameResult& result);
     void add(const FrameWriter::Written& file);
 
-    // Ends the list and names the file; a second call does nothing. Error: it could not be written.
+    // Ends the list and names the file; a second call does nothing. Throws Error if it could not be written.
     void finish();
 
 private:
@@ -91,27 +92,27 @@ public:
         std::function<void(const std::string& text)> line;
         std::function<void(const std::string& text)> warning;
     };
-    // The run's time begins here. files: those that the run writes; cache: hears of all frames, null where there is
+    // The run's time begins here. files: those that the run writes; cache: is notified of all frames; null if there is
     // none.
     RunReport(Options options, Listener listener, FrameFiles& files, RunCache* cache);
 
-    // A frame that an earlier run has computed; is_before: before all that this one computes.
+    // Reports a frame that an earlier run has computed; is_before: before all that this one computes.
     void known_frame(const FrameRecord& record, bool is_before);
     void frame(const FrameResult& result);
     void line(const std::string& text);
-    // Each text once.
+    // Reports each text once.
     void warning(const std::string& text);
-    // Of a frame. Warnings tend to repeat in the next ones: of those that differ in numbers alone the first are told as
-    // they come, and the rest is counted for the end.
+    // Reports a warning of a frame. Warnings tend to repeat in later frames: of those that differ only in numbers the
+    // first are printed at once, and the rest is counted for the end.
     void warning(const std::string& text, std::int64_t frame);
 
-    // The run is complete: tells what was only counted, and writes statistics and profile. Returns the summary. Error:
-    // a file can't be written.
+    // Ends a complete run: reports the counted warnings, and writes statistics and profile. Returns the summary. Throws
+    // Error if a file cannot be written.
     std::string finish();
-    // It ends before. Returns why a file could not be written; empty where they were.
+    // Ends an incomplete run. Returns why a file could not be written; empty if all were.
     std::string finish_early();
-    // From another thread, at any moment, before the process ends: what is told afterwards does not return. Nothing
-    // where the run's own thread does not let go within a second.
+    // Called from another thread at any time, before the process ends: later reports do not return. Returns nothing if
+    // the run's own thread does not release the lock within a second.
     struct Abandoned {
         std::vector<std::string> warnings;
         std::string failure;  // as finish_early()
@@ -119,10 +120,10 @@ public:
     std::optional<Abandoned> abandon();
 
 private:
-    // For what the run's own thread tells. Does not return where the run has been abandoned.
+    // Locks for reports of the run's own thread. Does not return if the run has been abandoned.
     std::unique_lock<std::timed_mutex> locked();
     void add_writing();
-    // Statistics and profile. Error: a file can't be written.
+    // Writes statistics and profile. Throws Error if a file cannot be written.
     void write_statistics();
     std::string try_to_write();
     void tell(const std::string& text, std::int64_t frame);
@@ -133,7 +134,7 @@ private:
     FrameFiles& files_;
     RunCache* const cache_;
     const Stopwatch stopwatch_;
-    double earlier_seconds_ = 0;  // of the runs that this one goes on behind
+    double earlier_seconds_ = 0;  // of the runs that this one continues
     std::uint64_t earlier_peak_ = 0;
 
     std::timed_mutex mutex_;
@@ -142,7 +143,7 @@ private:
     RunTotals totals_;
     std::optional<StatisticsFile> statistics_;
     std::optional<ProfileFile> profile_;
-    std::set<std::string> warned_;  // of no frame: as many as the scene makes
+    std::set<std::string> warned_;  // without a frame: limited by the scene
     FrameWarnings frame_warnings_;
 };
 

@@ -17,7 +17,7 @@
 namespace rapid {
 namespace {
 
-// The output that is compared: main, or the only one.
+// Returns the output that is compared: main, or the only one.
 std::string compared_output(const Plan& plan)
 {
     if (plan.outputs.size() > 1 && !plan.outputs.count("main"))
@@ -30,9 +30,9 @@ bool is_compared(const Study& study, std::int64_t frame)
     return study.last_frame_only ? frame == study.last : frame > study.first && frame <= study.last;
 }
 
-// The rounding error of a position after n frames, m, as the state is rounded to single precision once a frame: each
-// frame adds up to half an ulp of P, and of v times the remaining time, in both directions, so that n such errors grow
-// as sqrt(n).
+// Returns the rounding error of a position after n frames, m. The state is rounded to single precision once a frame:
+// each frame adds up to half an ulp of P, and of v times the remaining time, in both directions, so that n such errors
+// grow as sqrt(n).
 double rounding_of(const PointSet& points, std::int64_t frames, double time)
 {
     const auto ulp_of_largest = [&](const Column<Vec3f>& column) {
@@ -49,7 +49,7 @@ class Measure {
 public:
     Measure(const Study& study, const Session& session) : study_(study), session_(session) {}
 
-    // The largest residual of the frame's constraints.
+    // Adds the largest residual of the frame's constraints.
     void add(const FrameFigures& figures, const PointSet& points)
     {
         residual_ = std::max(residual_, figures.constraint_residual_max);
@@ -73,7 +73,7 @@ public:
                 (points.P()[match.a[i]].cast<double>() - reference.P()[match.b[i]].cast<double>()).norm());
     }
 
-    // Error: the run has no error that is a number.
+    // Throws Error if the run has no numeric error.
     StudyRow row() const
     {
         if (!study_.compares() && !constrained_)
@@ -110,7 +110,7 @@ private:
     std::vector<double> distances_;
 };
 
-// Reads the next frame of a reference. Throws Error if it is another one.
+// Reads the next frame of a reference. Throws Error if it is a different one.
 PointSet frame_of(const RecordLog& reference, std::int64_t frame, std::uint64_t& place)
 {
     std::string record;
@@ -123,7 +123,7 @@ PointSet frame_of(const RecordLog& reference, std::int64_t frame, std::uint64_t&
     throw Error(fmt::format("the reference has no frame {}", frame));
 }
 
-// Computes all frames, and gives those that are compared to `keep`. Returns the time, s.
+// Computes all frames, and passes those that are compared to `keep`. Returns the time, s.
 double run_frames(const Plan& plan, const Study& study,
                   const std::function<void(const FrameResult& result, const PointSet& points)>& keep)
 {
@@ -182,8 +182,8 @@ StudyRow StudyScene::measure(const RecordLog* reference, const Progress& progres
 {
     Measure measure(study_, session_);
     std::vector<double> seconds;
-    // The first run warms caches, compiled kernels and the allocator, and measures the error: each run of a scene gives
-    // the same bits. Each run has a plan of its own, so that it does not reuse the shapes of another.
+    // The first run warms caches, compiled kernels and the allocator, and measures the error: all runs of a scene are
+    // bit-identical. Each run has its own plan, so that it does not reuse the shapes of another.
     for (int run = 0; run <= study_.repeat_runs; ++run) {
         const Plan plan = this->plan();
         if (run == 0) progress(0);

@@ -1,4 +1,4 @@
-// A scene of a study: at the knobs of a row, or of the reference that rows are compared with.
+// A scene of a study, at the knobs of a row or of the reference.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,31 @@
 
 namespace rapid {
 
-// Where the scenes of a study come from.
+// The source of a study's scenes.
 struct StudySource {
-    std::string file;  // a study file, which makes a scene of its knobs (docs/lua-api.md), or a scene
+    std::string file;  // a study file, which makes a scene from its knobs (docs/lua-api.md), or a scene
     bool is_scene = false;
-    SessionOptions session;  // but the knobs
+    SessionOptions session;  // all except the knobs
     std::optional<std::uint64_t> seed;
 };
 
-// The study of a study file. Error: the file is wrong.
+// Returns the study of a study file. Throws Error if the file is wrong.
 Study read_study(const StudySource& source);
 
 class StudyScene {
 public:
-    // Runs the file. The study lives longer. Error: the file or a knob is wrong.
+    // Runs the file. The study must outlive this object. Throws Error if the file or a knob is wrong.
     StudyScene(const Study& study, const StudySource& source, const Knobs& knobs);
 
     std::int64_t first_frame() const { return Plan(graph_, {seed_, {}}).first_frame(); }
 
-    // Both tell how many runs are done: 0 when the first frame is due. Error: frames before the scene's first; no
-    // output that is to be compared; those of frames; no error that is a number.
+    // Both report the number of completed runs: 0 before the first frame. They throw Error if frames precede the
+    // scene's first, if no output can be compared, if a frame fails, or if the error is not a number.
     using Progress = std::function<void(int runs)>;
 
-    // Replaces what the log has by the frames that are compared.
+    // Replaces the contents of the log with the frames that are compared.
     void keep_frames(RecordLog& log, const Progress& progress) const;
-    // Runs it once to measure the error, then for the time, as often as the study wants. reference: null where the
+    // Runs it once to measure the error, then for the time, as often as the study requests. reference: null if the
     // study needs none.
     StudyRow measure(const RecordLog* reference, const Progress& progress) const;
 

@@ -19,7 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The same for all ways to the file, but for a link in its place, which a written file replaces.
+// Returns the same path for all ways to the file. A symbolic link in its place is not followed, since writing replaces
+// it.
 fs::path true_path(const fs::path& file)
 {
     const fs::path full = fs::absolute(file);
@@ -35,7 +36,7 @@ std::optional<int> number(std::int64_t frame)
     return static_cast<int>(frame);
 }
 
-// The frame whose file has this name.
+// Returns the frame whose file has this name.
 std::optional<int> frame_named(const std::string& name, const FramePattern& pattern)
 {
     constexpr const char* digits = "0123456789";
@@ -72,7 +73,7 @@ void WrittenNames::add(const FramePattern& pattern, std::string_view output, con
     writers_.push_back(std::move(writer));
 }
 
-// The file's name where it is one of the writer's.
+// Returns the file's name if it is one of the writer's.
 std::optional<std::string> WrittenNames::name_of_file(const Writer& writer, const fs::path& file) const
 {
     if (file.parent_path() != writer.folder) return std::nullopt;
@@ -87,7 +88,7 @@ std::optional<std::string> WrittenNames::common_name(const Writer& a, const Writ
     if (!a.pattern) return name_of_file(b, a.folder / a.name);
     if (!b.pattern) return name_of_file(a, b.folder / b.name);
     if (a.folder != b.folder) return std::nullopt;
-    // Of patterns that differ in the number of digits the longest numbers are alike.
+    // In patterns that differ in the number of digits, the longest numbers are alike.
     for (const std::int64_t frame : {a.frames.first, a.frames.last})
         if (const auto at = number(frame); at && a.pattern->expand(*at) == b.pattern->expand(*at))
             return a.pattern->expand(*at);
@@ -104,7 +105,7 @@ void WrittenNames::check(const Writer& writer) const
             throw Error(fmt::format("the run reads {}; write to another name", *name));
 }
 
-// A note is a file that only one process makes.
+// A note is a file that only one process can make.
 void claim_among_processes(const fs::path& folder, const std::string& who, const fs::path& file)
 {
     const fs::path note = folder / (hash_text(content_hash(true_path(file).native())) + ".claim");

@@ -1,5 +1,5 @@
-// The names that a run writes to. Where two writers had one name, what one of them wrote would be lost, and what the
-// run reads is not its own: both are errors.
+// The names of the files that a run writes. If two writers shared a name, one's output would be lost, and a run must
+// not overwrite its inputs: both are errors.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,11 @@ namespace rapid {
 
 class WrittenNames {
 public:
-    // What the run reads before its first frame.
+    // Adds a file that the run reads before its first frame.
     void reads(const std::filesystem::path& file);
-    // One file. who: "statistics". Error: it is read, or another's.
+    // Adds one file. who: "statistics". Throws Error if it is read, or belongs to another writer.
     void add(const std::filesystem::path& file, std::string who);
-    // One file for each frame, or of all where the pattern has no frame number. who: "output x.####.csv".
+    // Adds one file for each frame, or for all if the pattern has no frame number. who: "output x.####.csv".
     void add(const FramePattern& pattern, std::string_view output, const RunFrames& frames, std::string who);
 
 private:
@@ -40,7 +40,7 @@ private:
     std::vector<Writer> writers_;
 };
 
-// Among processes: notes in the folder that the file is that of `who`. Error: it is another's.
+// Notes in the folder that the file belongs to `who`, among processes. Throws Error if it belongs to another.
 void claim_among_processes(const std::filesystem::path& folder, const std::string& who,
                            const std::filesystem::path& file);
 

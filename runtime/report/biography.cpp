@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// Columns of the solver's own, which say nothing about a point's life.
+// Returns true for the solver's own columns, which do not concern a point's life.
 bool is_hidden(const std::string& name)
 {
     return name == "id" || name == "dt" || name == "still" || name.starts_with("stuck");
@@ -39,7 +39,7 @@ bool same_bits(const AttributeValue& a, const AttributeValue& b)
                                          a);
 }
 
-// m/s², of one force on one point, its linear parts included.
+// Returns the acceleration of one point by one force, including its linear parts, m/s².
 Vec3d acceleration_by(const Force& force, const PointSet& point, double begin, double h)
 {
     std::array<Vec3d, 1> P = {point.P()[0].cast<double>()}, v = {point.v()[0].cast<double>()};
@@ -167,7 +167,7 @@ void Biographer::leave(const Node& node, const PointSet& points)
             if (!followed.alive) return;
             if (kind == NodeKind::Source)
                 die(followed, node.name, "taken away by an emitter of another chain");
-            else if (followed.before && planned.in_loop && kind != NodeKind::Solve)  // of Solve the record tells why
+            else if (followed.before && planned.in_loop && kind != NodeKind::Solve)  // Solve's record has the reasons
                 die(followed, node.name, "removed by " + node.name);
             else if (followed.before && !planned.in_loop)
                 step.edits.push_back({node.name, {}, true});
@@ -220,7 +220,7 @@ void Biographer::note_record(Followed& followed, const StepRecord& record, Biogr
     const std::vector<KnownCollider>& colliders = colliders_[followed.simulation];
     const std::uint32_t before = find(record.before, id);
     if (before != IdIndex::none) {
-        // The moment of birth, where the emitter tells it: a newborn moves for a part of the step.
+        // The time of birth, if the emitter provides it: a newborn moves for part of the step.
         const Column<float>* own = record.before.find<float>("dt");
         if (followed.life.birth && own && id >= record.first_new && followed.life.birth->time == step.time)
             followed.life.birth->time = record.time - std::min(record.h, double((*own)[before]));

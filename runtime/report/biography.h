@@ -1,4 +1,4 @@
-// The lives of single points: birth, what each node changed, the forces on them, contacts, sleep, death and why.
+// The lives of single points: birth, changes by each node, forces, contacts, sleep, and the cause of death.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace rapid {
 
-// All attributes of a point, and 0 or 1 for each group as group:NAME.
+// All attributes of a point; groups are 0 or 1 as group:NAME.
 using PointValues = std::map<std::string, AttributeValue>;
 
 struct Biography {
@@ -29,7 +29,7 @@ struct Biography {
     struct Edit {
         std::string node;
         std::map<std::string, std::pair<AttributeValue, AttributeValue>> changes;  // before and after
-        bool removed = false;  // from the output: behind Solve, where the simulation keeps it
+        bool removed = false;  // from the output, after Solve; the simulation retains it
     };
     struct Force {
         std::string node;
@@ -40,7 +40,7 @@ struct Biography {
         double time, speed, impulse;
         Vec3f P, normal;
     };
-    // A step of the simulation; a frame has several where it has sub-frames.
+    // A step of the simulation; a frame with sub-frames has several.
     struct Step {
         std::int64_t frame;
         double time;  // its end, s since the start
@@ -48,8 +48,8 @@ struct Biography {
         std::vector<Force> forces;
         std::vector<Contact> contacts;
         bool asleep = false;                // when it entered Solve
-        bool has_contacts = true;           // whether they are known: not where Solve has a tolerance
-        std::optional<PointValues> values;  // at its end; nothing where the point has died
+        bool has_contacts = true;           // false with a tolerance in Solve, when contacts are unknown
+        std::optional<PointValues> values;  // at its end; nothing if the point has died
     };
 
     std::optional<Moment> birth, death;
@@ -60,17 +60,17 @@ struct Biography {
 // (PlanOptions::keep_steps).
 class Biographer {
 public:
-    // Points with these ids in each simulation, or in that of one create. Error: there is no such create.
+    // ids: points in each simulation, or in that of one create node. Throws Error if that does not exist.
     Biographer(const Plan& plan, const std::vector<std::int64_t>& ids, const std::string& create = {});
 
-    // Before the first frame.
+    // Called before the first frame.
     void watch(Evaluator& evaluator);
-    // For the constructor of the evaluator.
+    // Returns the hook for the evaluator's constructor.
     Evaluator::ResultHook results();
-    // After each frame.
+    // Called after each frame.
     void add(const FrameResult& result);
 
-    // Of those that were born, by simulation, in the order of the ids.
+    // Returns the lives of the points that were born, by simulation, in the order of the ids.
     std::vector<Biography> lives() const;
 
 private:
@@ -85,7 +85,7 @@ private:
         std::string node;
         bool kills;
     };
-    // Calls f for those that a node's points may hold.
+    // Calls f for each followed point that may be among a node's points.
     template <class F>
     void for_each_of(const Node& node, const F& f);
     void enter(const Node& node, const Frame& frame, std::span<const Flow> inputs);
@@ -101,7 +101,7 @@ private:
     std::vector<std::vector<KnownCollider>> colliders_;  // by simulation, in the order of the chain
 };
 
-// As a text of a line an event, and as JSON.
+// Return the lives as text with a line per event, and as JSON.
 std::string to_text(const std::vector<Biography>& lives);
 std::string to_json(const std::vector<Biography>& lives);
 

@@ -42,7 +42,7 @@ private:
 
 std::string bytes(std::size_t count) { return fmt::format("{} B", count); }
 
-// The name of an attribute, with its simulation where there are several.
+// Returns the name of an attribute, with its simulation if there are several.
 std::string shown(const Explanation::ExplainedAttribute& attribute, const Explanation& plan)
 {
     const bool several = attribute.simulation != plan.attributes.front().simulation ||

@@ -11,12 +11,12 @@ namespace rapid {
 std::string to_text(const Explanation& plan);
 std::string to_json(const Explanation& plan);  // an object, in one line
 
-// The part that `one` keeps and `other` does not. Nodes are compared by type, as names differ from scene to scene.
+// Returns the part that `one` keeps and `other` does not. Nodes are compared by type, as names differ between scenes.
 Explanation surplus(const Explanation& one, const Explanation& other);
 std::string text_of_surplus(const std::string& file, const std::string& other, const Explanation& surplus);
 std::string json_of_surplus(const Explanation& surplus);  // an object, in one line
 
-// What nodes keep, in bytes, by a heading.
+// Bytes that nodes hold, under a heading.
 struct KeptBytes {
     std::string name;
     std::size_t bytes;

@@ -1,4 +1,4 @@
-// Where the time of a frame went.
+// The time of each pass of a frame.
 #pragma once
 
 #include <string>

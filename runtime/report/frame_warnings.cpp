@@ -9,7 +9,7 @@ namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// The end of the number that begins at a digit: 12, 1.5, 1e-06.
+// Returns the end of the number that begins at a digit: 12, 1.5, 1e-06.
 std::size_t end_of_number(std::string_view text, std::size_t at)
 {
     const auto digit_at = [&](std::size_t i) { return i < text.size() && is_digit(text[i]); };
@@ -24,7 +24,7 @@ std::size_t end_of_number(std::string_view text, std::size_t at)
     return at;
 }
 
-// Of FILE:LINE: at the beginning; 0 where there is none.
+// Returns the end of FILE:LINE: at the beginning; 0 if there is none.
 std::size_t end_of_place(std::string_view text)
 {
     const std::size_t end = text.find(": ");

@@ -1,4 +1,4 @@
-// The warnings of a run's frames, in bounded memory: one that comes again with other numbers is counted.
+// Collects the warnings of a run's frames in bounded memory: a repeated warning with other numbers is counted.
 #pragma once
 
 #include <cstdint>
@@ -9,26 +9,26 @@
 
 namespace rapid {
 
-// What warnings that differ in numbers alone have in common: those of a place (FILE:LINE: ) and in quotes, of names,
-// are kept.
+// Returns the common form of warnings that differ only in numbers. Numbers in a place (FILE:LINE: ) and in quoted names
+// remain.
 std::string kind_of_warning(std::string_view text);
 
 class FrameWarnings {
 public:
     static constexpr std::size_t most_kinds = 1000, told_of_each = 10;
 
-    // Whether it is to be told now, as the first ten of a kind are, each once.
+    // Adds a warning. Returns true if it should be printed now: the first ten of a kind are, each once.
     bool add(const std::string& text, std::int64_t frame);
 
-    // For the end, in the order of their frames: of each kind how many more there were, and the last of them. Then how
-    // many warnings were of further kinds than the most.
+    // Returns summaries for the end of the run, in the order of their frames: for each kind the number of further
+    // warnings and the last of them; then the number of warnings of further kinds.
     std::vector<std::string> untold() const;
 
 private:
     struct Kind {
         std::vector<std::string> told;
         std::uint64_t untold = 0;
-        std::string last;        // of those that were not told
+        std::string last;        // the last one that was not printed
         std::int64_t frame = 0;  // its frame
     };
     std::map<std::string, Kind> kinds_;

@@ -37,7 +37,7 @@ const char* name_of(Edge::Kind kind)
     return kind == Edge::Kind::Flow ? "flow" : kind == Edge::Kind::Source ? "source" : "feedback";
 }
 
-// UTF-8 without control characters, whatever the text is.
+// Returns any text as UTF-8 without control characters.
 std::string clean(const std::string& text)
 {
     const std::string valid =
@@ -45,7 +45,7 @@ std::string clean(const std::string& text)
     return ordered_json::parse(valid).get<std::string>();
 }
 
-// A string of the language of Graphviz, in which \N and the like stand for names.
+// Returns a string in Graphviz's language, in which \N and the like stand for names.
 std::string quoted(const std::string& text)
 {
     std::string result = "\"";
@@ -114,7 +114,7 @@ std::string tip_of(const GraphPicture::Node& node)
     return node.changes.empty() ? tip : fmt::format("{}; {}", tip, node.changes);
 }
 
-// Numbers of a text such as "e,27,18 54.5,18" in pairs; the arrow's head, which is marked by a letter, last.
+// Returns the numbers of a text such as "e,27,18 54.5,18" in pairs; the arrow's head, marked by a letter, comes last.
 ordered_json path_of(const std::string& text, double height)
 {
     ordered_json path = ordered_json::array(), head;
@@ -132,7 +132,7 @@ ordered_json path_of(const std::string& text, double height)
     return path;
 }
 
-// Places by the names that to_dot() gives: n0, n1, ...; of edges in the order in which it writes them.
+// Sets positions by the names that to_dot() assigns, n0, n1, ...; edges have the order in which it writes them.
 void place(const ordered_json& laid_out, ordered_json& nodes, ordered_json& edges, ordered_json& size)
 {
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0;

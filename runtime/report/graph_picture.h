@@ -1,4 +1,4 @@
-// The graph of a plan as a picture: its nodes, what flows between them, and why some are left out.
+// The graph of a plan as a picture: its nodes, the data between them, and the reasons for pruning some.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ struct GraphPicture {
         std::string name, type, kind;  // kind: "source", "points", "dynamic", "merge", "solve"
         std::string file;              // where the graph file makes it
         int line = 0;
-        std::string simulation;  // the name of its create; empty of what is left out
+        std::string simulation;  // name of its create node; empty for pruned nodes
         bool kept = true;
         std::string evaluated, why, changes;                         // as in Explanation
         std::vector<std::pair<std::string, std::string>> arguments;  // as the graph file gives them
@@ -35,13 +35,13 @@ struct GraphPicture {
 
 GraphPicture picture_of(const Plan& plan);
 
-// For Graphviz: from left to right, with a dashed edge from each Solve to its Create. Without tips the text is the same
-// for all values of parameters, as the layout is.
+// Returns the graph for Graphviz: from left to right, with a dashed edge from each Solve to its Create. Without tips
+// the text is the same for all values of parameters, and so is the layout.
 enum class Tips { Kept, LeftOut };
 std::string to_dot(const GraphPicture& picture, Tips tips = Tips::Kept);
 
-// The picture as JSON; laid_out: what `dot -Tjson` makes of to_dot(), for the places of nodes and the paths of edges in
-// points (1/72 inch) from the upper left corner; empty: without places.
+// Returns the picture as JSON. laid_out: the output of `dot -Tjson` for to_dot(), with the positions of nodes and the
+// paths of edges in points (1/72 inch) from the upper left corner; empty: without positions.
 std::string to_json(const GraphPicture& picture, const std::string& laid_out);
 
 }  // namespace rapid

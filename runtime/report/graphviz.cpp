@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-// A file in memory: dot may read and write as it likes, without a pipe that fills.
+// Returns a file in memory: unlike a pipe it never blocks dot.
 Descriptor memory_file()
 {
     Descriptor file(memfd_create("dot", MFD_CLOEXEC));

@@ -1,12 +1,12 @@
-// Graphviz's dot, a program of its own, which lays graphs out.
+// Runs dot, Graphviz's program for laying out graphs.
 #pragma once
 
 #include <string>
 
 namespace rapid {
 
-// What `dot -T<format>` makes of a graph in its language. Error: there is no dot on the PATH, with the package that has
-// it; or what it says.
+// Returns the output of `dot -T<format>` for a graph. Throws Error with the name of the package if dot is not on the
+// PATH, or with dot's own message.
 std::string lay_out(const std::string& graph, const std::string& format);
 
 }  // namespace rapid

@@ -5,7 +5,7 @@
 
 namespace rapid {
 
-// The largest resident set size so far (VmHWM), bytes; 0 where the system does not report it.
+// Returns the largest resident set size so far (VmHWM), bytes; 0 if the system does not report it.
 std::uint64_t peak_memory();
 
 }  // namespace rapid

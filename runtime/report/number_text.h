@@ -1,4 +1,4 @@
-// Numbers as people read them.
+// Formats numbers for people.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ std::string in_millions(double count);             // "3.21 million"
 std::string memory_text(std::uint64_t bytes);      // "85.2 MiB"
 std::string duration_text(double seconds);         // "0.042 s", "2 min 05 s"
 
-// A line for each row. Columns are as wide as their longest cell; the first `left` are aligned to the left. The first
-// row has the titles, and all columns.
+// Returns a line for each row. Columns are as wide as their longest cell; the first `left` are aligned to the left. The
+// first row has the titles, and all columns.
 using TextTable = std::vector<std::vector<std::string>>;
 std::string table_text(const TextTable& rows, std::size_t left = 0);
 

@@ -1,4 +1,4 @@
-// The statistics of a run, by frame and in all: the summary, and the file that --stats writes.
+// The statistics of a run, by frame and in total: the summary, and the file that --stats writes.
 #pragma once
 
 #include <cstdint>
@@ -28,16 +28,16 @@ struct FrameStatistics {
     std::uint64_t born = 0, died = 0, collisions = 0;
     std::uint64_t contact_limit = 0, trapped = 0;  // points of which Solve warns (FrameFigures)
     int substeps = 0;
-    // Estimated position errors, m: accumulated since birth, and made in this frame alone; nothing where none were
-    // estimated. And what is in neither, as texts.
+    // Estimated position errors, m: accumulated since birth, and of this frame alone; nothing if none were estimated.
+    // Also the contributions that neither includes, as text.
     struct Error {
         double p50, p95, max;
     };
     std::optional<Error> error, frame_error;
     std::vector<std::string> left_out_of_errors;
-    double rounding = 0;  // m, the most by which rounding of positions has displaced a point of the sample since birth
-    // Change of the energy of motion of that sample by the integrator since birth, J/kg: the mean, and the largest
-    // magnitude. Nothing where the energy is not defined (energy_drift.h).
+    double rounding = 0;  // m, largest displacement of a sampled point since birth by rounding of positions
+    // Change of the sample's kinetic energy by the integrator since birth, J/kg: the mean, and the largest magnitude.
+    // Nothing if the energy is not defined (energy_drift.h).
     struct EnergyDrift {
         double mean, max;
     };
@@ -47,23 +47,23 @@ struct FrameStatistics {
     ContactEnergy contact_energy;
     std::optional<Ledger> ledger;
     std::vector<BandFigures> bands;
-    double constraint_residual_max = 0;   // m; 0 where nothing is constrained
+    double constraint_residual_max = 0;   // m; 0 if nothing is constrained
     std::uint64_t constraint_rows = 0;    // active at the frame's end
-    std::uint64_t loose_constraints = 0;  // of these, with an error above a tenth of their size
+    std::uint64_t loose_constraints = 0;  // those with an error above a tenth of their size
     std::uint64_t broken = 0;             // rods and springs that broke in the frame
     std::uint64_t asleep = 0;             // sleeping points at the frame's end
     std::optional<Residual::Search> contact_search;
     StageSeconds seconds;
-    // What each pass took, in order; sub-frames added up. The points and bytes of the last.
+    // Time of each pass, in order; sub-frames are added up, except points and bytes, which are those of the last one.
     struct Node {
-        std::vector<std::string> nodes;  // names: one, or neighbours that went over the points together
+        std::vector<std::string> nodes;  // names: one, or neighbours that processed the points together
         double seconds;                  // of the wall, s
         std::uint64_t points, bytes;     // of the result
     };
     std::vector<Node> nodes;
 };
 
-// Without the time of writing, which comes later.
+// Returns the statistics without the time of writing, which is known later.
 FrameStatistics statistics_of(const FrameResult& result);
 
 struct RunStatistics {
@@ -74,18 +74,18 @@ struct RunStatistics {
     std::vector<Stiffness> stiff;  // the worst of each node
 };
 
-// The text of a statistics file, in the pieces in which a run knows them: its head; a line for each frame, behind the
-// one before; what the run is known by at its end. A run that ended early has the frames that it completed.
+// Parts of a statistics file, in the order in which a run knows them: its head; a line for each frame, after that of
+// the previous one; and the totals at the end. A run that ended early has the frames that it completed.
 std::string json_head(const RunStatistics& run);
 std::string json_line(const FrameStatistics& frame, bool first);
 std::string json_end(const RunStatistics& run);
 
-// A line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff node and
-// each warning of Solve.
+// Returns a line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff
+// node and each warning of Solve.
 class RunTotals;
 std::string summary(const RunStatistics& run, const RunTotals& totals);
 
-// A line for each stiff node.
+// Returns a line for each stiff node.
 std::string advice(const std::vector<Stiffness>& stiff);
 
 }  // namespace rapid

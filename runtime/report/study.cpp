@@ -11,8 +11,8 @@
 namespace rapid {
 namespace {
 
-// An error is significant above this multiple of what rounding alone may cause: below it, rounding changes the fitted
-// slope (at 4, the order of an orbit over six halvings is still within 0.03 of 2).
+// An error is significant above this multiple of the error that rounding alone may cause: below it, rounding changes
+// the fitted slope (at 4, the order of an orbit over six halvings is still within 0.03 of 2).
 constexpr double above_rounding = 4;
 
 // A knob of whole numbers counts steps; others (a tolerance, a voxel) are step sizes.
@@ -24,7 +24,7 @@ bool counts_steps(const std::vector<Value>& values)
     });
 }
 
-// Least-squares slope of y over x; nothing where x does not vary.
+// Returns the least-squares slope of y over x; nothing if x does not vary.
 std::optional<double> slope(const std::vector<std::pair<double, double>>& points)
 {
     double x_mean = 0, y_mean = 0;

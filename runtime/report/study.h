@@ -1,7 +1,7 @@
 // A study: one scene at many settings of its knobs, each run compared with a reference and timed.
 //
-// The definition of a study, the results of its runs, and what follows from them: the observed order of accuracy of
-// each line, and the Pareto-optimal rows.
+// Defines a study, the results of its runs, and the values derived from them: the observed order of accuracy of each
+// line, and the Pareto-optimal rows.
 #pragma once
 
 #include <cstdint>
@@ -29,30 +29,31 @@ struct Study {
     std::optional<Knobs> reference;  // knobs of the reference run; none: the closed form of the study file, if any
     int repeat_runs = 5;
 
-    // Whether points are compared with a reference: a residual needs none.
+    // Returns true if points are compared with a reference. A residual needs none.
     bool compares() const { return error != "residual"; }
-    // Completes `lines` where the sweep leaves no choice. Error: two knobs remain for the step; an unknown name; a
-    // value or a line given twice.
+    // Completes `lines` if the sweep leaves no choice. Throws Error if two knobs remain for the step, a name is
+    // unknown, or a value or a line is given twice.
     void complete();
-    // The knob along a line: the one that is not in `lines`. Empty where there is none, or where it has no numbers.
+    // Returns the knob along a line: the one that is not in `lines`; empty if there is none, or if it has no numbers.
     std::string step() const;
-    // The knobs of every row: line by line, in the order of the sweep.
+    // Returns the knobs of every row: line by line, in the order of the sweep.
     std::vector<Knobs> rows() const;
-    // "method continuous, drag 2": of a row; and of its line, where a text stands without its knob: "continuous".
+    // Returns the label of a row, "method continuous, drag 2". In that of its line, a text omits its knob:
+    // "continuous".
     std::string label(const Knobs& knobs) const;
     std::string line_of(const Knobs& knobs) const;
-    // The knobs of the run that a row is compared with: its own, overridden by `reference`.
+    // Returns the knobs of the run that a row is compared with: its own, overridden by `reference`.
     Knobs reference_of(const Knobs& knobs) const;
 };
 
 struct StudyRow {
     Knobs knobs;
     double error = 0;             // m; of an own error function, its unit
-    double rounding = 0;          // error of single precision alone, m; 0 where the unit is not known
+    double rounding = 0;          // error of single precision alone, m; 0 if the unit is not known
     std::vector<double> seconds;  // of each repetition
     std::uint64_t compared = 0;   // points, summed over frames
     std::uint64_t missing = 0;    // points only in the run or only in the reference
-    std::string failed;           // the reason; empty where it ran
+    std::string failed;           // the reason; empty if it ran
 
     double median_seconds() const;
     bool at_rounding() const;
@@ -71,18 +72,18 @@ struct StudyResult {
     std::vector<std::pair<std::string, std::string>> machine;
 
     std::vector<StudyLine> lines() const;
-    // By row: it ran and is Pareto-optimal in error and time. Errors at rounding are equal.
+    // Returns true for each row that ran and is Pareto-optimal in error and time. Errors at rounding are equal.
     std::vector<bool> best() const;
 };
 
-// The 95th percentile: the least value that at least 95 % do not exceed. Values in any order, not empty.
+// Returns the 95th percentile: the least value that at least 95 % do not exceed. Values in any order, not empty.
 double p95_of(std::vector<double> values);
 
 std::string knob_text(const Value& value);
 std::string to_text(const StudyResult& result);
 nlohmann::ordered_json to_json(const StudyResult& result);
 
-// An SVG of error against run time, both axes logarithmic, for light and dark backgrounds.
+// Returns an SVG of error against run time, both axes logarithmic, for light and dark backgrounds.
 std::string to_svg(const StudyResult& result);
 
 }  // namespace rapid

@@ -25,8 +25,8 @@ constexpr double width = 860, height = 480;                       // px
 constexpr double left = 84, right = 600, top = 76, bottom = 416;  // of the plot
 constexpr double legend_x = right + 24, legend_step = 44, radius = 4;
 
-// Of medium lightness, for white and black backgrounds; neighbours differ in lightness as well as in hue, for the
-// colour-blind.
+// Colours of medium lightness, for white and black backgrounds; neighbours differ in lightness as well as in hue, for
+// the colour-blind.
 constexpr std::array colours = {"#2b7fd4", "#e08214", "#159a74", "#c64a9a", "#7a68c9",
                                 "#c9a100", "#d1483f", "#46a3c4", "#7d8f2e", "#9c6b4e"};
 

@@ -38,7 +38,7 @@ std::string error_title(const Study& study)
     return study.error == "own" ? "error (the study's own measure)" : study.error + " error of P (m)";
 }
 
-// Begins with a comma; empty where nothing is compared.
+// Returns a text that begins with a comma; empty if nothing is compared.
 std::string reference_text(const Study& study)
 {
     if (!study.compares()) return "";
@@ -57,7 +57,7 @@ std::string order_text(const StudyLine& line)
     return line.at_rounding ? "exact: every error is at rounding" : "no order: fewer than two rows to fit";
 }
 
-// A row for each setting, below a row of titles; the knobs come first.
+// Returns a row for each setting, below a row of titles; the knobs come first.
 TextTable table_of(const StudyResult& result)
 {
     const Study& study = result.study;

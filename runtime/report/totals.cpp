@@ -20,7 +20,7 @@ void RunTotals::Warning::add(std::int64_t frame, std::uint64_t count)
     ++frames;
 }
 
-// "warning  points did so 5 times, in 3 frames from 7 to 48"; empty where no frame counted any.
+// Returns "warning  points did so 5 times, in 3 frames from 7 to 48"; empty if no frame counted any.
 std::string RunTotals::Warning::text(const char* what) const
 {
     if (frames == 0) return "";
@@ -112,7 +112,7 @@ void RunTotals::WorstError::add(const std::optional<FrameStatistics::Error>& oth
 std::string RunTotals::WorstError::text(const std::string& what) const
 {
     if (!error) return "";
-    // What shadows do not see is not said to be nothing.
+    // Errors that shadows cannot see must not be reported as zero.
     constexpr std::string_view same = "the same at twice the sub-steps";
     const auto within = [&](double e, std::string_view unit) {
         return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : std::string(same);
@@ -122,7 +122,7 @@ std::string RunTotals::WorstError::text(const std::string& what) const
                        within(error->p50, " m"), within(error->p95, ""), error->max, frame);
 }
 
-// The estimated errors of the frames with the largest ones, and what is in none of them.
+// Returns the estimated errors of the worst frames, and the contributions that none of them includes.
 std::string RunTotals::error_text() const
 {
     if (!is_solved_ && !worst_error_.error) return "";
@@ -138,7 +138,7 @@ std::string RunTotals::error_text() const
     return text;
 }
 
-// What rounding of positions to single precision is off by; no sub-steps change that.
+// Returns the displacement by rounding positions to single precision. More sub-steps do not reduce it.
 std::string RunTotals::rounding_text() const
 {
     if (!(worst_rounding_ > 0)) return "";
@@ -146,7 +146,7 @@ std::string RunTotals::rounding_text() const
                        worst_rounding_frame_);
 }
 
-// The change of the energy of motion by the integrator; empty where it is 0 or not defined.
+// Returns the change of kinetic energy by the integrator; empty if it is 0 or not defined.
 std::string RunTotals::energy_text() const
 {
     if (!last_.energy_drift || last_.energy_drift->max == 0) return "";
@@ -154,7 +154,7 @@ std::string RunTotals::energy_text() const
                        last_.energy_drift->mean, last_.energy_drift->max);
 }
 
-// What has changed the energy of constrained points; empty where there are none.
+// Returns the sources of energy change of constrained points; empty if there are none.
 std::string RunTotals::ledger_text() const
 {
     if (!ledger_) return "";
@@ -179,7 +179,7 @@ std::string RunTotals::ledger_text() const
     return text + '\n';
 }
 
-// The audit of all collisions; empty where there were none.
+// Returns the audit of all collisions; empty if there were none.
 std::string RunTotals::contact_text() const
 {
     if (contacts_ == 0 && !(deepest_ > 0)) return "";
@@ -188,7 +188,7 @@ std::string RunTotals::contact_text() const
                        contact_energy_.lost, contact_energy_.added);
 }
 
-// The residual of the constraints, where there are any, and the grids of the contact search.
+// Returns the residual of the constraints, if any, and the grids of the contact search.
 std::string RunTotals::constraint_text() const
 {
     std::string text;
@@ -212,7 +212,7 @@ std::string RunTotals::sleep_text() const
                        with_separators(last_.points));
 }
 
-// The cost of building narrow bands: a line for each node.
+// Returns the cost of building narrow bands: a line for each node.
 std::string RunTotals::band_text() const
 {
     std::string text;

@@ -1,4 +1,4 @@
-// What the summary of a run tells, added up frame by frame: its size does not depend on their number.
+// The totals in a run's summary, added up frame by frame. Their size does not depend on the number of frames.
 #pragma once
 
 #include <map>
@@ -13,7 +13,7 @@ public:
     void add(const FrameStatistics& frame);
     void add_writing(double seconds) { seconds_.write += seconds; }
 
-    // A line for each subject that there is.
+    // Each returns a line for its subject, if present.
     std::string points_text() const;
     std::string frames_text(double run_seconds) const;  // with the seconds by stage
     std::string error_text() const;
@@ -42,7 +42,7 @@ private:
     std::uint64_t most_points_ = 0;
     std::int64_t most_points_frame_ = 0;
     bool is_solved_ = false;  // some points
-    // Of the frame with the largest.
+    // The frame with the largest error.
     struct WorstError {
         std::optional<FrameStatistics::Error> error;
         std::int64_t frame = 0;

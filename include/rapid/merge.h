@@ -1,4 +1,5 @@
-// Parts of a run, which were simulated apart (docs/scale.md), as one: to the bit what the whole run would have written.
+// Merges the parts of a run that were simulated separately (docs/scale.md). The result is bit-identical to that of the
+// whole run.
 #pragma once
 
 #include <cstddef>
@@ -11,24 +12,24 @@
 
 namespace rapid {
 
-// What merge_files() has written.
+// The result of merge_files().
 struct MergedFiles {
-    std::size_t parts = 0, frames = 0;  // that were read, of each part; that were written
+    std::size_t parts = 0, frames = 0;  // read, of each part; written
     std::uint64_t points = 0;           // of all frames
 };
 
-// Puts the files of the parts of a run together, a frame at a time; the points of a large frame lie in unnamed files
-// beside the output meanwhile. Loops run where the caller's do, in the TBB arena of the calling thread.
+// Merges the files of the parts of a run, a frame at a time. Meanwhile the points of a large frame are stored in
+// unnamed files next to the output. Loops run in the TBB arena of the calling thread.
 //
-// parts: patterns of the files of each part, as its run had them; {part} stands for all parts whose records are there.
-// output: the pattern of the whole, #### is the frame's number; missing folders are made.
-// progress: told of each frame that is written, with its points; false ends the merge with the error Cancelled.
+// parts: patterns of the files of each part, as in its run; {part} stands for all parts whose records exist.
+// output: the pattern of the whole, where #### is the frame's number; missing folders are made.
+// progress: called with each frame that is written and its points; false ends the merge with the error Cancelled.
 //
-// Errors: WrongCall, before anything is written: a part or a frame that is missing or of another run, each of them; a
-// format that holds no points; an output that would replace a part. FailedFrame: a file that can't be read or written,
-// a point that belongs to another part; frames before it are written. Busy: another thread merges. OutOfMemory and
-// Unexpected at any time. Meanwhile no scene may run and no frame be read or copied, whose points would lie in those
-// files, too.
+// Errors: WrongCall, before anything is written, if a part or a frame is missing or belongs to another run (each is
+// listed), if a format holds no points, or if an output would replace a part. FailedFrame if a file cannot be read or
+// written, or if a point belongs to another part; earlier frames are written. Busy if another thread merges.
+// OutOfMemory and Unexpected at any time. Meanwhile no scene may run and no frame may be read or copied, since its
+// points would be stored in those files, too.
 Result<MergedFiles> merge_files(const std::vector<std::string>& parts, const std::string& output,
                                 const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress = {});
 

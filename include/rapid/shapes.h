@@ -1,5 +1,4 @@
-// The shapes of a scene in a frame, for renderers and viewers: what its points collide with, and what they are born
-// from.
+// The shapes of a scene in a frame, for renderers and viewers: those that its points collide with or are born from.
 //
 //   auto shapes = scene.shapes(frame->number());
 //   for (const rapid::ShapeMesh& mesh : shapes->meshes()) draw(mesh);
@@ -18,7 +17,7 @@
 
 namespace rapid {
 
-// What a shape is to the points.
+// Roles of a shape for the points.
 enum class ShapeRole {
     Collider,  // they collide with it
     Emitter,   // they are born from it, or go to it
@@ -31,32 +30,32 @@ struct ShapeMesh {
     const float* positions = nullptr;         // shape [corner_count][3], m
     std::size_t triangle_count = 0;           // of triangles
     const std::int32_t* triangles = nullptr;  // shape [triangle_count][3], counter-clockwise seen from outside; from 0
-    // Of the arrays, which it keeps valid and unchanged. Meshes of two frames that have one owner are the same mesh, as
-    // of a shape that rests.
+    // Owner of the arrays, which keeps them valid and unchanged. Meshes of two frames with the same owner are the same
+    // mesh, as for a shape at rest.
     std::shared_ptr<const void> owner;
 };
 
 // An infinite plane.
 struct ShapePlane {
-    std::array<double, 3> normal = {0, 1, 0};  // of length 1, out of the shape
+    std::array<double, 3> normal = {0, 1, 0};  // unit length, out of the shape
     double offset = 0;                         // m; its points have normal · x = offset
 };
 
-// All shapes of a frame, and what its `:picture` nodes say. Copying one copies a pointer; it is read, copied and
-// released from any thread.
+// All shapes of a frame, and the settings of its `:picture` nodes. Copies are cheap (a shared pointer); it is read,
+// copied and released from any thread.
 class SceneShapes {
 public:
     SceneShapes();  // none
 
-    // In the order of the nodes; infinite shapes other than planes are in neither.
+    // Both are in the order of the nodes; infinite shapes other than planes are omitted.
     std::vector<ShapeMesh> meshes() const;
     std::vector<ShapePlane> planes() const;
-    // Whether the scene says from where its pictures are seen; SceneFrame::camera() has the camera.
+    // Returns true if the scene sets the camera of its pictures; SceneFrame::camera() returns it.
     bool has_camera() const;
-    // What was warned of when they were made, such as a mesh with holes.
+    // Returns the warnings of making them, such as a mesh with holes.
     std::vector<std::string> warnings() const;
 
-    // Whether they are the same ones: of one frame, or of two frames of a scene in which nothing moves.
+    // Returns true if they are the same: of one frame, or of two frames of a scene in which nothing moves.
     bool operator==(const SceneShapes& other) const;
 
 private:

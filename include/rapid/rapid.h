@@ -364,6 +364,7 @@ int rapid_frame_details(rapid_frame* frame, const char** lines, rapid_error** er
 /* Returns the warnings of nodes in this frame, one per line. */
 int rapid_frame_warnings(rapid_frame* frame, const char** lines, rapid_error** error);
 
+/* The number of the frame. */
 int64_t rapid_frame_number(rapid_frame* frame);
 double rapid_frame_time(rapid_frame* frame); /* s since the start of the output's simulation */
 double rapid_frame_fps(rapid_frame* frame);  /* of the output's simulation */
@@ -381,6 +382,7 @@ typedef struct rapid_statistics {
     double constraint_residual_max;                /* m */
     double seconds, script_seconds, solve_seconds; /* wall time: total, and of parts */
 } rapid_statistics;
+/* Fills in the figures of the frame. */
 int rapid_frame_statistics(rapid_frame* frame, rapid_statistics* statistics, rapid_error** error);
 /* Returns the frame's object in the file of `rapid run --stats`. */
 int rapid_frame_statistics_json(rapid_frame* frame, const char** json, rapid_error** error);
@@ -477,7 +479,9 @@ int rapid_scene_picture(rapid_scene* scene, rapid_frame* frame, int width, int h
 
 /* Every step-th frame from the first one to the last. */
 typedef struct rapid_frames {
-    int64_t first, last, step;
+    int64_t first; /* the number of the first frame */
+    int64_t last;  /* the last frame that is included */
+    int64_t step;  /* the distance between two frames, at least 1 */
 } rapid_frames;
 
 /* How a run ended. */

@@ -64,8 +64,10 @@ struct SceneError {
 // The exception of Result::value().
 class SceneException : public std::runtime_error {
 public:
+    // Takes the text of the error as what().
     explicit SceneException(SceneError error) : std::runtime_error(error.text()), error_(std::move(error)) {}
 
+    // The error that was thrown.
     const SceneError& error() const { return error_; }
 
 private:
@@ -96,6 +98,7 @@ public:
         throw_error();
         return **this;
     }
+    // The same for a temporary, whose value is moved out.
     T value() &&
     {
         throw_error();

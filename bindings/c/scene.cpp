@@ -1,9 +1,9 @@
 // Scenes in C.
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "bindings/c/interface.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
 namespace {
@@ -37,24 +37,17 @@ int advance_into(rapid_scene* scene, rapid_frame** frame, rapid_error** error, c
     });
 }
 
-std::string in_json(const std::string& text)
-{
-    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-// Written as text: the destructor of a tree of nlohmann's takes memory, and ends the program where there is none.
-std::string in_json(const NodeParameter& parameter)
-{
-    return fmt::format(R"({{"name":{},"type":{},"unit":{},"doc":{},"default":{},"required":{}}})",
-                       in_json(parameter.name), in_json(parameter.type), in_json(parameter.unit),
-                       in_json(parameter.doc), in_json(parameter.fallback), parameter.required);
-}
 std::string in_json(const SceneNodeType& type)
 {
-    std::vector<std::string> parameters;
-    for (const NodeParameter& parameter : type.parameters) parameters.push_back(in_json(parameter));
-    return fmt::format(R"({{"name":{},"doc":{},"parameters":[{}]}})", in_json(type.name), in_json(type.doc),
-                       fmt::join(parameters, ","));
+    JsonText json;
+    json.begin_object();
+    json.members("name", type.name, "doc", type.doc);
+    json.list("parameters", type.parameters, [&](const NodeParameter& parameter) {
+        json.object("name", parameter.name, "type", parameter.type, "unit", parameter.unit, "doc", parameter.doc,
+                    "default", parameter.fallback, "required", parameter.required);
+    });
+    json.end();
+    return json.text();
 }
 
 }  // namespace

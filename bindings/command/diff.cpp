@@ -3,19 +3,17 @@
 
 #include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "include/rapid/scene.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 class Diff : public Command, public Confined {
 public:
@@ -75,7 +73,7 @@ private:
     int compare_files() const
     {
         const FrameComparison found = compare(a_, b_);
-        print(json_ ? ordered_json::parse(found.report.json).dump(2) + '\n' : found.report.text);
+        print(json_ ? json_text(CheckedJson::parse(found.report.json), 2) + '\n' : found.report.text);
         return found.same ? status_done : status_failed;
     }
 
@@ -88,23 +86,28 @@ private:
             if (!a.frames.count(frame)) only_b.push_back(frame);
 
         std::size_t different = 0;
-        ordered_json frames = ordered_json::array();
+        std::vector<std::pair<int, std::string>> reports;  // as JSON
         for (const int frame : both) {
             const FrameComparison found = compare(a.frames.at(frame), b.frames.at(frame));
             different += !found.same;
-            if (json_) {
-                ordered_json json = {{"frame", frame}};
-                json.update(ordered_json::parse(found.report.json));
-                frames.push_back(std::move(json));
-            } else if (!found.same) {
+            if (json_)
+                reports.emplace_back(frame, found.report.json);
+            else if (!found.same)
                 print(fmt::format("frame {}\n{}", frame, found.report.text));
-            }
         }
         const bool same = different == 0 && only_a.empty() && only_b.empty();
         if (json_) {
-            print(ordered_json{{"same", same}, {"only_a", only_a}, {"only_b", only_b}, {"frames", frames}}.dump(
-                      2, ' ', false, ordered_json::error_handler_t::replace) +
-                  '\n');
+            JsonText json(2);
+            json.begin_object();
+            json.members("same", same, "only_a", only_a, "only_b", only_b);
+            json.list("frames", reports, [&](const auto& report) {
+                json.begin_object();
+                json.member("frame", report.first);
+                json.add_members(CheckedJson::parse(report.second));
+                json.end();
+            });
+            json.end();
+            print(json.text() + '\n');
         } else {
             if (!only_a.empty()) print(fmt::format("only in {}: frames {}\n", a_, fmt::join(only_a, ", ")));
             if (!only_b.empty()) print(fmt::format("only in {}: frames {}\n", b_, fmt::join(only_b, ", ")));

@@ -2,20 +2,17 @@
 // one.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "bindings/command/file_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 class Explain : public Command, public Confined {
 public:
@@ -53,7 +50,7 @@ public:
             if (!against_.empty()) {
                 Scene other = graph_.open_other(against_, common);
                 const SceneReport more = SceneInside::explain_difference(scene, files_.files(), other).value();
-                print(json_ ? indented(ordered_json::parse(more.json)) : more.text);
+                print(json_ ? json_text(CheckedJson::parse(more.json), 2) + '\n' : more.text);
                 return status_done;
             }
             std::optional<SceneReport> state;
@@ -64,9 +61,9 @@ public:
                 state = SceneInside::explain_state(scene, files_.files(), *state_after_).value();
             }
             if (json_) {
-                ordered_json json = ordered_json::parse(kept.json);
-                if (state) json["state"] = ordered_json::parse(state->json);
-                print(indented(json));
+                CheckedJson json = CheckedJson::parse(kept.json);
+                if (state) json["state"] = CheckedJson::parse(state->json);
+                print(json_text(json, 2) + '\n');
             } else {
                 print(kept.text + (state ? state->text : ""));
             }
@@ -75,11 +72,6 @@ public:
     }
 
 private:
-    static std::string indented(const ordered_json& json)
-    {
-        return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n';
-    }
-
     SceneArguments graph_;
     FileOptions files_;
     std::string against_;

@@ -1,19 +1,16 @@
 // rapid info: describes a cache file, or each file of a sequence.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "bindings/command_line/cache_files.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/printable.h"
 #include "runtime/base/threads.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 constexpr std::size_t most_of_warning = 4000;  // bytes printed at most
 
@@ -38,34 +35,30 @@ public:
     {
         Threads threads(common.threads);
         const CacheFiles cache = find_cache(file_);
-        ordered_json all = ordered_json::array();
+        JsonText json(2);
+        if (cache.sequence) json.begin_list();
         for (const auto& [frame, path] : cache.frames) {
+            json.begin_object();
+            json.member("file", path.string());
             if (SceneInside::is_snapshot(path)) {
                 const SceneReport report = SceneInside::describe_snapshot(path).value();
-                ordered_json json = {{"file", path.string()}};
-                json.update(ordered_json::parse(report.json));
                 if (!json_) print(report.text);
-                all.push_back(std::move(json));
-                continue;
-            }
-            const SceneFrame points = threads.run([&, &file = path] { return SceneFrame::read(file).value(); });
-            const SceneReport report = threads.run([&] { return points.describe().value(); });
-            if (json_) {
-                ordered_json json = {{"file", path.string()}};
-                if (cache.sequence) json["frame"] = frame;
-                json.update(ordered_json::parse(report.json));
-                json["left_out"] = points.warnings();
-                all.push_back(std::move(json));
+                json.add_members(CheckedJson::parse(report.json));
             } else {
-                if (cache.sequence) print(path.string() + '\n');
-                print(report.text);
+                const SceneFrame points = threads.run([&, &file = path] { return SceneFrame::read(file).value(); });
+                const SceneReport report = threads.run([&] { return points.describe().value(); });
+                if (!json_ && cache.sequence) print(path.string() + '\n');
+                if (!json_) print(report.text);
                 for (const std::string& what : points.warnings())
-                    print(fmt::format("left out    {}\n", shortened(what, most_of_warning)));
+                    if (!json_) print(fmt::format("left out    {}\n", shortened(what, most_of_warning)));
+                if (cache.sequence) json.member("frame", frame);
+                json.add_members(CheckedJson::parse(report.json));
+                json.member("left_out", points.warnings());
             }
+            json.end();
         }
-        if (json_)
-            print((cache.sequence ? all : all.front()).dump(2, ' ', false, ordered_json::error_handler_t::replace) +
-                  '\n');
+        if (cache.sequence) json.end();
+        if (json_) print(json.text() + '\n');
         return status_done;
     }
 

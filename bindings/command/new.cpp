@@ -5,12 +5,12 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "bindings/command_line/command.h"
 #include "bindings/scene/installation.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/json_text.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {
@@ -69,9 +69,9 @@ public:
         make(scene, fill_in(lua, "scene.lua", name_));
         make(test, fill_in(lua, "test.lua", name_));
         make(".luacheckrc", fill_in(lua, "luacheckrc", name_));
-        const nlohmann::ordered_json editor = {{"runtime.version", "LuaJIT"},
-                                               {"workspace.library", {(lua / "rapid.d.lua").string()}}};
-        make(".luarc.json", editor.dump(2) + '\n');
+        JsonText editor(2);
+        editor.object("runtime.version", "LuaJIT", "workspace.library", std::array{(lua / "rapid.d.lua").string()});
+        make(".luarc.json", editor.text() + '\n');
         print(fmt::format("now: rapid run {} -f 1-96 -o {}.####.png\n     rapid test {}\n", scene, name_, test));
         return status_done;
     }

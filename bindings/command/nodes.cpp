@@ -2,15 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
 
 std::string list_of(const std::vector<NodeDocument>& types)
 {
@@ -45,11 +43,13 @@ public:
             print(documents.annotations);
         } else if (!name_.empty()) {
             const SceneReport& page = found_in(documents.types).page;
-            print(json_ ? ordered_json::parse(page.json).dump(2) + '\n' : page.text);
+            print(json_ ? json_text(CheckedJson::parse(page.json), 2) + '\n' : page.text);
         } else if (json_) {
-            ordered_json all = ordered_json::array();
-            for (const NodeDocument& type : documents.types) all.push_back(ordered_json::parse(type.page.json));
-            print(all.dump(2) + '\n');
+            JsonText json(2);
+            json.begin_list();
+            for (const NodeDocument& type : documents.types) json.value(CheckedJson::parse(type.page.json));
+            json.end();
+            print(json.text() + '\n');
         } else {
             print(list_of(documents.types));
         }

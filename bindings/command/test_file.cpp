@@ -12,19 +12,17 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
-
-using nlohmann::json;
 
 void run_tests_as_child(const std::string& file, const SceneTestOptions& options)
 {
     fcntl(test_report_descriptor, F_SETFD, FD_CLOEXEC);  // otherwise programs started by tests would keep the pipe open
-    const auto send = [](const json& report) {
-        const std::string line = report.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
+    const auto send = [](const CheckedJson& report) {
+        const std::string line = json_text(report) + '\n';
         if (write(test_report_descriptor, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
             _exit(status_failed);
     };
@@ -125,7 +123,7 @@ void TestFile::receive()
 
 void TestFile::read_report(const std::string& line)
 {
-    const json report = json::parse(line, nullptr, false);
+    const CheckedJson report = CheckedJson::parse(line, nullptr, false);
     if (report.is_discarded()) return;  // the test has written to the descriptor
     if (report.contains("end")) {
         all_reported_ = true;

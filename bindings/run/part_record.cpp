@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "runtime/base/checked_json.h"
 #include "runtime/base/error.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/setting_names.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"
@@ -61,19 +61,17 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
 
 void PartRecord::write(const std::filesystem::path& file) const
 {
-    CheckedJson written = CheckedJson::array();
-    for (const auto& [frame, of_frame] : files)
-        written.push_back({{"frame", frame}, {"points", of_frame.points}, {"hash", of_frame.hash}});
-    const CheckedJson json = {{"rapid_part", record_version},
-                              {"part", part.number},
-                              {"parts", part.count},
-                              {"sample", sample ? CheckedJson(*sample) : CheckedJson()},
-                              {"frames", {{"first", frames.first}, {"last", frames.last}, {"step", frames.step}}},
-                              {"fps", fps},
-                              {"start", start},
-                              {"files", written},
-                              {"identity", identity}};
-    write_whole(file, json.dump(2, ' ', false, CheckedJson::error_handler_t::replace) + '\n');
+    JsonText json(2);
+    json.begin_object();
+    json.members("rapid_part", record_version, "part", part.number, "parts", part.count, "sample", sample, "frames",
+                 [&] { json.object("first", frames.first, "last", frames.last, "step", frames.step); });
+    json.members("fps", fps, "start", start);
+    json.list("files", files, [&](const auto& written) {
+        json.object("frame", written.first, "points", written.second.points, "hash", written.second.hash);
+    });
+    json.member("identity", identity);
+    json.end();
+    write_whole(file, json.text() + '\n');
 }
 
 std::string difference(const PartRecord& there, const PartRecord& here)

@@ -5,26 +5,21 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <map>
 #include <optional>
 
 #include "bindings/host/kernel.h"
 #include "bindings/run/races.h"
 #include "bindings/scene/scene_impl.h"
+#include "runtime/base/json_text.h"
 #include "runtime/io/format.h"
 #include "runtime/report/explanation_text.h"
 #include "runtime/report/statistics.h"
 
 namespace rapid {
 namespace {
-
-using nlohmann::ordered_json;
-
-std::string dumped(const ordered_json& json)
-{
-    return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
 
 // The plan of a scene whose points go to files.
 struct OutputPlan {
@@ -61,17 +56,23 @@ Explanation explained(const SceneInside::Impl& scene, const FileOutputs& outputs
 // By name: the points of a create, and what a node keeps.
 SceneReport report_of(const Snapshot& snapshot)
 {
-    ordered_json json = {{"frame", snapshot.frame}};
+    std::map<std::string, std::size_t> simulations, nodes;
     std::vector<KeptBytes> kept;
     for (const auto& [name, state] : snapshot.simulations) {
-        json["simulations"][name] = state.size();
+        simulations[name] = state.size();
         kept.push_back({name, state.size(), "points, ids and what is adopted"});
     }
     for (const auto& [name, state] : snapshot.nodes) {
-        json["nodes"][name] = state.size();
+        nodes[name] = state.size();
         kept.push_back({name, state.size(), "of the node"});
     }
-    return {to_text(fmt::format("\nSTATE after frame {}", snapshot.frame), kept), dumped(json)};
+    JsonText json;
+    json.begin_object();
+    json.member("frame", snapshot.frame);
+    if (!simulations.empty()) json.member("simulations", simulations);
+    if (!nodes.empty()) json.member("nodes", nodes);
+    json.end();
+    return {to_text(fmt::format("\nSTATE after frame {}", snapshot.frame), kept), json.text()};
 }
 
 }  // namespace
@@ -144,14 +145,14 @@ Result<SceneReport> SceneInside::explain_difference(Scene& scene, const FileOutp
     if (!others) return others.error();
     return here.call(SceneError::Unexpected, [&] {
         const Explanation more = surplus(*own, *others), less = surplus(*others, *own);
-        return SceneReport{
-            text_of_surplus(here.file, there.file, more) + '\n' + text_of_surplus(there.file, here.file, less) +
-                fmt::format("\nbytes a point at most: {} and {}\n", own->bytes_per_point(), others->bytes_per_point()),
-            dumped({{"graph", here.file},
-                    {"against", there.file},
-                    {"only_graph", ordered_json::parse(json_of_surplus(more))},
-                    {"only_against", ordered_json::parse(json_of_surplus(less))},
-                    {"bytes_per_point", {own->bytes_per_point(), others->bytes_per_point()}}})};
+        const std::array bytes = {own->bytes_per_point(), others->bytes_per_point()};
+        JsonText json;
+        json.object("graph", here.file, "against", there.file, "only_graph", CheckedJson::parse(json_of_surplus(more)),
+                    "only_against", CheckedJson::parse(json_of_surplus(less)), "bytes_per_point", bytes);
+        return SceneReport{text_of_surplus(here.file, there.file, more) + '\n' +
+                               text_of_surplus(there.file, here.file, less) +
+                               fmt::format("\nbytes a point at most: {} and {}\n", bytes[0], bytes[1]),
+                           json.text()};
     });
 }
 

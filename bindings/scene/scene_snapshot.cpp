@@ -1,12 +1,12 @@
 // Snapshots, in memory and in files.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_inside.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/printable.h"
 #include "runtime/report/number_text.h"
 
@@ -29,7 +29,7 @@ std::string told_as_text(const std::string& path, const CheckedJson& told)
 {
     const auto word = [](const CheckedJson& value) {
         constexpr std::size_t most = 4000;  // bytes: the code of some hundred functions
-        return shortened(value.is_string() ? value.get<std::string>() : value.dump(), most);
+        return shortened(value.is_string() ? value.get<std::string>() : json_text(value), most);
     };
     std::string text =
         fmt::format("{}: a snapshot, {} bytes\n", path, with_separators(told.at("bytes").get<std::uint64_t>()));
@@ -104,7 +104,7 @@ Result<SceneReport> SceneInside::describe_snapshot(const std::string& path)
 {
     return of_file(path, [&] {
         const CheckedJson told = told_of(path);
-        return SceneReport{told_as_text(path, told), told.dump(-1, ' ', false, CheckedJson::error_handler_t::replace)};
+        return SceneReport{told_as_text(path, told), json_text(told)};
     });
 }
 

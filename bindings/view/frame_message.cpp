@@ -8,24 +8,23 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <unordered_map>
+#include <utility>
 
 #include "runtime/base/error.h"
+#include "runtime/base/json_text.h"
 #include "runtime/picture/tone.h"
 
 namespace rapid {
 namespace {
 
-using nlohmann::ordered_json;
-
 // Concatenates arrays and writes their offsets into the header. They are written in the buffer that is sent: a frame of
 // a million points has eight megabytes, and each copy of them takes milliseconds.
 class Message {
 public:
-    explicit Message(ordered_json header) : header_(std::move(header)) { header_["arrays"] = ordered_json::object(); }
+    explicit Message(CheckedJson header) : header_(std::move(header)) { header_["arrays"] = CheckedJson::object(); }
 
-    ordered_json& header() { return header_; }
+    CheckedJson& header() { return header_; }
 
     // Adds an array that fill(std::span<T>) writes in finish().
     template <class T, class F>
@@ -40,7 +39,7 @@ public:
 
     std::string finish(std::uint32_t request) const
     {
-        std::string head = header_.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+        std::string head = json_text(header_);
         head.resize((head.size() + 3) / 4 * 4, ' ');
         const std::uint32_t words[2] = {request, static_cast<std::uint32_t>(head.size())};
         std::string all;
@@ -53,7 +52,7 @@ public:
     }
 
 private:
-    ordered_json header_;
+    CheckedJson header_;
     std::vector<std::function<void(char* data)>> arrays_;
     std::size_t size_ = 0;
 };
@@ -319,10 +318,9 @@ ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish)
     return shown;
 }
 
-std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish,
-                          const std::string& head)
+std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish, CheckedJson head)
 {
-    Message message(ordered_json::parse(head));
+    Message message(std::move(head));
     const ShownPoints shown = shown_points(points, wish);
     const Places* const places = shown.all_or_some();
     message.header()["total"] = points.size();
@@ -342,17 +340,17 @@ std::string frame_message(std::uint32_t request, const SceneFrame& points, const
 
 std::string trails_message(std::uint32_t request, const std::vector<float>& ends, std::uint64_t every)
 {
-    Message message(ordered_json({{"every", every}}));
+    Message message(CheckedJson({{"every", every}}));
     message.add<float>("ends", "f32", ends.size(),
                        [&](std::span<float> to) { std::copy(ends.begin(), ends.end(), to.begin()); });
     return message.finish(request);
 }
 
 std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
-                           const std::vector<std::uint64_t>& numbers, const std::string& head)
+                           const std::vector<std::uint64_t>& numbers, CheckedJson head)
 {
-    Message message(ordered_json::parse(head));
-    ordered_json bodies = ordered_json::array(), planes = ordered_json::array();
+    Message message(std::move(head));
+    CheckedJson bodies = CheckedJson::array(), planes = CheckedJson::array();
     for (const ShapePlane& plane : shapes.planes())
         planes.push_back({{"normal", plane.normal}, {"offset", plane.offset}});
     const std::vector<ShapeMesh> meshes = shapes.meshes();

@@ -12,6 +12,7 @@
 
 #include "bindings/view/points.h"
 #include "include/rapid/shapes.h"
+#include "runtime/base/checked_json.h"
 
 namespace rapid {
 
@@ -33,13 +34,12 @@ struct ShownPoints {
 };
 ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish);
 
-// head: members of the header, as JSON in braces. Throws Error if the attribute or group does not exist.
-std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish,
-                          const std::string& head);
+// head: members of the header, an object. Throws Error if the attribute or group does not exist.
+std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish, CheckedJson head);
 
 // Returns the shapes of a frame: planes, and meshes by number, without those that the page has. head: as above.
 std::string shapes_message(std::uint32_t request, const SceneShapes& shapes, const std::set<std::uint64_t>& known,
-                           const std::vector<std::uint64_t>& numbers, const std::string& head);
+                           const std::vector<std::uint64_t>& numbers, CheckedJson head);
 
 // ends: ends of line segments, with x y z and their age from 0 to 1; every: as in ShownPoints.
 std::string trails_message(std::uint32_t request, const std::vector<float>& ends, std::uint64_t every);

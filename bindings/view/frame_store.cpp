@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
 namespace {
@@ -194,7 +194,7 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
                 continue;
             known_[number] = std::move(known);
             records[number] = std::move(record);
-        } catch (const nlohmann::json::exception&) {
+        } catch (const CheckedJson::exception&) {
             continue;
         }
     std::vector<std::string> list;
@@ -229,7 +229,7 @@ void CachedRun::put(const ViewFrame& frame, const std::vector<std::string>& warn
                         {"warnings", warnings},
                         {"read", read}};
     try {
-        archive_.add(entry.dump(-1, ' ', false, Json::error_handler_t::replace));
+        archive_.add(json_text(entry));
     } catch (const Error&) {  // the next view computes the frame again
     }
 }

@@ -11,6 +11,7 @@
 
 #include "bindings/scene/scene_inside.h"
 #include "bindings/view/request_fields.h"
+#include "runtime/base/json_text.h"
 
 namespace rapid {
 namespace {
@@ -129,7 +130,7 @@ Json camera_of_scene(const ViewFrame& frame, const Json& json)
 void ViewRequests::Ask::tell(Json json) const
 {
     json["re"] = re;
-    answer(json.dump(-1, ' ', false, Json::error_handler_t::replace), false);
+    answer(json_text(json), false);
 }
 
 void ViewRequests::Ask::send(const std::string& data) const
@@ -156,8 +157,7 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
         const Ask ask{json.at("re").get<std::uint32_t>(), answer};
         ask.guard([&] { dispatch(json, ask); });
     } catch (const std::exception& error) {
-        answer(Json({{"re", nullptr}, {"error", error.what()}}).dump(-1, ' ', false, Json::error_handler_t::replace),
-               false);
+        answer(json_text(Json({{"re", nullptr}, {"error", error.what()}})), false);
     }
 }
 
@@ -308,7 +308,7 @@ void ViewRequests::tell_frame(const Json& json, const Ask& ask)
     const ViewFramePtr frame = after.empty() ? simulation_.frame(number) : nullptr;
     const Json head = {{"frame", number}, {"run", frame ? frame->run : simulation_.status().run}, {"after", after}};
     with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
-        ask.answer(frame_message(ask.re, points, wish, head.dump()), true);
+        ask.answer(frame_message(ask.re, points, wish, head), true);
     });
 }
 
@@ -329,7 +329,7 @@ void ViewRequests::tell_shapes(const Json& json, const Ask& ask)
     for (const ShapeMesh& mesh : frame->shapes.meshes()) numbers.push_back(number_of(mesh));
     const auto known = json.value("known", std::vector<std::uint64_t>());
     const Json head = {{"camera", camera_of_scene(*frame, json)}};
-    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers, head.dump()), true);
+    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers, head), true);
 }
 
 void ViewRequests::tell_point(const Json& json, const Ask& ask)
@@ -575,10 +575,10 @@ void ViewRequests::set_parameters(const Json& json, const Ask& ask)
     for (const auto& [name, value] : json.at("values").items()) {
         if (value.is_array()) {
             std::vector<std::string> parts;
-            for (const Json& part : value) parts.push_back(part.dump());
+            for (const Json& part : value) parts.push_back(json_text(part));
             values[name] = fmt::format("{}", fmt::join(parts, ","));
         } else {
-            values[name] = value.is_string() ? value.get<std::string>() : value.dump();
+            values[name] = value.is_string() ? value.get<std::string>() : json_text(value);
         }
     }
     simulation_.set(std::move(values));

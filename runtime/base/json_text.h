@@ -48,7 +48,7 @@ public:
         if constexpr (std::invocable<const T&>) {
             value();
         } else if constexpr (nlohmann::detail::is_basic_json<T>::value) {
-            add_parsed(value);
+            add(value);
         } else if constexpr (requires { value.valueless_by_exception(); }) {
             std::visit([this](const auto& held) { this->value(held); }, value);
         } else if constexpr (requires {
@@ -65,7 +65,7 @@ public:
             for (const auto& each : value) this->value(each);
             end();
         } else {
-            add_single(nlohmann::json(value));
+            add(nlohmann::json(value));
         }
     }
 
@@ -88,6 +88,11 @@ public:
         begin_object();
         if constexpr (sizeof...(Members) > 0) members(all...);
         end();
+    }
+    // Writes the members of a parsed object.
+    void add_members(const CheckedJson& object)
+    {
+        for (const auto& each : object.items()) member(each.key(), each.value());
     }
     // Writes a member that is a list. `add` writes each element.
     template <class Range, class F>
@@ -121,21 +126,14 @@ private:
         new_line();
     }
     template <class Json>
-    void add_single(const Json& single)
+    void add(const Json& json)
     {
         separate();
-        text_ += single.dump(-1, ' ', false, Json::error_handler_t::replace);
-    }
-    template <class Json>
-    void add_parsed(const Json& parsed)
-    {
-        if (!parsed.is_structured()) return add_single(parsed);
-        parsed.is_object() ? begin_object() : begin_list();
-        for (const auto& each : parsed.items()) {
-            if (parsed.is_object()) key(each.key());
-            add_parsed(each.value());
+        for (const char c :
+             json.dump(indent_ > 0 ? static_cast<int>(indent_) : -1, ' ', false, Json::error_handler_t::replace)) {
+            text_ += c;
+            if (c == '\n') text_.append(indent_ * closing_.size(), ' ');
         }
-        end();
     }
 
     const std::size_t indent_;

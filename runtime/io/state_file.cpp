@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "runtime/base/error.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/of_thread.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"
@@ -180,7 +181,7 @@ void write_to(const std::function<void(const void* data, std::size_t bytes)>& wr
         hash.add(data, bytes);
         write(data, bytes);
     };
-    const std::string text = header.dump(1, ' ', false, CheckedJson::error_handler_t::replace);
+    const std::string text = json_text(header, 1);
     const std::uint64_t length = text.size();
     append(state_magic.data(), state_magic.size());
     append(&length, sizeof length);

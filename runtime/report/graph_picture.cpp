@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
+#include "runtime/base/json_text.h"
 #include "runtime/base/printable.h"
 #include "runtime/graph/explain.h"
 #include "runtime/graph/node_handle.h"
@@ -12,7 +12,6 @@
 namespace rapid {
 namespace {
 
-using nlohmann::ordered_json;
 using Edge = GraphPicture::Edge;
 
 const char* name_of(NodeKind kind)
@@ -38,12 +37,7 @@ const char* name_of(Edge::Kind kind)
 }
 
 // Returns any text as UTF-8 without control characters.
-std::string clean(const std::string& text)
-{
-    const std::string valid =
-        ordered_json(printable(text)).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-    return ordered_json::parse(valid).get<std::string>();
-}
+std::string clean(const std::string& text) { return CheckedJson::parse(json_text(printable(text))).get<std::string>(); }
 
 // Returns a string in Graphviz's language, in which \N and the like stand for names.
 std::string quoted(const std::string& text)
@@ -115,16 +109,16 @@ std::string tip_of(const GraphPicture::Node& node)
 }
 
 // Returns the numbers of a text such as "e,27,18 54.5,18" in pairs; the arrow's head, marked by a letter, comes last.
-ordered_json path_of(const std::string& text, double height)
+CheckedJson path_of(const std::string& text, double height)
 {
-    ordered_json path = ordered_json::array(), head;
+    CheckedJson path = CheckedJson::array(), head;
     for (std::size_t begin = 0; begin < text.size();) {
         const std::size_t end = std::min(text.find(' ', begin), text.size());
         const std::string word = text.substr(begin, end - begin);
         const bool marked = !word.empty() && (word[0] == 'e' || word[0] == 's');
         double x = 0, y = 0;
         if (std::sscanf(word.c_str() + (marked ? 2 : 0), "%lf,%lf", &x, &y) == 2)
-            (marked ? head : path).push_back(marked ? ordered_json(x) : ordered_json({x, height - y}));
+            (marked ? head : path).push_back(marked ? CheckedJson(x) : CheckedJson({x, height - y}));
         if (marked) head.push_back(height - y);
         begin = end + 1;
     }
@@ -133,13 +127,13 @@ ordered_json path_of(const std::string& text, double height)
 }
 
 // Sets positions by the names that to_dot() assigns, n0, n1, ...; edges have the order in which it writes them.
-void place(const ordered_json& laid_out, ordered_json& nodes, ordered_json& edges, ordered_json& size)
+void place(const CheckedJson& laid_out, CheckedJson& nodes, CheckedJson& edges, CheckedJson& size)
 {
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
     const std::string box = laid_out.value("bb", "");
     if (std::sscanf(box.c_str(), "%lf,%lf,%lf,%lf", &x0, &y0, &x1, &y1) != 4) return;
     size = {x1, y1};
-    for (const ordered_json& object : laid_out.value("objects", ordered_json::array())) {
+    for (const CheckedJson& object : laid_out.value("objects", CheckedJson::array())) {
         const std::string name = object.value("name", "");
         std::size_t i = 0;
         double x = 0, y = 0;
@@ -151,7 +145,7 @@ void place(const ordered_json& laid_out, ordered_json& nodes, ordered_json& edge
         nodes[i]["width"] = 72 * std::stod(object.value("width", "0"));
         nodes[i]["height"] = 72 * std::stod(object.value("height", "0"));
     }
-    for (const ordered_json& edge : laid_out.value("edges", ordered_json::array())) {
+    for (const CheckedJson& edge : laid_out.value("edges", CheckedJson::array())) {
         std::size_t i = 0;
         if (std::sscanf(edge.value("id", "").c_str(), "e%zu", &i) == 1 && i < edges.size())
             edges[i]["path"] = path_of(edge.value("pos", ""), y1);
@@ -223,9 +217,9 @@ std::string to_dot(const GraphPicture& picture, Tips tips)
 
 std::string to_json(const GraphPicture& picture, const std::string& laid_out)
 {
-    ordered_json nodes = ordered_json::array(), edges = ordered_json::array(), outputs = ordered_json::object(), size;
+    CheckedJson nodes = CheckedJson::array(), edges = CheckedJson::array(), outputs = CheckedJson::object(), size;
     for (const GraphPicture::Node& node : picture.nodes) {
-        ordered_json arguments = ordered_json::object();
+        CheckedJson arguments = CheckedJson::object();
         for (const auto& [name, value] : node.arguments) arguments[clean(name)] = clean(value);
         nodes.push_back({{"name", clean(node.name)},
                          {"type", node.type},
@@ -245,10 +239,10 @@ std::string to_json(const GraphPicture& picture, const std::string& laid_out)
     for (const Edge& edge : picture.edges)
         edges.push_back({{"from", edge.from}, {"to", edge.to}, {"kind", name_of(edge.kind)}});
     for (const auto& [name, i] : picture.outputs) outputs[clean(name)] = i;
-    if (!laid_out.empty()) place(ordered_json::parse(laid_out), nodes, edges, size);
-    ordered_json json = {{"nodes", nodes}, {"edges", edges}, {"outputs", outputs}};
+    if (!laid_out.empty()) place(CheckedJson::parse(laid_out), nodes, edges, size);
+    CheckedJson json = {{"nodes", nodes}, {"edges", edges}, {"outputs", outputs}};
     if (!size.is_null()) json["size"] = size;
-    return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+    return json_text(json);
 }
 
 }  // namespace rapid

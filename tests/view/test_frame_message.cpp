@@ -99,7 +99,7 @@ TEST_CASE("a page gets positions, velocities and speeds within half a step, howe
     FrameWish wish;
     wish.velocities = true;
     wish.most = every == 1 ? count : (count + 1) / 2;
-    const Received message(frame_message(3, frame_of(points), wish, "{}"));
+    const Received message(frame_message(3, frame_of(points), wish, CheckedJson::object()));
 
     std::vector<Moving> shown;
     for (std::size_t i = 0; i<count; i += count> wish.most ? every : 1) shown.push_back(points[i]);

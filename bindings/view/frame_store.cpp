@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
@@ -182,14 +183,15 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
 {
     std::error_code none;
     std::map<std::int64_t, std::string> records;
+    std::int64_t first_changed = std::numeric_limits<std::int64_t>::max();
     for (std::string& record : archive_.read_journal().value_or(FrameArchive::Records{}).whole) try {
             const Json entry = Json::parse(record);
             const auto number = entry.at("frame").get<std::int64_t>();
             Known known{entry.at("statistics").get<std::string>(), entry.at("warnings").get<std::vector<std::string>>(),
                         entry.at("shapes").get<std::int64_t>()};
-            if (!SceneInside::are_unchanged(scene, entry.at("read").get<std::map<std::string, std::string>>())
-                     .value() ||
-                !fs::exists(archive_.file(frame_kind, number), none) || !Json::accept(known.statistics) ||
+            if (!SceneInside::are_unchanged(scene, entry.at("read").get<std::map<std::string, std::string>>()).value())
+                first_changed = std::min(first_changed, number);
+            if (!fs::exists(archive_.file(frame_kind, number), none) || !Json::accept(known.statistics) ||
                 (known.shapes != 0 && !fs::exists(archive_.file(shapes_kind, known.shapes), none)))
                 continue;
             known_[number] = std::move(known);
@@ -197,6 +199,11 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
         } catch (const CheckedJson::exception&) {
             continue;
         }
+    // A file is recorded with the first frame that reads it. All later frames depend on that frame.
+    known_.erase(known_.lower_bound(first_changed), known_.end());
+    records.erase(records.lower_bound(first_changed), records.end());
+    for (const auto& [number, file] : archive_.files(snapshot_kind))
+        if (number >= first_changed) fs::remove(file, none);
     std::vector<std::string> list;
     for (auto& [number, record] : records) list.push_back(std::move(record));
     return list;

@@ -37,8 +37,8 @@ std::size_t bytes_of(const ViewFrame& frame);
 // for none), "statistics", "warnings" and "read", the files that were read for the frame.
 class CachedRun {
 public:
-    // Finds the complete frames for which the scene still reads the same files. `hash` is that of the run's
-    // fingerprint. Throws Error if the folder cannot be made or read.
+    // Finds the complete frames before the first one for which the scene read a file that has changed. `hash` is that
+    // of the run's fingerprint. Throws Error if the folder cannot be made or read.
     CachedRun(const std::filesystem::path& folder, std::string hash, Scene& scene);
 
     struct Known {

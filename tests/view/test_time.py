@@ -202,6 +202,22 @@ def a_cached_frame_whose_statistics_are_damaged_is_computed_again(bench):
 
 
 @test
+def cached_frames_are_computed_again_from_the_first_that_read_a_file_that_has_changed(bench):
+    text = """local rapid = require "rapid"
+return rapid.create {}
+  :emit { source = function(frame) return rapid.points.read(frame.number < 5 and "early.csv" or "late.csv") end,
+          from = "points", rate = 24 } :solve {}"""
+    heights = "rapidView.ask('sheet', {frame: 9}).then((s) => s.rows.map((r) => r.values.P[1]))"
+    (bench.path / "early.csv").write_text("id,Px,Py,Pz\n0,0,1,0\n", encoding="utf-8")
+    for late in (2, 3):
+        (bench.path / "late.csv").write_text(f"id,Px,Py,Pz\n0,0,{late},0\n", encoding="utf-8")
+        browser = bench.ready(text, "-f", "1-10", "--cache", "changed")
+        first, *_, last = browser.promise(heights)
+        assert (first, last) == (1, late)
+        bench.end()
+
+
+@test
 def with_a_cache_memory_holds_what_was_seen_last(bench):
     text = """local rapid = require "rapid"
 local P = {}

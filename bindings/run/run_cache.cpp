@@ -132,12 +132,7 @@ void RunCache::read_record(const std::string& record, bool is_first)
 void RunCache::read_journal()
 {
     const std::string name = archive_.journal().string();
-    std::optional<FrameArchive::Records> records;
-    try {
-        records = archive_.read_journal();
-    } catch (Error& error) {
-        throw error.at({name, 0});
-    }
+    const std::optional<FrameArchive::Records> records = archive_.read_journal();
     std::size_t damaged = records ? records->damaged : 0;
     for (std::size_t k = 0; records && k < records->whole.size(); ++k) {
         try {
@@ -225,12 +220,7 @@ void RunCache::begin(const Session& session, const Plan& plan, const RunFrames& 
     std::vector<std::string> records = {record_of(RecordKind::Head, known_.fingerprint)};
     for (const auto& [frame, record] : known_.frames) records.push_back(record_of(RecordKind::Frame, record));
     for (const auto& [path, film] : known_.films) records.push_back(record_of(RecordKind::Film, film));
-    try {
-        archive_.begin_journal(records);
-    } catch (const std::exception& error) {
-        failures_.push_back(shown_error(archive_.journal().string(), error) +
-                            "; the run goes on, and what it computes is not kept");
-    }
+    archive_.begin_journal(records);
 }
 
 void RunCache::find_due(const Plan& plan, FrameFiles& files)

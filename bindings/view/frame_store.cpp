@@ -166,11 +166,7 @@ std::size_t FrameStore::bytes() const
 
 CachedRun::CachedRun(const fs::path& folder, std::string hash, Scene& scene) : hash_(std::move(hash)), archive_(folder)
 {
-    try {
-        archive_.begin_journal(read_journal(scene));
-    } catch (const Error& error) {
-        throw Error(fmt::format("--cache {}: {}", archive_.journal().string(), error.what()));
-    }
+    archive_.begin_journal(read_journal(scene));
     std::error_code none;
     fs::last_write_time(folder, fs::file_time_type::clock::now(), none);  // marks the time of last use
     for (const auto& [number, known] : known_) {
@@ -184,7 +180,7 @@ std::vector<std::string> CachedRun::read_journal(Scene& scene)
     std::error_code none;
     std::map<std::int64_t, std::string> records;
     std::int64_t first_changed = std::numeric_limits<std::int64_t>::max();
-    for (std::string& record : archive_.read_journal().value_or(FrameArchive::Records{}).whole) try {
+    for (std::string& record : archive_.read_journal().value_or(FrameArchive::Records()).whole) try {
             const Json entry = Json::parse(record);
             const auto number = entry.at("frame").get<std::int64_t>();
             Known known{entry.at("statistics").get<std::string>(), entry.at("warnings").get<std::vector<std::string>>(),

@@ -230,7 +230,13 @@ std::optional<FrameArchive::Records> FrameArchive::read_journal() const
 {
     if (!fs::exists(journal())) return std::nullopt;
     Records records;
-    const InputFile input(journal());
+    const InputFile input = [&] {
+        try {
+            return InputFile(journal());
+        } catch (Error& error) {
+            throw error.at({journal().string(), 0});
+        }
+    }();
     std::string_view text = input.text();
     if (!text.starts_with(journal_magic)) {
         records.damaged = 1;
@@ -255,16 +261,22 @@ std::optional<FrameArchive::Records> FrameArchive::read_journal() const
 
 void FrameArchive::begin_journal(const std::vector<std::string>& records)
 {
-    OutputFile file(journal());
-    file.append(journal_magic.data(), journal_magic.size());
-    for (const std::string& record : records) {
-        const Head head = head_of(record);
-        file.append(&head, sizeof head);
-        file.append(record.data(), record.size());
+    try {
+        OutputFile file(journal());
+        file.append(journal_magic.data(), journal_magic.size());
+        for (const std::string& record : records) {
+            const Head head = head_of(record);
+            file.append(&head, sizeof head);
+            file.append(record.data(), record.size());
+        }
+        file.finish();
+        journal_.emplace(journal());
+        journal_->go_on_at(file.appended());
+    } catch (const std::exception& error) {
+        const std::lock_guard lock(mutex_);
+        failures_.push_back(
+            fmt::format("{}: {}; the run goes on, and what it computes is not kept", journal().string(), error.what()));
     }
-    file.finish();
-    journal_.emplace(journal());
-    journal_->go_on_at(file.appended());
 }
 
 void FrameArchive::add(std::string_view record)

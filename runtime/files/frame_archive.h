@@ -76,7 +76,7 @@ public:
     void submit(std::string_view kind, std::int64_t frame, Write write);
     // Waits until all files are written.
     void finish();
-    // Returns the reasons why files could not be written since the last call.
+    // Returns the reasons why files and the journal could not be written since the last call.
     std::vector<std::string> take_failures();
 
     std::filesystem::path journal() const { return folder_ / "journal"; }
@@ -84,9 +84,9 @@ public:
         std::vector<std::string> whole;
         std::size_t damaged = 0;
     };
-    // Returns nothing if there is no journal. Throws Error if it can't be read.
+    // Returns nothing if there is no journal. Throws Error with its name if it can't be read.
     std::optional<Records> read_journal() const;
-    // Replaces the journal. Throws Error if it can't be written; add() then does nothing.
+    // Replaces the journal. If it can't be written, take_failures() says why, and add() does nothing.
     void begin_journal(const std::vector<std::string>& records);
     // Throws Error if the record can't be written; the journal is then unchanged.
     void add(std::string_view record);

@@ -141,6 +141,9 @@ TEST_CASE("an archive finds its files by kind and frame, and says which could no
     FrameArchive archive(folder.path());
     for (const std::int64_t frame : {-3, 0, 12345})
         archive.submit("frame", frame, [](const fs::path& path) { std::ofstream(path) << "x"; });
+    fs::create_directory(archive.journal());
+    archive.begin_journal({"x"});
+    archive.add("y");
     archive.submit("snapshot", 7, [](const fs::path&) { throw Error("can't be written"); });
     archive.finish();
     std::vector<std::int64_t> found;
@@ -150,7 +153,9 @@ TEST_CASE("an archive finds its files by kind and frame, and says which could no
     }
     CHECK(found == std::vector<std::int64_t>{-3, 0, 12345});
     CHECK(archive.take_failures() ==
-          std::vector<std::string>{(folder / "snapshot.0007.rapid").string() +
-                                   ": can't be written; the run goes on without this snapshot"});
+          std::vector<std::string>{
+              archive.journal().string() +
+                  ": can't be written: it is not a regular file; the run goes on, and what it computes is not kept",
+              (folder / "snapshot.0007.rapid").string() + ": can't be written; the run goes on without this snapshot"});
     CHECK(archive.take_failures().empty());
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
 #include <sstream>
@@ -13,6 +12,7 @@
 
 #include "bindings/command/processes.h"
 #include "bindings/command_line/programs.h"
+#include "runtime/base/json_text.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/start_program.h"
 
@@ -20,7 +20,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 // Slurm's commands: sbatch, squeue, scancel.
 
@@ -241,7 +240,11 @@ private:
         const FarmJob& job = submitted.job;
         const std::size_t count = job.tasks.size() + !job.last.empty();
         std::map<Stage, std::size_t> counts;
-        ordered_json tasks = ordered_json::array();
+        JsonText json(2);
+        json.begin_object();
+        json.member("name", job.name);
+        json.key("tasks");
+        json.begin_list();
         std::string lines;
         for (std::size_t k = 0; k < count; ++k) {
             const bool is_last = k == job.tasks.size();
@@ -252,17 +255,17 @@ private:
             const TaskState& task = states[k];
             ++counts[task.state];
             const std::string_view state = state_names[static_cast<std::size_t>(task.state)];
-            tasks.push_back({{"name", name}, {"job", id}, {"state", state}, {"why", task.why}, {"log", log}});
+            json.object("name", name, "job", id, "state", state, "why", task.why, "log", log);
             if (task.state == Stage::Failed || task.state == Stage::Lost)
                 lines += fmt::format("{}: {}{}{}, {}\n", name, state, task.why.empty() ? "" : ", ", task.why, log);
         }
         std::vector<std::string> summary;
         for (const auto& [state, number] : counts)
             summary.push_back(fmt::format("{} {}", number, state_names[static_cast<std::size_t>(state)]));
+        json.end();
+        json.end();
         if (json_)
-            print(ordered_json{{"name", job.name}, {"tasks", tasks}}.dump(2, ' ', false,
-                                                                          ordered_json::error_handler_t::replace) +
-                  '\n');
+            print(json.text() + '\n');
         else
             print(fmt::format("{}: {} tasks: {}\n{}", job.name, count, fmt::join(summary, ", "), lines));
         return counts[Stage::Failed] + counts[Stage::Lost] > 0 ? status_failed : status_done;

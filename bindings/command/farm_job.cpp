@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "runtime/base/checked_json.h"
 #include "runtime/base/error.h"
+#include "runtime/base/json_text.h"
 #include "runtime/files/input_file.h"
 
 namespace rapid {
@@ -153,27 +153,28 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
         return submitted;
     } catch (Error& error) {
         throw error.at({file.string(), 0});
-    } catch (const nlohmann::json::parse_error& error) {  // its text holds all of the unparsable input
+    } catch (const CheckedJson::parse_error& error) {  // its text holds all of the unparsable input
         throw Error(fmt::format("is no FARM.json: byte {} is none of JSON", error.byte)).at({file.string(), 0});
-    } catch (const nlohmann::json::exception& error) {
+    } catch (const CheckedJson::exception& error) {
         throw Error(fmt::format("is no FARM.json: {}", error.what())).at({file.string(), 0});
     }
 }
 
 void SubmittedJob::write() const
 {
-    CheckedJson json = {{"rapid_farm", job_version},
-                        {"name", job.name},
-                        {"folder", job.folder.string()},
-                        {"outputs", job.outputs.string()},
-                        {"options", job.options},
-                        {"command", job.words},
-                        {"tasks", CheckedJson::array()},
-                        {"last", {{"commands", job.last}, {"needs_all", job.last_needs_all}, {"job", last}}}};
-    for (std::size_t k = 0; k < job.tasks.size(); ++k)
-        json["tasks"].push_back(
-            {{"name", job.tasks[k].name}, {"command", job.tasks[k].words}, {"job", arrays[k]}, {"number", k + 1}});
-    write_whole(job.file(), json.dump(2, ' ', false, CheckedJson::error_handler_t::replace) + '\n');
+    JsonText json(2);
+    json.begin_object();
+    json.members("rapid_farm", job_version, "name", job.name, "folder", job.folder.string(), "outputs",
+                 job.outputs.string(), "options", job.options, "command", job.words);
+    std::size_t number = 0;
+    json.list("tasks", job.tasks, [&](const FarmTask& task) {
+        const auto array = arrays[number];
+        json.object("name", task.name, "command", task.words, "job", array, "number", ++number);
+    });
+    json.key("last");
+    json.object("commands", job.last, "needs_all", job.last_needs_all, "job", last);
+    json.end();
+    write_whole(job.file(), json.text() + '\n');
 }
 
 }  // namespace rapid

@@ -15,18 +15,18 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/signals.h"
+#include "runtime/base/json_text.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/start_program.h"
 
 namespace rapid {
 namespace {
 
-using nlohmann::json;
+using json = CheckedJson;
 
 void signal_at_end_of(int parent, int signal)
 {
@@ -108,7 +108,7 @@ EndedProcess ended_process(int status, const Capture& errors)
 
 void write_event(int pipe, const json& event)
 {
-    const std::string line = event.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
+    const std::string line = json_text(event) + '\n';
     for (std::size_t written = 0; written < line.size();) {
         const ssize_t count = write(pipe, line.data() + written, line.size() - written);
         if (count < 0 && errno != EINTR) _exit(status_failed);

@@ -3,9 +3,10 @@
 
 #include <cstddef>
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include "runtime/base/checked_json.h"
 
 namespace rapid {
 
@@ -23,7 +24,7 @@ struct EndedProcess {
 int run_processes(std::size_t count, int jobs, const std::function<std::vector<std::string>(std::size_t)>& words,
                   const std::function<void(std::size_t, const EndedProcess&)>& ended);
 
-using TellParent = std::function<void(const nlohmann::json& event)>;
+using TellParent = std::function<void(const CheckedJson& event)>;
 
 // Forks. The child does `work`, reports events and ends; this process hears each as it arrives. Returns an empty text,
 // or how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
@@ -32,7 +33,7 @@ using TellParent = std::function<void(const nlohmann::json& event)>;
 // runtime, which start threads, belong in children. A child's standard output goes to standard error, so that output of
 // scripts does not mix with the parent's results.
 std::string run_in_child(const std::function<void(const TellParent& tell)>& work,
-                         const std::function<void(const nlohmann::json& event)>& hear);
+                         const std::function<void(const CheckedJson& event)>& hear);
 
 // Makes this process end when its parent does, however the parent ends.
 void end_with_parent(int parent);

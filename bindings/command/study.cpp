@@ -17,7 +17,6 @@
 #include <filesystem>
 #include <fstream>
 #include <new>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "bindings/command/processes.h"
@@ -29,6 +28,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/host/graph_parameter.h"
 #include "bindings/run/study_scene.h"
+#include "runtime/base/checked_json.h"
 #include "runtime/base/printable.h"
 #include "runtime/base/threads.h"
 #include "runtime/files/input_file.h"
@@ -38,7 +38,7 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using json = CheckedJson;
 
 int read_repeat(const std::string& text)
 {
@@ -291,7 +291,7 @@ public:
             }
         }
         result.machine = describe_machine(threads_ > 0 ? threads_ : tbb::info::default_concurrency());
-        const std::string text = to_json(result).dump(2, ' ', false, json::error_handler_t::replace) + '\n';
+        const std::string text = to_json(result) + '\n';
         write_whole(fs::path(folder_) / "study.json", text);
         write_whole(fs::path(folder_) / "study.svg", to_svg(result));
         print(json_ ? text : to_text(result));

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -25,7 +24,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/picture_sheet.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json_text.h"
 #include "runtime/base/printable.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
@@ -37,7 +36,6 @@ namespace rapid {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 // The rows: settings, and the names of the files that each writes.
 
@@ -229,7 +227,7 @@ void read_statistics(const fs::path& file, WedgeResult& result)
             if (!result.error || p95 > result.error->p95)
                 result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
         }
-    } catch (const nlohmann::json::exception&) {
+    } catch (const CheckedJson::exception&) {
         result.failure = fmt::format("{}: it does not hold the statistics of a run", file.string());
     }
 }
@@ -265,26 +263,25 @@ std::string table_of(const std::vector<SweptSetting>& varied, const std::vector<
     return table_text(table) + "error: since birth, estimated; 95 % of the points are within it in every frame\n";
 }
 
-ordered_json row_json(const WedgeRow& row)
+void add_row(JsonText& json, const WedgeRow& row)
 {
     const WedgeResult& result = row.result;
-    ordered_json json = {{"settings", ordered_json::object()},
-                         {"files", row.outputs},
-                         {"status", result.failure.empty() ? "done" : "failed"}};
-    for (const auto& [name, value] : row.settings) json["settings"][name] = value;
-    if (!result.failure.empty()) json["failure"] = result.failure;
-    json["last_frame"] = result.last_frame ? ordered_json(*result.last_frame) : ordered_json();
-    json.update({{"points", result.points},
-                 {"contacts", result.contacts},
-                 {"seconds", result.seconds},
-                 {"peak_bytes", result.peak_bytes},
-                 {"error", nullptr}});
-    if (result.error)
-        json["error"] = {{"position_p50", result.error->p50},
-                         {"position_p95", result.error->p95},
-                         {"position_max", result.error->max},
-                         {"frame", result.error->frame}};
-    return json;
+    json.begin_object();
+    json.key("settings");
+    json.begin_object();
+    for (const auto& [name, value] : row.settings) json.member(name, value);
+    json.end();
+    json.members("files", row.outputs, "status", result.failure.empty() ? "done" : "failed");
+    if (!result.failure.empty()) json.member("failure", result.failure);
+    json.members("last_frame", result.last_frame, "points", result.points, "contacts", result.contacts, "seconds",
+                 result.seconds, "peak_bytes", result.peak_bytes);
+    json.key("error");
+    if (const auto& error = result.error)
+        json.object("position_p50", error->p50, "position_p95", error->p95, "position_max", error->max, "frame",
+                    error->frame);
+    else
+        json.value(nullptr);
+    json.end();
 }
 
 // Writes the contact sheet from the last pictures of the first -o that makes pictures. Returns false if there are none.
@@ -439,11 +436,16 @@ private:
     int report() const
     {
         const bool drawn = write_sheet(folder_ / "wedge.png", settings_, rows_);
-        ordered_json wedge = {
-            {"graph", graph_.file()}, {"varied", ordered_json::object()}, {"rows", ordered_json::array()}};
-        for (const SweptSetting& setting : settings_) wedge["varied"][setting.name] = setting.values;
-        for (const WedgeRow& row : rows_) wedge["rows"].push_back(row_json(row));
-        write_whole(folder_ / "wedge.json", wedge.dump(2, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+        JsonText json(2);
+        json.begin_object();
+        json.member("graph", graph_.file());
+        json.key("varied");
+        json.begin_object();
+        for (const SweptSetting& setting : settings_) json.member(setting.name, setting.values);
+        json.end();
+        json.list("rows", rows_, [&](const WedgeRow& row) { add_row(json, row); });
+        json.end();
+        write_whole(folder_ / "wedge.json", json.text() + '\n');
         if (!quiet_) {
             print('\n' + table_of(settings_, rows_));
             print(fmt::format(

@@ -52,9 +52,9 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
         return record;
     } catch (Error& error) {
         throw error.at({file.string(), 0});
-    } catch (const nlohmann::json::parse_error& error) {  // its text holds all of the unparsable input
+    } catch (const CheckedJson::parse_error& error) {  // its text holds all of the unparsable input
         throw Error(fmt::format("is no record of a part: byte {} is none of JSON", error.byte)).at({file.string(), 0});
-    } catch (const nlohmann::json::exception& error) {
+    } catch (const CheckedJson::exception& error) {
         throw Error(fmt::format("is no record of a part: {}", error.what())).at({file.string(), 0});
     }
 }

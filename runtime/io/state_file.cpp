@@ -122,7 +122,7 @@ void take_texts(const CheckedJson& blocks, SavedState& state)
         try {
             for (const CheckedJson& text : *found) texts.push_back(token_of(text.get<std::string>()));
             state.columns[k] = texts_at(texts, std::get<Column<std::int32_t>>(state.columns[k]));
-        } catch (const nlohmann::json::exception&) {
+        } catch (const CheckedJson::exception&) {
             damaged("its header can't be read");
         } catch (const std::bad_variant_access&) {
             damaged("a block does not fit its header");
@@ -238,7 +238,7 @@ StateFile::StateFile(Content content) : content_(std::move(content))
         if (header_.at("format").get<int>() != state_format)
             throw Error(fmt::format("it has the format {} of snapshots; this Rapid reads {}",
                                     header_.at("format").get<int>(), state_format));
-    } catch (const nlohmann::json::exception&) {
+    } catch (const CheckedJson::exception&) {
         damaged("its header can't be read");
     }
 }
@@ -293,7 +293,7 @@ SavedState StateFile::state() const
                     is_of_texts ? KeptColumn(Column<std::int32_t>())
                                 : column_of_type<KeptColumn>(static_cast<std::size_t>(found - std::begin(types)))));
         }
-    } catch (const nlohmann::json::exception&) {
+    } catch (const CheckedJson::exception&) {
         damaged("its header can't be read");
     }
     tbb::parallel_for(std::size_t{0}, places.size(),

@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <map>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -81,7 +80,7 @@ double p95_of(std::vector<double> values);
 
 std::string knob_text(const Value& value);
 std::string to_text(const StudyResult& result);
-nlohmann::ordered_json to_json(const StudyResult& result);
+std::string to_json(const StudyResult& result);
 
 // Returns an SVG of error against run time, both axes logarithmic, for light and dark backgrounds.
 std::string to_svg(const StudyResult& result);

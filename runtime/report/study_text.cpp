@@ -2,33 +2,36 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
+#include <optional>
 
+#include "runtime/base/json_text.h"
 #include "runtime/report/number_text.h"
 #include "runtime/report/study.h"
 
 namespace rapid {
 namespace {
 
-using nlohmann::ordered_json;
-
-ordered_json json_of(const Value& value)
+void add_knob(JsonText& json, const Value& value)
 {
-    if (const bool* boolean = value.get<bool>()) return *boolean;
-    if (const std::string* text = value.get<std::string>()) return *text;
-    if (const Vec3d* vector = value.get<Vec3d>()) return {vector->x(), vector->y(), vector->z()};
+    if (const bool* boolean = value.get<bool>()) return json.value(*boolean);
+    if (const std::string* text = value.get<std::string>()) return json.value(*text);
+    if (const Vec3d* vector = value.get<Vec3d>()) return json.value(*vector);
     const double number = *value.get<double>();
     constexpr double exact = 9007199254740992;  // 2^53
-    if (number == std::floor(number) && std::abs(number) < exact) return static_cast<std::int64_t>(number);
-    return number;
+    if (number == std::floor(number) && std::abs(number) < exact) return json.value(static_cast<std::int64_t>(number));
+    json.value(number);
 }
 
-ordered_json json_of(const Knobs& knobs)
+void add_knobs(JsonText& json, const Knobs& knobs)
 {
-    ordered_json json = ordered_json::object();
-    for (const auto& [name, value] : knobs) json[name] = json_of(value);
-    return json;
+    json.begin_object();
+    for (const auto& [name, value] : knobs) {
+        json.key(name);
+        add_knob(json, value);
+    }
+    json.end();
 }
 
 // The title of the error column: "rms error of P (m)".
@@ -102,46 +105,44 @@ std::string to_text(const StudyResult& result)
     return text + "* no other row beats it in both error and run time\n";
 }
 
-ordered_json to_json(const StudyResult& result)
+std::string to_json(const StudyResult& result)
 {
     const Study& study = result.study;
-    ordered_json json = {{"name", study.name}, {"file", study.file}, {"machine", ordered_json::object()}};
-    for (const auto& [what, value] : result.machine) json["machine"][what] = value;
-    json["frames"] = {study.first, study.last};
-    json["error"] = study.error;
-    json["error_frames"] = study.last_frame_only ? "last" : "all";
-    json["reference"] = study.reference    ? json_of(*study.reference)
-                        : study.compares() ? ordered_json("closed form")
-                                           : ordered_json();
-    json["repeat_runs"] = study.repeat_runs;
-
-    json["rows"] = ordered_json::array();
+    JsonText json(2);
+    json.begin_object();
+    json.members("name", study.name, "file", study.file, "machine", [&] {
+        json.begin_object();
+        for (const auto& [what, value] : result.machine) json.member(what, value);
+        json.end();
+    });
+    json.members("frames", std::array{study.first, study.last}, "error", study.error, "error_frames",
+                 study.last_frame_only ? "last" : "all");
+    json.key("reference");
+    if (study.reference)
+        add_knobs(json, *study.reference);
+    else
+        json.value(study.compares() ? std::optional("closed form") : std::nullopt);
+    json.member("repeat_runs", study.repeat_runs);
     const std::vector<bool> best = result.best();
-    for (std::size_t i = 0; i < result.rows.size(); ++i) {
-        const StudyRow& row = result.rows[i];
-        ordered_json of_row = {{"line", study.line_of(row.knobs)}, {"knobs", json_of(row.knobs)}};
+    std::size_t number = 0;
+    json.list("rows", result.rows, [&](const StudyRow& row) {
+        json.begin_object();
+        json.members("line", study.line_of(row.knobs), "knobs", [&] { add_knobs(json, row.knobs); });
         if (row.failed.empty()) {
             const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
-            of_row.update({{"error", row.error},
-                           {"seconds", row.median_seconds()},
-                           {"seconds_min", *least},
-                           {"seconds_max", *most},
-                           {"at_rounding", row.at_rounding()},
-                           {"compared", row.compared},
-                           {"missing", row.missing}});
+            json.members("error", row.error, "seconds", row.median_seconds(), "seconds_min", *least, "seconds_max",
+                         *most, "at_rounding", row.at_rounding(), "compared", row.compared, "missing", row.missing);
         } else {
-            of_row.update({{"error", nullptr}, {"seconds", nullptr}, {"failed", row.failed}});
+            json.members("error", nullptr, "seconds", nullptr, "failed", row.failed);
         }
-        of_row["best"] = static_cast<bool>(best[i]);
-        json["rows"].push_back(std::move(of_row));
-    }
-    json["lines"] = ordered_json::array();
-    for (const StudyLine& line : result.lines())
-        json["lines"].push_back({{"line", line.name},
-                                 {"order", line.order ? ordered_json(*line.order) : ordered_json()},
-                                 {"fitted", line.fitted},
-                                 {"at_rounding", line.at_rounding}});
-    return json;
+        json.member("best", static_cast<bool>(best[number++]));
+        json.end();
+    });
+    json.list("lines", result.lines(), [&](const StudyLine& line) {
+        json.object("line", line.name, "order", line.order, "fitted", line.fitted, "at_rounding", line.at_rounding);
+    });
+    json.end();
+    return json.text();
 }
 
 }  // namespace rapid

@@ -151,7 +151,7 @@ TEST_CASE("a failed row is in the JSON and the table as failed, with its reason,
         [](double n) { return n; });
     result.rows[1].failed = "signal 11 <Segmentation fault>";
 
-    const auto json = to_json(result);
+    const auto json = nlohmann::ordered_json::parse(to_json(result));
     CHECK(json["rows"][0]["error"] == 0.1);
     CHECK(json["rows"][1]["error"].is_null());
     CHECK(json["rows"][1]["failed"] == "signal 11 <Segmentation fault>");

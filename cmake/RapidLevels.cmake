@@ -13,11 +13,10 @@ set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for
 
 # By the profile of the scenes of graphs and of tests/bench.
 set(rapid_hot_files
-  elementary.cpp noise.cpp power.cpp random.cpp lanes/lane_operations.cpp operators/births/draws.cpp points/cell_grid.cpp
-  processor_levels/shared_types_of_level.cpp
-  shapes/level_set/baked_level_set.cpp
-  shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp shapes/motion/rigid_contacts.cpp
-  solver/collision/contact_rounds.cpp solver/collision/contact_rounds.cpp solver/collision/slide.cpp
+  lanes/lane_operations.cpp math/elementary.cpp math/noise.cpp math/power.cpp math/random.cpp
+  operators/births/draws.cpp points/cell_grid.cpp processor_levels/shared_types_of_level.cpp
+  shapes/level_set/baked_level_set.cpp shapes/motion/motion.cpp shapes/motion/rigid_contacts.cpp
+  solver/collision/contact_rounds.cpp solver/collision/slide.cpp
   solver/constraints/contact_pack.cpp solver/constraints/contact_search.cpp solver/constraints/contacts.cpp
   solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp
   solver/motion/damped_motion.cpp solver/motion/free_paths.cpp)

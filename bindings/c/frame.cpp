@@ -27,7 +27,7 @@ const char* text_of(const rapid_error* error, const auto& field)
     return open ? field(*open).c_str() : "";
 }
 
-// Gives a text of the frame, which belongs to it until the next of its kind.
+// Returns a text of the frame, which belongs to it until the next of its kind.
 int text_into(rapid_frame* frame, const char* kind, const char** text, const char* name, rapid_error** error,
               const auto& make)
 {
@@ -36,7 +36,7 @@ int text_into(rapid_frame* frame, const char* kind, const char** text, const cha
         const auto open = open_frame(frame);
         std::string made = make(std::as_const(open->frame));
         const std::lock_guard lock(open->mutex);
-        // What was given before stays valid where it is the same.
+        // A text returned before stays valid if it is the same.
         std::string& kept = open->texts[kind];
         if (kept != made) kept = std::move(made);
         *text = kept.c_str();
@@ -69,7 +69,7 @@ int tell(rapid_error** to, SceneError error) noexcept
             object->error = std::move(error);
             *to = static_cast<rapid_error*>(Errors::add(std::move(object)));
         } catch (...) {
-            *to = nullptr;  // the status is all that can be told
+            *to = nullptr;  // only the status can be returned
         }
     return status;
 }
@@ -247,7 +247,7 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
 {
     return guarded(error, [&] {
         const auto open = open_frame(frame);
-        // A number or three: no text.
+        // a detail is one number or three, never a text
         not_null(value, "value") = value_in_c(open->frame.detail(&not_null(name, "name")).value());
     });
 }

@@ -1,5 +1,5 @@
-// Handles of the C interface: numbers in the form of pointers, so that one which is closed, of another type or made up
-// is told from one that is open. The tables of those that are open are all that the interface keeps.
+// Handles of the C interface: numbers in the form of pointers, so that a closed, mistyped or invented one is
+// distinguished from an open one. The tables of open handles are the interface's only state.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace rapid {
 
-// Objects of one type. From any thread.
+// The open objects of one type. Callable from any thread.
 //
 // A handle is, from its lowest bit: 1 (no pointer is odd), the type (3 bits), the place in the table (28), the number
 // of objects that have had the place (32), so that a place which is taken again has another handle.
 template <class T, unsigned type>
 class Handles {
 public:
-    // Null: it is of no open object.
+    // Returns null if the handle does not belong to an open object.
     static std::shared_ptr<T> get(const void* handle)
     {
         Table& all = table();
@@ -31,7 +31,7 @@ public:
         Table& all = table();
         const std::lock_guard lock(all.mutex);
         if (all.free_places.empty()) {
-            all.free_places.reserve(all.entries.size() + 1);  // so that remove() takes no memory
+            all.free_places.reserve(all.entries.size() + 1);  // so that remove() does not allocate
             all.entries.emplace_back();
             all.free_places.push_back(static_cast<std::uint32_t>(all.entries.size() - 1));
         }
@@ -44,7 +44,7 @@ public:
         return reinterpret_cast<void*>(static_cast<std::uintptr_t>(bits));
     }
 
-    // The object, which is no longer open; null where it was not.
+    // Closes the handle and returns its object; null if it was not open.
     static std::shared_ptr<T> remove(const void* handle)
     {
         Table& all = table();
@@ -78,7 +78,7 @@ private:
     };
     static Table& table()
     {
-        static auto* one = new Table;  // never destroyed: programs close what they have open when they end
+        static auto* one = new Table;  // never destroyed: programs close handles while they end
         return *one;
     }
 };

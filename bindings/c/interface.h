@@ -1,4 +1,4 @@
-// What the functions of rapid.h share.
+// Shared code of the functions of rapid.h.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@
 
 namespace rapid {
 
-// An open scene, with the texts that it has handed out.
+// An open scene, with the texts that it has returned.
 struct OpenScene {
     Scene scene;
     std::atomic<bool> is_busy = false;
@@ -26,8 +26,8 @@ struct OpenScene {
 };
 struct OpenFrame {
     SceneFrame frame;
-    std::mutex mutex;                          // of the texts
-    std::map<std::string, std::string> texts;  // by what they are of
+    std::mutex mutex;                          // guards the texts
+    std::map<std::string, std::string> texts;  // by subject
     std::map<std::string, SceneValue> details;
 };
 struct OpenShapes {
@@ -41,7 +41,7 @@ struct OpenError {
     std::string text;
 };
 
-// Calls the program's functions when the last callback of a set of offers is gone.
+// Calls the program's functions after the last callback of a set of offers is destroyed.
 class OffersEnd {
 public:
     OffersEnd() = default;
@@ -71,10 +71,10 @@ using Errors = Handles<OpenError, 4>;
 using AllOffers = Handles<OpenOffers, 5>;
 using AllShapes = Handles<OpenShapes, 6>;
 
-// Puts the error into *to, and returns its status.
+// Stores the error in *to, and returns its status.
 int tell(rapid_error** to, SceneError error) noexcept;
 
-// Runs f, the whole of a function.
+// Runs f, the body of a function.
 template <class F>
 int guarded(rapid_error** error, const F& f) noexcept
 {
@@ -86,12 +86,12 @@ int guarded(rapid_error** error, const F& f) noexcept
         try {
             return tell(error, caught_error(SceneError::Unexpected));
         } catch (...) {
-            return RAPID_OUT_OF_MEMORY;  // not even its text can be held
+            return RAPID_OUT_OF_MEMORY;  // not even the text fits into memory
         }
     }
 }
 
-// What a getter gives: f(), or nothing of a handle that is not open, and of a scene that is in another call.
+// Runs a getter: f(), or an empty value if the handle is not open or the scene is in another call.
 template <class F>
 auto gotten(const F& f) noexcept -> decltype(f())
 {
@@ -102,7 +102,7 @@ auto gotten(const F& f) noexcept -> decltype(f())
     }
 }
 
-// The open object of a handle. Error: there is none.
+// Returns the open object of a handle. Throws Error if there is none.
 template <class Table>
 auto open(const void* handle, const char* what)
 {
@@ -113,7 +113,7 @@ auto open(const void* handle, const char* what)
     return object;
 }
 inline auto open_scene(rapid_scene* handle) { return open<Scenes>(handle, "scene"); }
-// The scene for the length of a call. Error: another one is running, which what is merely read would see half done.
+// Holds the scene for a call. Throws Error if another call is running, whose state would be half done.
 class SceneCall {
 public:
     explicit SceneCall(rapid_scene* handle) : open_(open_scene(handle))
@@ -128,7 +128,7 @@ public:
     Scene& scene() const { return open_->scene; }
 
 private:
-    const std::shared_ptr<OpenScene> open_;  // closed meanwhile, it lives to the end of the call
+    const std::shared_ptr<OpenScene> open_;  // if closed meanwhile, it lives to the end of the call
 };
 inline auto open_offers(rapid_offers* handle) { return open<AllOffers>(handle, "offers"); }
 inline auto open_frame(rapid_frame* handle) { return open<Frames>(handle, "frame"); }
@@ -142,7 +142,7 @@ T& not_null(T* pointer, const char* name)
     return *pointer;
 }
 
-// A struct of the caller's, whose size says how much of it he knows; the rest is as it is in `known`.
+// Reads a caller's struct, whose size says which members it has; the rest is as in `known`.
 template <class T>
 T known_part(const T* given, const char* name, T known = {})
 {
@@ -159,7 +159,7 @@ T known_part(const T* given, const char* name, T known = {})
     return known;
 }
 
-// Gives a struct of the caller as much as he knows of it. least: the size of the struct's first version.
+// Fills a caller's struct as far as its size allows. least: the size of the struct's first version.
 template <class T>
 void give(T* to, T from, const char* name)
 {
@@ -178,11 +178,11 @@ const T& at_place(const std::vector<T>& all, std::size_t place, const char* whos
     return all[place];
 }
 
-// A line each.
+// Returns one line each.
 inline std::string joined(const std::vector<std::string>& lines) { return fmt::format("{}", fmt::join(lines, "\n")); }
 
 SceneOptions options_of(const rapid_options* given);
-// What a program's pointer to a camera says; null: nothing.
+// Returns the camera of a program's pointer, empty for null.
 PictureCamera camera_of(const rapid_camera* given);
 
 // text: lives as long as the handle.

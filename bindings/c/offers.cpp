@@ -6,7 +6,7 @@
 namespace rapid {
 namespace {
 
-// A callback's status.
+// Throws if a callback's status is not 0.
 void expect_done(int status)
 {
     if (status != 0) throw std::runtime_error(fmt::format("it returned {}, where 0 says that it is done", status));
@@ -56,14 +56,15 @@ std::size_t bytes_of(ColumnType type)
     return bytes[static_cast<int>(type)];
 }
 
-// Of points or triangles, none of which takes more than 16 bytes a column. Error: more than an address has bits for.
+// Checks a count of points or triangles, of which none takes more than 16 bytes per column. Throws Error if the size
+// exceeds an address.
 void check_count(std::size_t count, const char* name)
 {
     constexpr std::size_t most = SIZE_MAX / 64;
     if (count > most) refuse(fmt::format("{} = {}; no memory holds as many", name, count));
 }
 
-// The values of a column, packed.
+// Returns the values of a column, packed.
 std::shared_ptr<std::vector<char>> copied(const rapid_column& column, std::size_t bytes, std::size_t count)
 {
     auto copy = std::make_shared<std::vector<char>>(bytes * count);

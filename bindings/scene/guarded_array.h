@@ -1,5 +1,5 @@
-// The array that a callback of the program writes. With a guard it is longer than the callback knows, and what follows
-// must stay as it is.
+// The array that a callback of the program writes. With a guard it is longer than the callback knows, and the part
+// after its end must stay unchanged.
 #pragma once
 
 #include <fmt/format.h>
@@ -26,7 +26,8 @@ public:
     T* data() { return values_.data(); }
     const T& operator[](std::size_t i) const { return values_[i]; }
 
-    // Error: a value that is not finite, or one past the end. who: "the program's shape "floor": the distance".
+    // Throws Error if a value is not finite, or if one was written past the end. who: "the program's shape "floor": the
+    // distance".
     void check(const std::string& who, std::size_t components) const
     {
         for (std::size_t i = size_; i < values_.size(); ++i)

@@ -1,4 +1,4 @@
-// Nodes whose work is a callback of the program over arrays of points.
+// Nodes whose callback in the program processes arrays of points.
 #include <fmt/format.h>
 
 #include <cctype>
@@ -17,7 +17,7 @@ namespace {
 
 using DeclaredNode = std::shared_ptr<const HostNode>;
 
-// The arguments of a node: its numbers, vectors as three.
+// The arguments of a node as numbers; a vector is three.
 struct HostFields {
     std::vector<double> values;
     std::string group;
@@ -25,7 +25,7 @@ struct HostFields {
 
 std::size_t width_of(ColumnType type) { return type == ColumnType::Vec3 ? 3 : 1; }
 
-// What the callback reads or writes of a column, from a place on: its own memory where that is an array.
+// A column that the callback reads or writes, from a point on: the column's own memory if it is an array.
 class ReadColumn {
 public:
     ReadColumn(const PointSet& points, const std::string& name, std::size_t first, std::size_t count)
@@ -97,7 +97,7 @@ private:
     const bool guarded_;
 };
 
-// Points of an edit, all of a group's.
+// The points of an edit: all of its group.
 class Edit {
 public:
     Edit(const HostNode& node, const HostFields& fields, const Evaluation& now, bool guarded)
@@ -126,7 +126,7 @@ public:
     }
 
 private:
-    // Of each point, whether it stays.
+    // Returns 1 for each point that stays.
     std::vector<std::uint8_t> call(PointSet& points) const
     {
         const std::size_t count = points.size();
@@ -262,7 +262,7 @@ bool is_name(const std::string& text)
            std::all_of(text.begin(), text.end(), is_word);
 }
 
-// A column that the node reads or writes comes into being, where nothing else makes it.
+// Declares that the node makes a column that it reads or writes, unless something else does.
 void declare_column(NodeType& type, const HostNode& node, const std::string& name, ColumnType of, bool written)
 {
     if (of != ColumnType::Float && of != ColumnType::Vec3)

@@ -1,4 +1,4 @@
-// The objects and nodes of a program as the runtime has its own.
+// Converts a program's objects and nodes into those of the runtime.
 #pragma once
 
 #include "include/rapid/offers.h"
@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// guarded: callbacks write into arrays of ours, behind which a pattern tells whether they go past the end.
-// Error: an array that is missing or wrong.
+// guarded: callbacks write into our arrays, which end with a pattern that shows writes past the end. Throws Error if an
+// array is missing or wrong.
 ObjectPtr make_object(const std::string& name, const HostObject& offered, bool guarded);
 NodeType make_type(const HostNode& node, bool guarded);
 

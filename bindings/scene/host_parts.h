@@ -1,4 +1,4 @@
-// The kinds of objects that a program offers. Error: an array that is missing or wrong.
+// Converts the kinds of objects that a program offers. Throws Error if an array is missing or wrong.
 #pragma once
 
 #include "include/rapid/offers.h"

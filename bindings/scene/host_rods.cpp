@@ -22,7 +22,7 @@ struct Rod {
     {
         const Vec3d d = P[0] - P[1];
         const double distance = d.norm();
-        // Any direction parts two points in one place.
+        // Coincident points may be separated in any direction.
         gradient[0] = distance > 0 ? Vec3d(d / distance) : Vec3d(Vec3d::UnitY());
         gradient[1] = -gradient[0];
         return distance - length;

@@ -1,4 +1,4 @@
-// Constraints of a program: rods that a callback gives for each frame.
+// Constraints of a program: rods that a callback returns for each frame.
 #pragma once
 
 #include "include/rapid/offers.h"
@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// values: of the node's parameters. Null where it gives none. Error: what the callback throws; a rod of wrong numbers
-// or between points that there are not.
+// values: of the node's parameters. Returns null if there are no rods. Throws the callback's exception, or Error if a
+// rod has wrong numbers or unknown points.
 std::shared_ptr<const Constraint> rods_of(const HostNode& node, const std::vector<double>& values,
                                           const std::string& group, const PointSet& points, const Evaluation& now);
 

@@ -1,4 +1,4 @@
-// A shape whose distance is a callback of the program over arrays of places.
+// A shape whose distance is a callback of the program over arrays of positions.
 #include <fmt/format.h>
 
 #include "bindings/scene/guarded_array.h"
@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-// What a batch of queries asks.
+// Answers a batch of queries.
 class HostSampler {
 public:
     HostSampler(const HostShape& shape, const std::string& name, bool guarded)
@@ -59,7 +59,7 @@ private:
     bool guarded_;
 };
 
-// Of a shape that is not convex, through which many paths are walked at once.
+// A sampler of a shape that is not convex, which traces many paths at once.
 class HostFieldSampler : public HostSampler {
 public:
     using HostSampler::HostSampler;
@@ -105,14 +105,14 @@ public:
     }
     Box3d bounds() const override { return sampler().bounds(); }
     double slope_bound() const override { return shape_.slope_bound; }
-    // All in one call.
+    // Evaluates all positions in one call.
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
     {
         if (!P.empty()) sampler().ask({P.front().data(), 3 * P.size()}, phi, gradient);
     }
 
 private:
-    // One call tells which paths are too short to reach it; the others are few, and are walked one by one.
+    // One call finds the paths that are too short to reach the shape; the others are few, and are traced one by one.
     void find_in_convex(std::span<const Path> paths, std::span<Contact> contacts) const
     {
         std::vector<double> P, phi(paths.size());

@@ -1,4 +1,4 @@
-// Where Rapid's own files are.
+// Finds Rapid's own files.
 #include "bindings/scene/installation.h"
 
 #include "bindings/host/modules.h"

@@ -1,4 +1,4 @@
-// Where Rapid's own files are: for programs that help to write scenes, and for those that confine themselves.
+// Locates Rapid's own files, for programs that help to write scenes and for those that confine themselves.
 #pragma once
 
 #include <string>
@@ -7,18 +7,18 @@
 
 namespace rapid {
 
-// The folders of the Rapid that the program runs with.
+// Folders of the installation with which the program runs.
 struct Installation {
-    // Modules, and nodes written in Lua. rapid.d.lua describes all that scenes are written with to Lua's language
-    // server; new/ has what a scene begins with.
+    // Modules, and nodes written in Lua. rapid.d.lua describes the graph language to Lua's language server; new/ has
+    // templates for new scenes.
     std::string lua;
-    std::string library;  // the library, and the part of it that is loaded when it is first needed
+    std::string library;  // the library, and its part that is loaded on first use
 
-    // From any thread. Error: the files in Lua are not where they belong to.
+    // Callable from any thread. Error: the Lua files are not in their place.
     static Result<Installation> find();
 
-    // Loads that part now, which reads and writes level sets, meshes and .vdb: for a program that then limits its
-    // memory or the files that it may open. From any thread. Error: it is not there, or of another version.
+    // Loads that part now, which reads and writes level sets, meshes and .vdb, for a program that then limits its
+    // memory or the files that it may open. Callable from any thread. Error: it is missing, or of another version.
     static Result<Done> load_all();
 };
 

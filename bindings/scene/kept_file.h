@@ -1,4 +1,4 @@
-// Files of what this build of Rapid has made, for itself: to the bit, and known by a key.
+// Files that this build of Rapid writes for itself: bit-identical data, identified by a key.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 
 namespace rapid {
 
-// What f gives of a file. Error: with the file.
+// Applies f to a file. Errors are rethrown with the file's name.
 template <class F>
 auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
 {
@@ -30,14 +30,14 @@ auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
     }
 }
 
-// Error: the file is of another build.
+// Throws Error if the file is of another build.
 inline void require_this_build(const std::string& build)
 {
     if (build != RAPID_ABI)
         throw Error(fmt::format("it is of Rapid {}, and this is {}; write it anew", build, RAPID_ABI));
 }
 
-// Error: the file is of another key.
+// Throws Error if the file has another key.
 inline void require_key(const CheckedJson& header, const std::string& key)
 {
     if (header.value("key", "") != key) throw Error("it is of another run");

@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-// Before other initialisers, which call the library.
+// Runs before other initialisers, which call the library.
 [[gnu::constructor(101)]] void check_library()
 {
     if (std::string_view(library_abi()) == RAPID_ABI) return;

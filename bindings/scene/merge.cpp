@@ -1,4 +1,4 @@
-// Parts of runs as one.
+// Merges parts of runs.
 #include "include/rapid/merge.h"
 
 #include <atomic>

@@ -22,7 +22,7 @@ Result<std::string> picture_sheet(const std::vector<SheetPicture>& pictures, std
         std::vector<SheetTile> tiles;
         for (const SheetPicture& picture : pictures)
             tiles.push_back({picture.file.empty() ? Picture() : read_png(picture.file), picture.label});
-        constexpr int steepest = 16;  // a height for each width
+        constexpr int steepest = 16;  // height per width
         for (const SheetTile& tile : tiles)
             if (!tile.picture.rgb.empty() && tile.picture.height > steepest * tile.picture.width)
                 refuse(fmt::format("a picture of {}x{} is too narrow for a sheet", tile.picture.width,

@@ -11,14 +11,14 @@ namespace rapid {
 
 // One of the pictures.
 struct SheetPicture {
-    std::string file;                // a .png; empty: there is none, and its place stays free
-    std::vector<std::string> label;  // lines of ASCII; what does not fit is cut
+    std::string file;                // a .png; empty: none, and its place stays free
+    std::vector<std::string> label;  // lines of ASCII, truncated to fit
 };
 
-// The bytes of a .png with these pictures from left to right and from the top, in about as many rows as columns; at
-// most 8,192 pixels wide. All have the shape of the first picture; others are fitted into it. So many pictures each are
-// a series, which begins with a row, or lies in one, where that is possible. From any thread. Error: a series of none;
-// more than 4,096 pictures; one that is more than 16 times as high as wide; a file that can't be read, or is no .png.
+// Returns the bytes of a .png with these pictures from left to right and from the top, in about as many rows as
+// columns; at most 8,192 pixels wide. All are fitted into the shape of the first picture. `series` pictures each form a
+// series, which begins a row or lies in one, if possible. Callable from any thread. Error: an empty series; more than
+// 4,096 pictures; one more than 16 times as high as wide; a file that cannot be read, or is not a .png.
 Result<std::string> picture_sheet(const std::vector<SheetPicture>& pictures, std::size_t series = 1);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// Files that are asked for, and what a scene's plan makes of them.
+// Requested files, and the parts of a scene's plan that they need.
 #include "bindings/scene/run_outputs.h"
 
 #include <fmt/format.h>
@@ -40,7 +40,7 @@ PlanOptions plan_options(const SceneInside::Impl& scene, const FileOutputs& outp
     return options;
 }
 
-// Without files: as an output that names no attributes.
+// Without files, explains an output that names no attributes.
 PlanOptions explained_options(const SceneInside::Impl& scene, const FileOutputs& outputs)
 {
     PlanOptions options = plan_options(scene, outputs);
@@ -53,7 +53,7 @@ Explanation explained(const SceneInside::Impl& scene, const FileOutputs& outputs
     return rapid::explain(OutputPlan(scene, outputs, explained_options(scene, outputs)).plan, outputs.outputs);
 }
 
-// By name: the points of a create, and what a node keeps.
+// Reports by name the points of create nodes, and the data that nodes hold.
 SceneReport report_of(const Snapshot& snapshot)
 {
     std::map<std::string, std::size_t> simulations, nodes;
@@ -195,8 +195,8 @@ Result<std::string> SceneInside::check_outputs(Scene& scene, const FileOutputs& 
 
 namespace {
 
-// Whether a kernel, which sees one point, has raised it: so it would in the run. A function of all points may fail for
-// want of points, and what runs into a limit may do so in the trial alone.
+// Returns true if a kernel, which sees one point, raised the error: it would do so in the run, too. A function of all
+// points may fail for lack of points, and a limit may be reached in the trial only.
 bool is_of_kernel(const Plan& plan, const Error& error)
 {
     if (error.kind() != ErrorKind::Fault) return false;
@@ -232,8 +232,8 @@ Result<std::string> SceneInside::advice_on(Scene& scene, const FileOutputs& file
             });
         } catch (const Error& error) {
             if (error.kind() == ErrorKind::Cancelled || error.kind() == ErrorKind::WrongCall) throw;
-            if (!impl.evaluator) impl.start_again();  // without what a limit has stopped
-            impl.cancellation.forget();               // of a limit of memory
+            if (!impl.evaluator) impl.start_again();  // without scripts that a limit has stopped
+            impl.cancellation.forget();               // cancelled by a memory limit
         }
         if (raised) throw *raised;
         return text;
@@ -249,7 +249,7 @@ Result<SceneRaces> SceneInside::find_races(Scene& scene, const FileOutputs& file
         options.keep_all = true;  // an attribute that no file needs may show the race
         Races races;
         tbb::task_arena(1).execute([&] {
-            // All sessions of the trials are stopped by one hand.
+            // One interruption stops all sessions of the trials.
             const auto scripts = std::make_shared<Interruption>();
             const SceneInside::Impl::Apart apart(impl, scripts);
             const auto load = [&](const KernelOrder& order) {

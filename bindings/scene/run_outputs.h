@@ -1,4 +1,4 @@
-// What the options of rapid/run.h mean for the files of a run.
+// Translates the options of rapid/run.h for the files of a run.
 #pragma once
 
 #include "bindings/run/frame_files.h"
@@ -6,10 +6,10 @@
 
 namespace rapid {
 
-// Error: a size or an angle that can't be; an output that is none.
+// Throws Error if a size or an angle is not possible, or an output is invalid.
 FrameFiles frame_files(const FileOutputs& files);
 
-// Error: frames that do not go up, or that no file's name or format holds.
+// Throws Error if frames do not increase, or do not fit into file names or formats.
 void check_frames(const RunFrames& frames);
 
 }  // namespace rapid

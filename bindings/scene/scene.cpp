@@ -1,4 +1,4 @@
-// Scenes: a session, a plan and an evaluator behind a face without exceptions.
+// Scenes: a session, a plan and an evaluator behind an interface without exceptions.
 #include "include/rapid/scene.h"
 
 #include <fmt/format.h>
@@ -45,7 +45,7 @@ Scene::~Scene() = default;
 
 namespace {
 
-// With hooks, of a file or of a text with its name.
+// Opens a file, or a text with its name, with hooks.
 Result<std::unique_ptr<SceneInside::Impl>> opened(const std::string& file, std::optional<std::string> text,
                                                   SceneOptions options, SceneHooks hooks)
 {
@@ -141,7 +141,7 @@ Result<Done> Scene::offer(const std::string& name, const HostObject& object)
 {
     return impl_->call(SceneError::WrongCall, [&] {
         impl_->offers->objects[name] = make_object(name, object, impl_->options.guard_callbacks);
-        impl_->behind_frame.reset();  // its functions may take it
+        impl_->behind_frame.reset();  // its functions may change it
         return Done();
     });
 }

@@ -1,4 +1,4 @@
-// What frames and snapshots hold.
+// Data of frames and snapshots.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,12 @@ struct [[gnu::visibility("hidden")]] SceneFrame::Data
 {
     FrameResult result;
     std::vector<std::string> warnings;
-    std::uint64_t scene = 0;  // whose plan it is of, by its number; 0: of none
+    std::uint64_t scene = 0;  // number of the scene to whose plan it belongs; 0: none
 
-    // That a frame has chosen at first: "main", or the first one where there is none.
+    // Returns the initial output of a frame: "main", or the first one if there is no "main".
     std::string first_output() const;
 
-    // Columns that are uniform, written out. On first request, from any thread.
+    // Uniform columns, written out. On first request, from any thread.
     mutable std::mutex mutex;
     mutable std::map<std::string, AnyColumn> expanded;  // by OUTPUT/NAME
 };
@@ -34,12 +34,12 @@ class StateFile;
 
 struct [[gnu::visibility("hidden")]] SceneSnapshot::Data
 {
-    // Error: what SceneSnapshot::read() refuses.
+    // Throws Error if the file is refused by SceneSnapshot::read().
     static SceneSnapshot read_from(const StateFile& file);
 
     Snapshot snapshot;
     std::string file;   // of the scene
-    std::string nodes;  // a hash of those of the graph, by type and name
+    std::string nodes;  // a hash of the graph's nodes, by type and name
 };
 
 struct [[gnu::visibility("hidden")]] SceneShapes::Data
@@ -50,8 +50,8 @@ struct [[gnu::visibility("hidden")]] SceneShapes::Data
 
 SceneValue value_of(const DetailValue& detail);
 
-// As the renderer takes it, which refuses sizes. Error: a camera that looks at its own place,
-// or nowhere; an angle of view that none has.
+// Returns options for the renderer, which checks sizes. Throws Error for a camera that looks at its own position, or
+// nowhere, or an impossible angle of view.
 std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camera, PictureSize size);
 
 }  // namespace rapid

@@ -1,4 +1,4 @@
-// What is Rapid's, without a scene: types of nodes, the memory that it keeps.
+// Functions that need no scene: documentation of node types, and spare memory.
 #include <fmt/format.h>
 
 #include <utility>
@@ -33,7 +33,7 @@ Result<Done> SceneInside::load_plugins(const std::string& path) { return loaded(
 Result<Done> SceneInside::keep_spare_columns(std::size_t columns)
 {
     try {
-        constexpr std::size_t most = 4096;  // each release goes over them
+        constexpr std::size_t most = 4096;  // each release iterates over them
         if (columns > most) refuse(fmt::format("{} columns are to be kept; it must be at most {}", columns, most));
         SparePages::all().keep(columns);
         return Done();

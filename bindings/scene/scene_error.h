@@ -1,4 +1,4 @@
-// Exceptions as values: what is thrown inside becomes a SceneError once, where a call returns.
+// Converts exceptions to values: an exception becomes a SceneError once, where a call returns.
 #pragma once
 
 #include <functional>
@@ -11,18 +11,18 @@
 
 namespace rapid {
 
-constexpr int most_threads = 4096;  // of a scene: more are a typing error, not a machine
+constexpr int most_threads = 4096;  // per scene; more is a typing error
 
 SceneError wrong_call(std::string message);
-SceneError busy();  // of a call while the scene is in another one
+SceneError busy();  // the error of a call while the scene is in another one
 
 // Refuses the call.
 [[noreturn]] inline void refuse(std::string message) { throw Error(std::move(message), ErrorKind::WrongCall); }
 
-// What is being handled, inside of a catch block. fault: the kind of an ErrorKind::Fault.
+// Returns the current exception inside a catch block. fault: the kind for an ErrorKind::Fault.
 SceneError caught_error(SceneError::Kind fault);
 
-// On a thread that may have no caller: what it throws is dropped.
+// Calls a hook on a thread that may have no caller: exceptions are dropped.
 template <class T>
 void call_hook(const std::function<void(const T& told)>& hook, const std::type_identity_t<T>& told)
 {
@@ -32,7 +32,7 @@ void call_hook(const std::function<void(const T& told)>& hook, const std::type_i
         }
 }
 
-// Runs a callback of the program: what it throws becomes an Error that names it.
+// Runs a callback of the program. Its exceptions become an Error that names the callback.
 template <class F, class... Arguments>
 auto call_program(const char* name, const F& f, Arguments&&... arguments)
 {

@@ -1,4 +1,4 @@
-// Films of frames, by the renderer of `rapid run -o film.mp4`; ffmpeg, a program of its own, encodes them.
+// Films of frames, by the renderer of `rapid run -o film.mp4`. ffmpeg, a separate program, encodes them.
 //
 //   auto film = rapid::SceneFilm::begin("film.mp4");
 //   for (const rapid::SceneFrame& frame : frames) film->add(frame, *scene.shapes(frame.number()));
@@ -16,32 +16,32 @@
 
 namespace rapid {
 
-// How a film is made.
+// Options of a film.
 struct FilmOptions {
     double fps = 24;       // pictures a second, from 1 to 1000
-    PictureSize size;      // of .mp4 and .webm with even edges
-    PictureCamera camera;  // what is left open is fitted, and follows the points without jumps
+    PictureSize size;      // of .mp4 and .webm with even edge lengths
+    PictureCamera camera;  // missing values are fitted, and follow the points without jumps
 };
 
-// A film that is being made.
+// A film in progress.
 class SceneFilm {
 public:
-    // path: a file of .mp4, .webm or .gif. Error: another extension; a pattern of several files; a rate, a size or an
-    // angle of view that can't be; no ffmpeg on the PATH.
+    // path: a file of .mp4, .webm or .gif. Error: another extension; a pattern of several files; an impossible rate,
+    // size or angle of view; no ffmpeg on the PATH.
     static Result<SceneFilm> begin(const std::string& path, const FilmOptions& options = {});
 
-    // What is moved from may only be assigned to, or end.
+    // A moved-from film may only be assigned to or destroyed.
     SceneFilm(SceneFilm&&) noexcept;
     SceneFilm& operator=(SceneFilm&&) noexcept;
     ~SceneFilm();  // without finish() there is no file
 
-    // The next picture, which a thread of the film's own draws; waits while another one waits. Error: of this or of an
-    // earlier picture, after which there will be no film; what ffmpeg says.
+    // Adds a picture, which the film's own thread draws; waits while another one waits. Error: one of this or of an
+    // earlier picture, after which there will be no film; ffmpeg's message.
     Result<Done> add(const SceneFrame& frame, const SceneShapes& shapes);
-    // The pictures that were in the film at the last add(), or finish().
+    // Returns the number of pictures in the film at the last add() or finish().
     std::int64_t done() const;
-    // Waits until all are; the file then has its name, and nothing is added any more. Error: as add(); no picture was
-    // added.
+    // Waits until all are done; the file then has its name, and nothing more can be added. Error: as in add(); no
+    // picture was added.
     Result<Done> finish();
 
 private:

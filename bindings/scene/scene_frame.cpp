@@ -1,4 +1,4 @@
-// Frames: columns as views of the memory that the point set has.
+// Frames: columns as views of the point set's memory.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ SceneColumn view_of(std::string_view name, const Column<T>& column)
 
 constexpr char what_a_frame_is[] = "frame of a scene";
 
-// What a file of a frame holds.
+// Contents of a frame's file.
 struct KeptFrame {
     std::int64_t number = 0;
     std::map<std::string, double> fps, time;

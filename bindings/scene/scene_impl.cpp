@@ -120,13 +120,13 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
         try {
             opening.request();
             scripts->request(Cancellation::cancelled());
-        } catch (...) {  // for want of memory
+        } catch (...) {  // out of memory
         }
     });
     auto fresh = std::make_unique<Session>(file, std::move(session_with));
     if (hooks.parameters) call_hook(hooks.parameters, parameters_of(*fresh));
     std::vector<std::string> told = fresh->take_warnings();
-    tell(told);  // the plan may fail for what they warn of
+    tell(told);  // the plan may fail for the reason that they warn of
     auto fresh_plan = std::make_unique<Plan>(fresh->graph(), plan_options());
     tell(fresh_plan->warnings);
     told.insert(told.end(), fresh_plan->warnings.begin(), fresh_plan->warnings.end());
@@ -235,7 +235,7 @@ Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scrip
           try {
               impl.cancellation.request();
               scripts->request(Cancellation::cancelled());
-          } catch (...) {  // for want of memory
+          } catch (...) {  // out of memory
           }
       })
 {

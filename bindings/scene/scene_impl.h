@@ -1,4 +1,4 @@
-// What a scene is made of.
+// The implementation of scenes.
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -30,24 +30,24 @@
 
 namespace rapid {
 
-// As --set takes it.
+// Returns a value in the form of --set.
 std::string text_of(const SceneValue& value);
 
-// What no scene is opened with; nothing where there is no such thing.
+// Returns the error of invalid options, or nothing.
 std::optional<SceneError> fault_of(const SceneOptions& options);
 
-// One scene. Its session is run again for other parameters; plan and evaluator for each start.
+// A scene. Its session is run again for other parameters; plan and evaluator are renewed for each start.
 struct [[gnu::visibility("hidden")]] Scene::Impl
 {
-    const std::uint64_t number = next_number();  // of the scenes of the process
+    const std::uint64_t number = next_number();  // among the scenes of the process
     std::string file;
     std::optional<std::string> text;
     SceneOptions options;
     SceneHooks hooks;
-    bool keeps_inputs = false;  // what it reads, for its fingerprint
-    // Of a run that writes files.
+    bool keeps_inputs = false;  // the contents of the files that it reads, for its fingerprint
+    // Set for a run that writes files.
     bool may_write = false;
-    PlanOptions plan_of_run;  // but seed and keep_all, which are those of the options
+    PlanOptions plan_of_run;  // except seed and keep_all, which come from the options
     Evaluator::WriteHook write;
     std::map<std::string, std::string> settings;  // of parameters, by name
     std::shared_ptr<Offers> offers = std::make_shared<Offers>();
@@ -58,13 +58,13 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::vector<SceneOutput> outputs;
     std::vector<std::string> warnings;
     std::unique_ptr<Plan> plan;
-    std::unique_ptr<Evaluator> evaluator;  // null behind an error
-    std::exception_ptr ended_by;           // of a frame beside the scene, which left it without an evaluator
+    std::unique_ptr<Evaluator> evaluator;  // null after an error
+    std::exception_ptr ended_by;           // the error of a separate frame that left the scene without an evaluator
     std::unique_ptr<SceneOfPlan> picture_scene;
-    std::map<std::string, SceneFrame> behind;   // the points behind the nodes in the frame that was asked for last
-    std::optional<std::int64_t> behind_frame;   // which one that is
-    std::shared_ptr<InputContents> inputs;      // of the files that are read; null where none are kept
-    std::map<std::string, std::string> opened;  // the contents of those of opening
+    std::map<std::string, SceneFrame> behind;   // the points after the nodes in the last requested frame
+    std::optional<std::int64_t> behind_frame;   // its number
+    std::shared_ptr<InputContents> inputs;      // of the files that are read; null if they are not recorded
+    std::map<std::string, std::string> opened;  // the contents of the files read on opening
     std::int64_t next = 1;
     bool has_advanced = false;
 
@@ -72,13 +72,13 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::atomic<bool> is_busy = false;
     std::uint64_t memory_at_first = MemoryWatch::now();
 
-    // What cancel() may do while another thread is in a call.
+    // State that cancel() may use while another thread is in a call.
     Cancellation cancellation;
     std::mutex scripts_mutex;
-    Session* scripts = nullptr;  // that an advance runs now
+    Session* scripts = nullptr;  // those that an advance is running
 
-    // Runs f, the whole of a call: in the scene's threads, with its limit of memory, its exceptions as errors. fault:
-    // the kind of an ErrorKind::Fault.
+    // Runs f, the whole of a call: on the scene's threads, with its memory limit, and exceptions as errors. fault: the
+    // kind for an ErrorKind::Fault.
     template <class F>
     auto call(SceneError::Kind fault, const F& f)->Result<decltype(f())>
     {
@@ -93,7 +93,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
                 if (hooks.stop.stop_requested()) throw Cancellation::cancelled();
                 const MemoryBudget budget(options.memory);
                 if (session) session->use_from_this_thread();
-                // Of the loops of this scene no thread that waits takes up another scene.
+                // Threads that wait in this scene's loops must not take up work of another scene.
                 tbb::this_task_arena::isolate([&] { value.emplace(f()); });
             };
             arena ? arena->execute(run) : run();
@@ -103,26 +103,26 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         }
     }
 
-    // What is being handled, inside of a catch block.
+    // Returns the current exception inside a catch block.
     SceneError error_of_call(SceneError::Kind fault);
-    // read: keeps the contents of what the session reads; may be null.
+    // read: records the contents of files that the session reads; may be null.
     SessionOptions session_options(const std::map<std::string, std::string>& set,
                                    std::shared_ptr<InputContents> read = nullptr);
     PlanOptions plan_options() const;
     void tell(const std::vector<std::string>& texts) const;
     void take_offers();
-    // Runs the file with these settings. The scene is as it was where that fails.
+    // Runs the file with these settings. If that fails the scene is unchanged.
     void load(std::map<std::string, std::string> set);
     void describe_scene(const Plan& planned);
-    // By which snapshots know their graph.
+    // Returns the hash by which snapshots identify their graph.
     std::string hash_of_nodes() const;
-    // A new run of the graph: operators keep state, and belong to a plan.
+    // Starts a new run of the graph: operators hold state, and belong to a plan.
     void start(std::unique_ptr<Plan> fresh);
-    // Scripts that were stopped do not run again.
+    // Starts again after an interruption: stopped scripts cannot continue.
     void start_again();
     SceneFrame advance();
     static std::uint64_t next_number();
-    // From any thread. For want of memory scripts go on to the next chunk.
+    // Callable from any thread. If memory runs out, scripts continue to the next chunk.
     void cancel() noexcept;
     SceneTrace trace(const TraceOptions& asked);
     SceneFrame points_behind(const std::string& node, std::int64_t frame);
@@ -139,11 +139,11 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             }
             throw;
         }
-        session->take_warnings();  // of frames, which the run tells
+        session->take_warnings();  // of frames; the run reports them
     }
-    // Computes the frames up to this one beside the scene. from: may be null; results: told of each node's.
+    // Computes the frames up to this one separately. from: may be null; results: called with each node's.
     void compute_beside(const Plan& apart, std::int64_t frame, const Snapshot* from, Evaluator::ResultHook results);
-    // The points behind a node of a plan as a frame.
+    // Returns the points after a node of a plan as a frame.
     SceneFrame frame_behind(const Plan& apart, const PlannedNode& planned, std::int64_t frame, PointSet points) const;
     const std::map<std::string, SceneFrame>& points_behind_all(std::int64_t frame, const SceneSnapshot* from);
     PointOrigin origin(const SceneFrame& frame, std::int64_t id, const SceneSnapshot* from);
@@ -154,7 +154,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     // What SceneHooks::beyond_memory asks for, with the place of what is computed; empty where nobody does.
     MemoryWatch::Tell too_late() const;
 
-    // For as long as it lives, cancel() stops scripts.
+    // While it lives, cancel() stops scripts.
     struct Scripts {
         Impl& impl;
         explicit Scripts(Impl& of) : impl(of) { set(impl.session.get()); }
@@ -165,21 +165,21 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
             impl.scripts = to;
         }
     };
-    // For as long as it lives, what ends a call also ends sessions with these scripts, which are not the scene's: of
-    // opening, and of trials.
+    // While it lives, the end of a call also ends sessions with these scripts, which are not the scene's: those of
+    // opening and of trials.
     struct Apart {
         Cancellation::Scope scope;
         std::optional<MemoryWatch> watch;
         std::stop_callback<std::function<void()>> stop;
         Apart(Impl& impl, const std::shared_ptr<Interruption>& scripts);
     };
-    // For as long as it lives, frames are computed, which end when it is cancelled or takes more memory than its limit.
+    // While it lives, frames are computed, and end when they are cancelled or exceed the memory limit.
     struct Running {
         Scripts scripts;
         Cancellation::Scope scope;
         std::optional<MemoryWatch> watch;
         std::stop_callback<std::function<void()>> stop;
-        // Error: it was cancelled before.
+        // Throws Error if it was cancelled before.
         explicit Running(Impl& impl)
             : scripts(impl), scope(&impl.cancellation), stop(impl.hooks.stop, [&impl] { impl.cancel(); })
         {

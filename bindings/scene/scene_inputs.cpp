@@ -1,4 +1,4 @@
-// What the frames of a scene follow from, and the contents of the files that it reads.
+// The inputs that determine a scene's frames, and the contents of the files that it reads.
 #include <algorithm>
 
 #include "bindings/scene/scene_impl.h"

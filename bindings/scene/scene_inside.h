@@ -1,4 +1,4 @@
-// What Rapid's own programs, and the tests, ask of scenes besides include/rapid: nobody else is promised it.
+// Functions of scenes for Rapid's own programs and tests, in addition to include/rapid. They may change at any time.
 //
 // Errors, units and threads are those of rapid/scene.h.
 #pragma once
@@ -19,101 +19,100 @@
 
 namespace rapid {
 
-// What a program needs that runs scenes of others, besides SceneOptions.
+// Hooks for a program that runs the scenes of others, in addition to SceneOptions.
 struct SceneHooks {
-    // Told, with the error's text, of each script that takes longer than script_seconds, before it is stopped: for a
-    // program that then rather ends, as a process that may not read /proc/self/maps can't stop compiled code. On a
-    // thread of Rapid's; what it throws is dropped.
+    // Called with the error's text before a script that exceeds script_seconds is stopped, for a program that then
+    // prefers to end: a process that may not read /proc/self/maps cannot stop compiled code. On a thread of Rapid's;
+    // exceptions are dropped.
     std::function<void(const std::string& message)> late;
-    // Told of each file before it is read, and of each place where a module or a node was looked for. On any thread;
-    // what it throws is dropped.
+    // Called with each file before it is read, and with each path at which a module or a node was looked for. On any
+    // thread; exceptions are dropped.
     std::function<void(const std::string& path)> reads;
-    // Told where memory was to end what is computed, and comes too late: the process has a sixteenth more than it may,
-    // or did not stop within a second. With the error's text; for a program that then rather ends. On a thread of
-    // Rapid's.
+    // Called with the error's text if the memory limit cannot end a computation in time: the process exceeds it by a
+    // sixteenth, or did not stop within a second. For a program that then prefers to end. On a thread of Rapid's.
     std::function<void(const std::string& message)> beyond_memory;
-    // Whether a frame ends with an error where the process takes more memory than its limit: not for a program that
-    // keeps frames, as long as it has room for them.
+    // True if a frame ends with an error when the process exceeds its memory limit. Not for a program that stores
+    // frames for as long as it has room for them.
     bool watch_memory = true;
-    // Told of the parameters as soon as the scene's file has run, before its plan is made, which may fail: for a
-    // program that lets its user change them then, too. On the thread of the call; what it throws is dropped.
+    // Called with the parameters as soon as the scene's file has run, before its plan is made, which may fail: for a
+    // program whose user can then still change them. On the thread of the call; exceptions are dropped.
     std::function<void(const std::vector<SceneParameter>& parameters)> parameters;
-    // Ends what the scene does, opening too, and all that it is asked to do later, with the error Cancelled: as
-    // Scene::cancel(), but once and for all. std::stop_source::request_stop() is for any thread at any time.
+    // Ends everything that the scene does, including opening and later calls, with the error Cancelled: like
+    // Scene::cancel(), but permanently. std::stop_source::request_stop() may be called from any thread at any time.
     std::stop_token stop;
-    // Refuses what no snapshot can hold, such as a function of the frame that counts in a local variable: for programs
-    // that go on in another process. Only then is there a fingerprint().
+    // Refuses state that no snapshot can hold, such as a function of the frame that counts in a local variable: for
+    // programs that continue in another process. fingerprint() requires it.
     bool keep_state = false;
-    // The points behind a solve have the columns "error" (m, where it is estimated), "substeps" and "asleep".
+    // The points after a solve have the columns "error" (m, if it is estimated), "substeps" and "asleep".
     bool tell_points = false;
 };
 
-// What the scene gives, known before a frame is computed.
+// An output of the scene, known before a frame is computed.
 struct SceneOutput {
-    std::string name;                  // "main" where the scene returns one node
-    std::vector<std::string> creates;  // whose points it holds, by name; of several, ids are not those of the creates
+    std::string name;                  // "main" if the scene returns one node
+    std::vector<std::string> creates;  // whose points it holds, by name; if there are several, ids are not theirs
 };
 
-// An attribute, or a group, that the points of a create may have.
+// An attribute or a group that the points of a create node may have.
 struct SceneAttribute {
-    std::string name;       // of a group with "group:" before it
+    std::string name;       // a group has the prefix "group:"
     std::string create;     // the name of the node
-    bool is_kept = false;   // whether the run keeps it; explain() says why
-    std::size_t bytes = 0;  // that it takes for each point, where the points do not share one value
+    bool is_kept = false;   // true if the run keeps it; explain() has the reasons
+    std::size_t bytes = 0;  // for each point, unless the points share one value
 };
 
-// A point as its create knows it.
+// A point as its create node identifies it.
 struct PointOrigin {
     std::string create;   // the name of the node
     std::int64_t id = 0;  // under which it made the point
 };
 
-// What the frames of a scene follow from: scenes of equal fingerprints come to the same bits.
+// The inputs that determine a scene's frames: scenes with equal fingerprints are bit-identical.
 struct SceneFingerprint {
     // By name: the build of Rapid, plugins, parameters, seeds, nodes with their arguments and inputs, the code of all
-    // functions, the contents of the files that opening has read, what points tell (SceneHooks::tell_points). Of what
-    // the program offers the names alone.
+    // functions, the contents of the files read on opening, the columns of SceneHooks::tell_points. For objects of the
+    // program only the names.
     std::map<std::string, std::string> parts;
-    std::string hash;  // of them, without the lines in which functions stand
+    std::string hash;  // of the parts, without the line numbers of functions
 };
 
 // The documentation of a type of node.
 struct NodeDocument {
     std::string name, doc;  // `:NAME { ... }`, and a sentence
-    SceneReport page;       // parameters, and what it reads, writes and makes, as `rapid nodes NAME` prints it
+    SceneReport page;       // parameters, and attributes read, written and made, as printed by `rapid nodes NAME`
 };
 
-// What scenes are made of.
+// The documentation of the graph language.
 struct NodeDocuments {
-    std::vector<NodeDocument> types;    // native ones, Rapid's own in Lua, and those that are found; in order of name
+    std::vector<NodeDocument> types;    // native ones, Rapid's own in Lua, and those that are found; ordered by name
     std::vector<std::string> warnings;  // of files that define a node with a mistake in it
-    std::string annotations;            // all that scenes are written with, for the Lua language server
+    std::string annotations;            // the graph language, for the Lua language server
 };
 
-// Where Graphviz has put the nodes and edges of a graph, for those of the next run that has the same ones.
+// Graphviz's positions of a graph's nodes and edges, reused for the next run of the same graph.
 struct GraphLayout {
-    std::string graph;   // in Graphviz's language, without what depends on values; empty: none is kept
-    std::string places;  // of it, as `dot -Tjson` writes them
+    std::string graph;   // in Graphviz's language, without the parts that depend on values; empty: nothing is stored
+    std::string places;  // its layout, as written by `dot -Tjson`
 };
 
-// What a text of FileOutputs::outputs asks for.
+// The format of a text of FileOutputs::outputs.
 struct OutputFormat {
     std::string extension;  // ".vdb"
     bool is_film = false;   // one file of all frames, which ffmpeg writes
 };
-// What SceneInside::abandon() has to tell.
+// The report of SceneInside::abandon().
 struct Abandoned {
-    std::vector<std::string> warnings;   // that were only counted until now
-    std::vector<std::string> unwritten;  // as RunOutcome
+    std::vector<std::string> warnings;   // only counted until now
+    std::vector<std::string> unwritten;  // as in RunOutcome
 };
 
-// Whether frames have the same bits in other orders of the points and in two states of Lua.
+// The result of find_races(): whether frames are bit-identical in other orders of the points and in two Lua states.
 struct SceneRaces {
     std::optional<SceneError> found;  // the first difference, with its node
-    bool compared = false;            // whether there was a point in these frames
+    bool compared = false;            // true if there was a point in these frames
 };
 
-// By what they ask.
+// Static functions, grouped by subject.
 struct SceneInside {
     using Impl = Scene::Impl;
     static Impl& of(Scene& scene) { return *scene.impl_; }
@@ -122,63 +121,64 @@ struct SceneInside {
     // ---- Scenes.
 
     static Result<Scene> open(const std::string& file, SceneOptions options, SceneHooks hooks);
-    // From files and folders, a list separated by colons, as RAPID_PLUGIN_PATH.
+    // Loads from files and folders, a list separated by colons, like RAPID_PLUGIN_PATH.
     static Result<Done> load_plugins(const std::string& path);
-    // In the whole process: memory of up to so many columns that are released, and of 64 MiB at most, is kept for those
-    // that are made next; at first 4, never fewer than before. For a program that keeps the frames of a run until those
-    // of the next one replace them: all columns of a frame are then released at once, and the system would clear each
-    // page anew.
+    // Reuses the memory of up to this many released columns, and of 64 MiB at most, in the whole process; initially 4,
+    // never reduced. For a program that stores the frames of a run until those of the next one replace them: all
+    // columns of a frame are then released at once, and the system would have to clear each page again.
     static Result<Done> keep_spare_columns(std::size_t columns);
-    // Without a scene, for those who write one: with the nodes of the Lua files in the current folder and on
-    // RAPID_PATH.
+    // Returns documentation without a scene, for programs that help to write one: includes the nodes of Lua files in
+    // the current folder and on RAPID_PATH.
     static Result<NodeDocuments> documents();
-    // The types that every scene of the process may use: native ones, those of plugins, and Rapid's own in Lua; in
-    // order of name.
+    // Returns the types that every scene of the process may use: native ones, those of plugins, and Rapid's own in Lua;
+    // ordered by name.
     static Result<std::vector<SceneNodeType>> all_node_types();
 
-    // In order of name.
+    // Ordered by name.
     static const std::vector<SceneOutput>& outputs(const Scene& scene);
-    // Those of all creates, in the order of the plan.
+    // Returns those of all create nodes, in the order of the plan.
     static Result<std::vector<SceneAttribute>> attributes(Scene& scene);
-    // The arguments of the nodes in a frame, as texts, by node and parameter.
+    // Returns the arguments of the nodes in a frame, as strings, by node and parameter.
     static Result<std::map<std::string, std::map<std::string, std::string>>> arguments(Scene& scene,
                                                                                        std::int64_t frame);
-    // As GraphForm::Json. `kept` is used where it is of this graph, and else replaced. nullptr: no places, for a
-    // program that lays graphs out itself, or may start no other one. Error: `dot` is needed, and not there.
+    // Returns the graph like GraphForm::Json. `kept` is used if it belongs to this graph, and replaced otherwise.
+    // nullptr: without positions, for a program that lays graphs out itself, or may not start another one. Error: `dot`
+    // is needed, and missing.
     static Result<std::string> graph_json(Scene& scene, GraphLayout* kept);
-    // The points as they leave each node that is evaluated in a frame, as ones with the only output of the node's name.
-    // The scene stays where it is: the frames are computed beside it, from a snapshot of this scene before the frame,
-    // or from the first one. Those of the last frame that was asked for are kept. Nodes whose result never changes are
-    // not evaluated in each frame. Error: a frame before the first one; a snapshot of another graph, or behind the
-    // frame; after a script had to be stopped, the scene is to be restarted.
+    // Returns the points after each node that is evaluated in a frame, as frames with a single output of the node's
+    // name. The scene stays where it is: the frames are computed separately, from a snapshot of this scene before the
+    // frame, or from the first one. Those of the last requested frame are cached. Nodes whose result never changes are
+    // not evaluated in each frame. Error: a frame before the first one; a snapshot of another graph, or after the
+    // frame. If a script had to be stopped, the scene must be restarted.
     static Result<std::map<std::string, SceneFrame>> points_behind_all(Scene& scene, std::int64_t frame,
                                                                        const std::optional<SceneSnapshot>& from = {});
-    // The create of a point of a frame's output, and its id there: where the points of several are merged, by the place
-    // and the velocity, from points_behind_all(). Error: the frame has no such output or point; several points are at
-    // its place; nodes behind its Solve have moved it.
+    // Returns the create node of a point of a frame's output, and its id there: if the points of several are merged, by
+    // position and velocity, from points_behind_all(). Error: the frame has no such output or point; several points are
+    // at its position; nodes after its Solve have moved it.
     static Result<PointOrigin> origin(Scene& scene, const SceneFrame& frame, std::int64_t id,
                                       const std::optional<SceneSnapshot>& from = {});
-    // These three with SceneHooks::keep_state alone.
+    // The next three need SceneHooks::keep_state.
     static Result<SceneFingerprint> fingerprint(Scene& scene);
-    // Files that have been read since the last call, those of opening left out: a hash of the content of each, by name.
+    // Returns a hash of the content of each file read since the last call, by name, without those read on opening.
     static Result<std::map<std::string, std::string>> take_inputs(Scene& scene);
-    // Whether the files of which another run of this scene has told by take_inputs() have the same contents still.
+    // Returns true if the files that another run of this scene returned from take_inputs() still have the same
+    // contents.
     static Result<bool> are_unchanged(Scene& scene, const std::map<std::string, std::string>& inputs);
 
     // ---- Frames, snapshots and shapes.
 
-    // That the columns and groups of all outputs take; those that are shared with other frames count in each.
+    // Returns the bytes of the columns and groups of all outputs; those shared with other frames count in each.
     static std::size_t bytes(const SceneFrame& frame);
-    // The points alone, without statistics, profile and warnings, for a program that keeps many frames: errors may be
-    // estimated of each point.
+    // Returns only the points, without statistics, profile and warnings, for a program that stores many frames: errors
+    // may be estimated for each point.
     static Result<SceneFrame> without_statistics(const SceneFrame& frame);
-    // The camera of a picture, with all that `camera` leaves open. Error: as SceneFrame::picture().
+    // Returns the camera of a picture, with the values that `camera` leaves open. Error: as in SceneFrame::picture().
     static Result<PictureCamera> camera(const SceneFrame& frame, const SceneShapes& shapes,
                                         const PictureCamera& camera = {}, PictureSize size = {});
 
-    // To the bit, to a file for the same build of Rapid, and back. key: of what they follow from, such as
-    // fingerprint(). Of a frame the points of all outputs are kept, of shapes all but warnings. Error: the system's; of
-    // load also a file that is of something else, damaged, of another build or another key.
+    // Save bitwise to a file for the same build of Rapid, and load again. key: of the inputs, such as fingerprint(). A
+    // frame's file has the points of all outputs; that of shapes everything but warnings. Error: that of the system;
+    // for load also a file of another kind, a damaged one, or one of another build or key.
     static Result<Done> save(const SceneFrame& frame, const std::string& path, const std::string& key);
     static Result<SceneFrame> load_frame(const std::string& path, const std::string& key);
     static Result<Done> save(const SceneShapes& shapes, const std::string& path);
@@ -186,49 +186,50 @@ struct SceneInside {
     static Result<Done> save(const SceneSnapshot& snapshot, const std::string& path, const std::string& key);
     static Result<SceneSnapshot> load_snapshot(const std::string& path, const std::string& key);
 
-    // Whether a file begins as one of a snapshot, of a scene or of `rapid run --cache`, does.
+    // Returns true if a file begins like one of a snapshot, of a scene or of `rapid run --cache`.
     static bool is_snapshot(const std::string& path);
-    // What such a file says of itself, as `rapid info` prints it. Error: the system's; a file that is of something
-    // else, or damaged.
+    // Describes such a file, as printed by `rapid info`. Error: that of the system; a file of another kind, or a
+    // damaged one.
     static Result<SceneReport> describe_snapshot(const std::string& path);
 
     // ---- Runs.
 
-    // keep_state and tell_points of the hooks are chosen by the run.
+    // The run sets keep_state and tell_points of the hooks.
     static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
                                  RunListener listener);
-    // For a prepared run in `parts` parts: of each output the pattern of the whole, and that of the parts, with {part}.
-    // Error: points that are coupled; pictures and films, which can't be put together; a name with {part}.
+    // Returns, for a prepared run in `parts` parts, for each output the pattern of the whole and that of the parts,
+    // with {part}. Error: points that are coupled; pictures and films, which cannot be merged; a name with {part}.
     static Result<std::vector<std::pair<std::string, std::string>>> merges(SceneRun& run, int parts);
-    // For a program that is about to end, from any thread at any moment, but not from a listener: writes statistics and
-    // profile of the frames so far. A call of the run does not return afterwards. Nothing where the run's thread does
-    // not let go within a second, as when a listener does not return.
+    // For a program that is about to end. Callable from any thread at any time, but not from a listener: writes
+    // statistics and profile of the frames so far. A call of the run does not return afterwards. Returns nothing if the
+    // run's thread does not release its lock within a second, for example because a listener does not return.
     static std::optional<Abandoned> abandon(SceneRun& run);
 
-    // ---- Files that are asked for, and what a plan makes of them. The scene stays where it is; where a script had to
-    // be stopped it is at its start afterwards, or is to be restarted.
+    // ---- Requested files, and the parts of a plan that they need. The scene stays where it is; if a script had to be
+    // stopped, it is at its start afterwards, or must be restarted.
 
-    // Error: an extension that no format has, with the known ones; no pattern; no attributes behind a colon.
+    // Error: an unknown extension, with the known ones; not a pattern; no attributes after a colon.
     static Result<OutputFormat> output_format(const std::string& output);
-    static std::vector<OutputFormat> output_formats();  // all there are, in order of extension
-    // The folders that a run writes to, that of its first output first; they are made where they are missing. Error:
-    // one can't be made.
+    static std::vector<OutputFormat> output_formats();  // all, ordered by extension
+    // Returns the folders that a run writes to, that of its first output first; missing ones are made. Error: one
+    // cannot be made.
     static Result<std::vector<std::string>> output_folders(const FileOutputs& files);
     static Result<std::vector<std::string>> output_folders(const RunOptions& options);
-    // As Scene::explain(), for these files: what they ask for is kept. Error: of an output, as SceneRun::prepare().
+    // Explains the plan like Scene::explain(), for these files: the attributes that they need are kept. Error: of an
+    // output, as in SceneRun::prepare().
     static Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files);
-    // What one of two scenes keeps and the other does not, as `rapid explain --against` prints it.
+    // Returns what one of two scenes keeps and the other does not, as printed by `rapid explain --against`.
     static Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other);
-    // Bytes that the points of each create, and each node, keep after a frame, as a snapshot holds them: computes the
-    // frames up to this one beside the scene. Error: a frame before the first one.
+    // Returns the bytes that the points of each create node, and each node, hold after a frame, as in a snapshot:
+    // computes the frames up to this one separately. Error: a frame before the first one.
     static Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame);
-    // What can be found without running a frame: a line for each parameter, and how many nodes are reached from which
-    // outputs. Error: of an output, as SceneRun::prepare().
+    // Checks everything that needs no frame: returns a line for each parameter, and the number of nodes that each
+    // output reaches. Error: of an output, as in SceneRun::prepare().
     static Result<std::string> check_outputs(Scene& scene, const FileOutputs& files);
-    // A line for each stiff node, and for each shape that is too coarse for its points: tries out the first frame with
-    // a few points. Error: what a kernel does wrong with one of these points; other errors are left to the run.
+    // Returns a line for each stiff node, and for each shape that is too coarse for its points, by trying the first
+    // frame with a few points. Error: that of a kernel for one of these points; other errors are left to the run.
     static Result<std::string> advice_on(Scene& scene, const FileOutputs& files);
-    // On one thread. Error: FailedFrame, of a frame that fails.
+    // Runs on one thread. Error: FailedFrame if a frame fails.
     static Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames);
 };
 

@@ -1,4 +1,4 @@
-// What is in a scene and in a frame of it: attributes, arguments, the points behind nodes, and where points come from.
+// Inspects a scene and its frames: attributes, arguments, the points after nodes, and the origin of points.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ void refuse_before_first(const Plan& plan, std::int64_t frame)
         refuse(fmt::format("frame {} is before the scene's first, {}", frame, plan.first_frame()));
 }
 
-// The node of this name, of `all` that the scene makes.
+// Returns the node of this name, of `all` that the scene makes.
 const PlannedNode& planned_node(const Plan& plan, const std::string& name, const std::vector<SceneNode>& all)
 {
     for (const PlannedNode& planned : plan.nodes)
@@ -102,10 +102,10 @@ SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t fram
 {
     planned_node(*plan, node, nodes);
     refuse_before_first(*plan, frame);
-    start_again();  // not before the arguments are known to be right
+    start_again();  // only after the arguments are checked
     const Plan watched(session->graph(), plan_options());
     const PlannedNode& found = planned_node(watched, node, nodes);
-    PointSet points;  // of a node whose result never changes, those of its only evaluation
+    PointSet points;  // for a node whose result never changes, those of its only evaluation
     compute_beside(watched, frame, nullptr, [&](const Node& of, std::int64_t, const PointSet& result) {
         if (of.name == node) points = result;
     });
@@ -146,7 +146,7 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
     if (place == IdIndex::none) refuse("the point is not in this frame");
     const PlannedNode& planned = plan->nodes[output->second];
     if (planned.carries.size() == 1) return {plan->simulations[planned.simulation].create->name, id};
-    // The chains' own points that are at the same place, to the bit, with the same velocity.
+    // The chains' own points with bitwise equal position and velocity.
     std::vector<PointOrigin> found;
     const std::map<std::string, SceneFrame>& results = points_behind_all(frame.number(), from);
     for (const std::size_t s : planned.carries) {

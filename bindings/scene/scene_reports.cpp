@@ -1,4 +1,4 @@
-// What is told of a scene: its plan, its graph as a picture, and the lives of single points.
+// Reports on a scene: its plan, its graph as a picture, and the lives of single points.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ SceneTrace Scene::Impl::trace(const TraceOptions& asked)
     Biographer(*plan, asked.ids, asked.create);  // throws Error if there is no such create
     if (asked.last < plan->first_frame())
         refuse(fmt::format("frame {} is before the scene's first, {}", asked.last, plan->first_frame()));
-    start_again();  // not before the arguments are known to be right
+    start_again();  // only after the arguments are checked
     const Running running(*this);
     PlanOptions with_steps = plan_options();
     with_steps.keep_steps = true;
@@ -74,9 +74,9 @@ SceneTrace Scene::Impl::trace(const TraceOptions& asked)
         if (session->is_interrupted()) evaluator.reset();  // its scripts do not run again
         if (error.kind() == ErrorKind::Cancelled) throw;
         result.fault = caught_error(SceneError::FailedFrame);
-        cancellation.forget();  // of a limit of memory
+        cancellation.forget();  // cancelled by a memory limit
     }
-    session->take_warnings();  // of frames, which the run tells
+    session->take_warnings();  // of frames; the run reports them
 
     const std::int64_t first = std::max(asked.first, traced.first_frame());
     std::vector<Biography> lives = biographer.lives();

@@ -1,4 +1,4 @@
-// Runs that write files: a scene, the files of its frames, and what is kept of them.
+// Runs that write files: a scene, the files of its frames, and their cache.
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
@@ -48,7 +48,7 @@ void check_options(const SceneOptions& scene, const RunOptions& options)
         refuse("again says what to do with a cache; give its folder");
     if (!options.claims.empty() && options.statistics.empty())
         refuse("claims are known by the file of statistics; give one");
-    // Of which a fingerprint has nothing.
+    // A fingerprint does not cover these.
     if (!options.cache.folder.empty() && (!scene.objects.empty() || !scene.nodes.empty()))
         refuse(
             "a cache does not know when what the program offers has changed; leave objects and nodes out, or the "
@@ -73,13 +73,13 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     RunCache cache;
     WrittenNames names;
     std::mutex names_mutex;              // scripts on all threads make objects of files
-    std::shared_ptr<PartRecord> record;  // null where all points are simulated
+    std::shared_ptr<PartRecord> record;  // null if all points are simulated
     std::optional<InputContents> read;   // of a part
     RunReport report;
     RunFrames frames{0, 0};
     std::int64_t first = 1;  // of the scene
     bool has_opened = false, is_ready = false, has_begun = false;
-    std::atomic<bool> computes = false;  // frames: what they read is not noted
+    std::atomic<bool> computes = false;  // while frames are computed, their inputs are not noted
     std::atomic<bool> is_to_end = false;
 
     Impl(std::string file, SceneOptions scene_options, SceneHooks hooks, RunOptions asked, RunListener told)
@@ -104,7 +104,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         scene.file = std::move(file);
         scene.text = options.text;
         scene.options = std::move(scene_options);
-        if (cache.asked()) scene.options.estimate_errors = true;  // until the cache says whether they are
+        if (cache.asked()) scene.options.estimate_errors = true;  // until the cache decides
         scene.hooks = std::move(hooks);
         scene.may_write = true;
         if (options.part) note_settings();
@@ -126,7 +126,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         files.take_part(record);
     }
 
-    // By which parts know that they belong together.
+    // Notes the settings by which parts recognize each other.
     void note_settings() const
     {
         for (const auto& [name, value] : scene.options.set) record->identity[name] = text_of(value);
@@ -180,7 +180,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         is_ready = true;
     }
 
-    // Those that are not of frames. Error: one of them is the scene, or two are one.
+    // Claims the files that are not of frames. Throws Error if one of them is the scene, or if two are the same.
     void claim_own_files()
     {
         names.reads(scene.file);
@@ -210,7 +210,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         return *options.frames;
     }
 
-    // What else changes what a run keeps.
+    // Returns further options that change the run's data.
     Fingerprint fingerprint_options() const
     {
         Fingerprint all = {{events_entry, options.events.empty() ? "no" : "yes"}};
@@ -219,7 +219,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         return all;
     }
 
-    // Error: found before the first frame.
+    // Throws errors found before the first frame.
     RunOutcome run()
     {
         if (!is_ready) refuse("the run is not prepared; call prepare() first");
@@ -241,7 +241,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
                 add_unwritten(outcome, report.finish_early());
                 return outcome;
             }
-            if (cache.first_due())  // what an earlier run has computed behind it
+            if (cache.first_due())  // after the frames of an earlier run
                 for (const FrameRecord* known : cache.records(last + 1, frames.last)) report.known_frame(*known, false);
             files.finish();
             finish_cache(true);
@@ -261,7 +261,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     std::int64_t compute(RunOutcome & outcome)
     {
         Evaluator& evaluator = *scene.evaluator;
-        // Until the last frame is computed: files that are written then are no reason to grow.
+        // Active until the last frame is computed: files written then must not count.
         const SceneInside::Impl::Running running(scene);
         std::int64_t last = frames.last;
         if (cache.asked()) last = go_on();
@@ -288,7 +288,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         return last;
     }
 
-    // Tells what the cache has, and takes the evaluator there. Returns the last frame to compute.
+    // Reports the cache's frames, and takes the evaluator there. Returns the last frame to compute.
     std::int64_t go_on()
     {
         Evaluator& evaluator = *scene.evaluator;
@@ -308,7 +308,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         for (const std::string& warning : cache.take_warnings()) report.warning(warning);
     }
 
-    // Writes the frames before the one that failed, which are complete, or says why not.
+    // Writes the complete frames before the one that failed, or says why not.
     void finish_files(const std::string& reason)
     {
         try {
@@ -387,7 +387,7 @@ std::optional<Abandoned> SceneInside::abandon(SceneRun& run)
         Abandoned result{std::move(told->warnings), {}};
         if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
         return result;
-    } catch (...) {  // for want of memory
+    } catch (...) {  // out of memory
         return std::nullopt;
     }
 }

@@ -1,4 +1,4 @@
-// Shapes of a frame, and pictures of points among them.
+// Shapes of a frame, and pictures of points with them.
 #include "include/rapid/shapes.h"
 
 #include <fmt/format.h>

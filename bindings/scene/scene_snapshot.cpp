@@ -15,7 +15,7 @@ namespace {
 
 constexpr char what_it_is[] = "snapshot of a scene";
 
-// What a file says of itself: the members of its header but those of its form.
+// Returns the members of a file's header, except those of its format.
 CheckedJson told_of(const std::string& path)
 {
     const StateFile file(path);

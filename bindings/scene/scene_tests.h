@@ -1,5 +1,5 @@
-// Tests of scenes in Lua, in busted's language (docs/lua-api.md), as `rapid test` runs them: for a harness of a
-// program's own. They need busted, which is found when a file is run.
+// Runs tests of scenes in Lua, in busted's language (docs/lua-api.md), like `rapid test`: for a program's own test
+// harness. They need busted, which is searched when a file is run.
 #pragma once
 
 #include <functional>
@@ -9,37 +9,36 @@
 
 namespace rapid {
 
-// What is told of a test, or of the file.
+// An event of a test, or of the file.
 struct SceneTestEvent {
-    // What has happened.
+    // Kinds of events.
     enum Kind {
         Started = 0,
         Passed = 1,
         Failed = 2,
         Skipped = 3,
-        Broken = 4,  // the file can't be read or run, so its tests are not known
+        Broken = 4,  // the file cannot be read or run, so its tests are unknown
     };
     Kind kind = Started;  // of the event
     std::string name;     // of the test, with its describe blocks
-    std::string message;  // of Failed and Broken: FILE:LINE: the fault, maybe with more lines
+    std::string message;  // for Failed and Broken: FILE:LINE: the fault, maybe with more lines
 };
 
-// How the tests of a file are run.
+// Options for the tests of a file.
 struct SceneTestOptions {
     std::string filter;   // a Lua pattern that a test's name must match; empty: all
-    int already_run = 0;  // tests at the beginning of the file that are left out: of a process that has ended in one
-    int threads = 0;      // of scenes that do not set it; 0: all that the machine has
-    // As SceneHooks::late, of scenes; the test fails where it returns.
+    int already_run = 0;  // number of tests to skip at the beginning of the file, if one ended the process
+    int threads = 0;      // for scenes that do not set it; 0: all of the machine
+    // Like SceneHooks::late, for scenes; the test fails if it returns.
     std::function<void(const std::string& message)> late;
 };
 
-// Runs the tests of a file in this process and tells of each, in order, on the thread of the call. Scenes that they run
-// are confined as others are; the file's own Lua may do all that a program may, the end of the process included, and
-// nothing limits its time. From one thread of the process at a time: `threads` is set for the whole process meanwhile
+// Runs the tests of a file in this process and reports each, in order, on the thread of the call. Scenes are confined
+// as usual; the file's own Lua may do anything that a program may, including ending the process, and its time is not
+// limited. Only one thread of the process may call this at a time: `threads` applies to the whole process meanwhile
 // (tbb::global_control).
 //
-// Error: WrongCall: options that can't be, busted is not there; what `tell` threw,
-// behind the last test.
+// Error: WrongCall if options are not possible or busted is missing; the exception of `tell`, after the last test.
 Result<Done> run_scene_tests(const std::string& file, const SceneTestOptions& options,
                              const std::function<void(const SceneTestEvent& event)>& tell);
 

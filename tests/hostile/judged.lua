@@ -3,17 +3,17 @@
 --
 --   local judged = require "tests.hostile.judged"
 --   local result = judged.run(folder, text, { seconds = 10, arguments = "--script-timeout 2" })
---   result.status, result.stderr; result.complaint where it did not end so
+--   result.status, result.stderr; result.complaint if it did not end in this way
 local address_space = require "tests.address_space"
 local command = require "testing.command"
 
 local judged = {}
 
-local most_address_space = 3 * 2 ^ 20 -- KiB: --memory, and what libraries and threads map and never touch
+local most_address_space = 3 * 2 ^ 20 -- KiB: --memory, plus memory that libraries and threads map but never touch
 local longest_message = 10000
 
--- seconds: of the processor, the same on a machine that has other work. environment: further variables. any_address:
--- whether the address space has no limit.
+-- seconds: of processor time, which does not depend on other load. environment: further variables. any_address: true if
+-- the address space is unlimited.
 function judged.run(folder, text, limits)
   folder:write("scene.lua", text)
   local result = command.shell(('ulimit -t %d; %s timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..

@@ -1,5 +1,5 @@
--- Files of a few megabytes in which one thing is there many times: they are read in a time that grows as they do, and
--- what is said about them has an end.
+-- Files of a few megabytes that repeat one thing many times: the reading time grows in proportion to their size, and
+-- messages about them stay short.
 local command = require "testing.command"
 
 local many = 200000
@@ -102,7 +102,7 @@ describe("a file that is there to be slow, or long", function()
 
   it("is written in little memory, where it has one endless text", function()
     local folder = command.folder()
-    -- Of .npz all texts of an attribute are as long: 80 MB here.
+    -- In .npz all strings of an attribute have the same length: 80 MB here.
     local text = "id,Px,Py,Pz,name\n0,0,0,0," .. ("n"):rep(1e5) .. "\n"
     for i = 1, 199 do text = text .. i .. ",0,0,0,n" .. i .. "\n" end
     folder:write("a.csv", text)

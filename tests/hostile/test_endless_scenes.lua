@@ -1,5 +1,5 @@
--- Scenes of what is small, or legal, so many times or so large that no memory, stack or time is enough: each is
--- refused with what it would take, and where.
+-- Scenes that repeat something small or legal so often, or make it so large, that memory, stack or time runs out: each
+-- is refused with its requirement and its position.
 local command = require "testing.command"
 
 local two = "rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } }"
@@ -8,7 +8,7 @@ local ball = "rapid.levelset.sphere { voxel = 0.2 }"
 local further = "^scene%.lua:%d: a further 64 MiB of nodes, level sets, meshes and points would take about 64 MiB, " ..
   "and %d+ MiB are free of 300 MiB; let the scene make fewer, or set %-%-memory\n$"
 
--- Scenes, in which TWO and BALL stand for the above, and how each is refused.
+-- Scenes, in which TWO and BALL stand for the above, and the error of each.
 local refused = {
   -- The stack: a motion asks its factors, and a shape the one that it moves.
   { [[
@@ -23,7 +23,7 @@ for i = 1, 1e5 do s = s:transform(rapid.translate(0, 1e-9, 0)) end
 return TWO :collide { shape = s } :solve {}]],
     "^scene%.lua:3: :transform: a sphere that is moved more than 1000 times; move it once, by a product of the " ..
     "motions\n$" },
-  -- Chains of nodes let go one after the other, where nothing computes them.
+  -- Chains of nodes are released one after the other, while nothing computes them.
   { [[
 local c = TWO
 for i = 1, 150000 do c = c:gravity {} end
@@ -62,7 +62,7 @@ return chain:points { name = "k", writes = names, kernel = function(p) for i = 1
   { "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.008 } } " ..
     ":contact { radius = 0.004 } :solve {}",
     '^scene%.lua:2: node "solve1": a step of 1953125 points that act on one another would take about 373 MiB' },
-  -- What libraries refuse without a word that helps.
+  -- Libraries refuse these without a helpful message.
   { [[
 local names, values = {}, {}
 for i = 1, 66000 do values["a" .. i], names[i] = 1, "a" .. i end

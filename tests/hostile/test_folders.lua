@@ -1,4 +1,4 @@
--- Scenes in folders of others, and names that would lead out of them.
+-- Scenes in foreign folders, and names that would lead out of them.
 local command = require "testing.command"
 
 local function run(folder, text, arguments)

@@ -1,4 +1,4 @@
--- What is no regular file, beside a scene or in its place: nothing is waited for, and nothing is read without end.
+-- Files that are not regular, next to a scene or in its place: Rapid neither blocks on them nor reads them endlessly.
 local command = require "testing.command"
 
 local function folder_with(text)

@@ -1,11 +1,11 @@
--- Records of others, which merge, wedge, farm and --cache find in folders: whatever is in them, they are read or
+-- Foreign records, which merge, wedge, farm and --cache find in folders: whatever their contents, they are read or
 -- refused, at once and in a few lines.
 local address_space = require "tests.address_space"
 local command = require "testing.command"
 
 local longest_message = 10000
 
--- Runs a line of the shell; `complaint` is what is wrong with its end.
+-- Runs a shell command; `complaint` says what is wrong with its end.
 local function ended(folder, line, environment)
   local result = command.shell(address_space(4194304) .. " ulimit -t 10; timeout -k 1 60 " .. line,
     { cwd = folder.path, environment = environment })
@@ -29,7 +29,7 @@ local function record(changes)
   return "{" .. table.concat(list, ", ") .. "}"
 end
 
--- What is no record, whatever it is to be one of.
+-- Contents that are not a record of any kind.
 local nonsense = {
   "", "{", "null", "[]", '"' .. ("x"):rep(1000000), ("x"):rep(1000000), ("["):rep(1000000), "\27[2J",
   '{"rapid_part": ' .. ("["):rep(200000) .. ("]"):rep(200000) .. "}",

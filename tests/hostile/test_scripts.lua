@@ -1,4 +1,4 @@
--- Scripts that mean harm, or nonsense: whatever they do, a run ends by itself, with a status of its own.
+-- Malicious or nonsensical scripts: whatever they do, a run ends by itself, with a status of its own.
 --
 -- HOSTILE_SCRIPTS is how many are tried, HOSTILE_STRESSED how many of them with Lua's collector at work all the time (a
 -- fifth), HOSTILE_SEED the first one's seed.
@@ -12,10 +12,10 @@ local count = amount.of("HOSTILE_SCRIPTS", 10)
 local many_stressed = tonumber(os.getenv "HOSTILE_STRESSED" or math.ceil(count / 5))
 local first = tonumber(os.getenv "HOSTILE_SEED" or 1)
 
--- The limit of time is for each stretch of script, of which a run has a few dozen.
+-- The time limit applies to each stretch of script, of which a run has a few dozen.
 local limits = { seconds = 20, arguments = "--script-timeout 0.5 --script-memory 48M" }
 
--- Lua collects garbage all the time, and each block of memory has a wall behind it, and is one when it was freed.
+-- Lua collects garbage all the time, and each block of memory is followed by a guard page and becomes one when freed.
 local stressed = {
   seconds = 60, arguments = "--script-timeout 1 --script-memory 48M", any_address = true,
   environment = { LD_PRELOAD = library, RAPID_STRESS = "collector,guard" },

@@ -1,4 +1,4 @@
--- Texts of scenes, files and tests hold what a terminal takes for commands: nothing that Rapid prints does.
+-- Strings in scenes, files and tests contain terminal commands; Rapid's output contains none.
 local command = require "testing.command"
 
 local clear = "\27[2J"

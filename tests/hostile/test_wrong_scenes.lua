@@ -1,4 +1,4 @@
--- Scenes with mistakes: each is refused, and told where, or runs.
+-- Scenes with mistakes: each is refused with its position, or runs.
 --
 -- WRONG_SCENES is how many are tried, WRONG_SEED the first one's seed.
 local command = require "testing.command"

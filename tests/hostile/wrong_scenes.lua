@@ -47,7 +47,7 @@ local function joined(pieces)
   return table.concat(texts)
 end
 
--- What wrong values need. One line, behind the scene's first.
+-- Definitions for wrong values: one line, after the scene's first.
 local head = [[local loop = {} loop[1], loop.x, loop.P = loop, loop, loop local long = ("long"):rep(3e5) ]] ..
   [[local failing = setmetatable({}, { __index = function() error "of a metatable" end }) ]] ..
   [[local function late(f) if f.number > 1 then error "late" end return 1 end]]
@@ -70,7 +70,7 @@ local function wrong_value()
   return pick(pick { wrong_numbers, wrong_values })
 end
 
--- Of what stands alone, before the scene is returned.
+-- Mistakes in separate statements, before the scene is returned.
 local statements = {
   'rapid.mesh.read "missing.obj"', 'rapid.mesh.read ""', 'rapid.mesh.read "scene.lua"', 'rapid.mesh.read "."',
   'rapid.mesh.read "m.####.obj"', 'rapid.mesh.read(long)', 'rapid.mesh.read(("x/"):rep(3000) .. "a.obj")',
@@ -110,7 +110,7 @@ local statements = {
   'local function f(i) return i:points("x", function(p) end) end local n = rapid.create {} while true do n = f(n) end',
 }
 
--- Of a chain.
+-- Mistakes in a chain.
 local links = {
   ":gravty {}", ":gravity(3)", ":gravity()", ":gravity { gravity = {} }", ":merge(3)", ":merge()", ":merge(loop)",
   ":merge(rapid)", ":emit {}", ":emit { source = 3 }", ":emit { source = rapid.mesh.box {} }", ":collide {}",
@@ -157,7 +157,7 @@ local links = {
   ":collide { shape = rapid.levelset.sphere {}, radius = 1e9 }", ":collide { shape = rapid.mesh.box {} }",
 }
 
--- The places of the pieces for which `wanted` is true.
+-- Returns the indices of the pieces for which `wanted` is true.
 local function places(pieces, wanted)
   local found = {}
   for i, piece in ipairs(pieces) do
@@ -234,7 +234,7 @@ function mistakes.text(pieces)
   if #found > 0 then pieces[pick(found)].text = " (" .. wrong_value() .. ")" end
 end
 
--- Of `name = value` within brackets.
+-- Mistakes in `name = value` within brackets.
 local function given(pieces)
   local depth = 0
   return places(pieces, function(piece, i)

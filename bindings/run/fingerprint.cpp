@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "bindings/host/modules.h"
+#include "bindings/run/setting_entries.h"
 #include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/graph/abi.h"
@@ -144,16 +145,6 @@ std::string hash_of(const Fingerprint& fingerprint)
             text += fmt::format("{}:{}{}:{}", name.size(), name, value.size(), value);
         }
     return hash_text(content_hash(text));
-}
-
-std::string name_in_message(const std::string& name)
-{
-    static const std::map<std::string, Setting> settings = {{events_entry, Setting::Events},
-                                                            {part_entry, Setting::Part},
-                                                            {sample_entry, Setting::Sample},
-                                                            {seed_entry, Setting::Seed}};
-    const auto found = settings.find(name);
-    return found == settings.end() ? name : name_of(found->second);
 }
 
 std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& is)

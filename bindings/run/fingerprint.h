@@ -21,12 +21,6 @@ Fingerprint fingerprint_of(const Session& session, const Plan& plan, const std::
 
 std::string hash_of(const Fingerprint& fingerprint);
 
-// Entries for settings, with the command's option names in the files of any program.
-constexpr char seed_entry[] = "--seed", part_entry[] = "--part", sample_entry[] = "--sample",
-               events_entry[] = "--events";
-
-// Returns the name of an entry in messages.
-std::string name_in_message(const std::string& name);
 std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& is);
 
 // The contents of the files that a run reads.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "bindings/run/setting_entries.h"
 #include "runtime/base/error.h"
 #include "runtime/base/json_text.h"
 #include "runtime/base/setting_names.h"

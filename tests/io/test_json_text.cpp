@@ -15,7 +15,7 @@ using namespace rapid;
 
 namespace {
 
-std::string text_of(std::size_t indent)
+std::string json_text_of(std::size_t indent)
 {
     const std::optional<double> none;
     const std::variant<bool, std::string> either = "no \xff UTF-8";
@@ -41,16 +41,16 @@ std::string text_of(std::size_t indent)
 
 TEST_CASE("JSON of any values is laid out as nlohmann's library lays it out", "[json]")
 {
-    const CheckedJson parsed = CheckedJson::parse(text_of(0));
-    CHECK(text_of(0) == parsed.dump());
-    CHECK(text_of(1) == parsed.dump(1));
-    CHECK(text_of(2) == parsed.dump(2));
+    const CheckedJson parsed = CheckedJson::parse(json_text_of(0));
+    CHECK(json_text_of(0) == parsed.dump());
+    CHECK(json_text_of(1) == parsed.dump(1));
+    CHECK(json_text_of(2) == parsed.dump(2));
     CHECK(json_text(parsed, 2) == parsed.dump(2));
 }
 
 TEST_CASE("JSON holds the values that were written", "[json]")
 {
-    const CheckedJson parsed = CheckedJson::parse(text_of(2));
+    const CheckedJson parsed = CheckedJson::parse(json_text_of(2));
     CHECK(parsed.at("P").get<std::vector<double>>() == std::vector<double>{0.1f, -2, 1e-8f});
     CHECK(parsed.at("some") == 1e300);
     for (const char* name : {"nothing", "none", "not finite"}) CHECK(parsed.at(name).is_null());

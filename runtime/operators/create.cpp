@@ -4,6 +4,7 @@
 // earlier ids are dropped.) At later frames they are the points from Solve, passed on without a copy, or the initial
 // points again if no Solve feeds points back. Every planned column and group exists from the first frame on, so all
 // frames have the same columns.
+#include "runtime/base/parallel.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"

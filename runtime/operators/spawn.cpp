@@ -194,8 +194,8 @@ private:
     }
 
     std::vector<AttributeSpec> made(const Uses& uses) const;
-    BirthPlan plan_of_step(const Flow& flow, const Flow& from, const Evaluation& now) const;
-    void bear(Flow& flow, const Flow& from, const Evaluation& now);
+    BirthPlan plan_of_step(const Flow& flow, const Flow& parent_flow, const Evaluation& now) const;
+    void bear(Flow& flow, const Flow& parent_flow, const Evaluation& now);
 
     ParentClock clock_;
     bool has_borne_ = false;  // read in trials
@@ -227,26 +227,26 @@ std::vector<AttributeSpec> Spawn::made(const Uses& uses) const
 }
 
 // The births of a frame are spread over its subframes.
-BirthPlan Spawn::plan_of_step(const Flow& flow, const Flow& from, const Evaluation& now) const
+BirthPlan Spawn::plan_of_step(const Flow& flow, const Flow& parent_flow, const Evaluation& now) const
 {
     BirthPlan plan{rate, count, on, min_speed.value_or(0), limit, birth.when};
     const FrameClock clock = flow.simulation->clock();
-    const std::int64_t late = from.simulation == flow.simulation ? 1 : 0;
+    const std::int64_t late = parent_flow.simulation == flow.simulation ? 1 : 0;
     const std::int64_t before = clock.step_at(now.frame) - clock.start - 1 - late;
     plan.parts = clock.subframes;
     plan.part = static_cast<int>(std::max<std::int64_t>(before, 0) % clock.subframes);
     return plan;
 }
 
-void Spawn::bear(Flow& flow, const Flow& from, const Evaluation& now)
+void Spawn::bear(Flow& flow, const Flow& parent_flow, const Evaluation& now)
 {
-    const StepRecord& record = *from.simulation->record;
+    const StepRecord& record = *parent_flow.simulation->record;
     if (on && on->kind == BirthEvent::Hit && !record.has_contacts)
         throw Error("on = \"hit\": the parents' solve has a tolerance, and then keeps no contacts; give it substeps");
     // Points of the same chain move after this node: their last path is that of the previous frame.
-    const bool waits = from.simulation == flow.simulation && !now.at_start;
-    const ParentPaths parents(from.points, record, source_group);
-    const BirthPlan plan = plan_of_step(flow, from, now);
+    const bool waits = parent_flow.simulation == flow.simulation && !now.at_start;
+    const ParentPaths parents(parent_flow.points, record, source_group);
+    const BirthPlan plan = plan_of_step(flow, parent_flow, now);
     std::vector<Brood> broods;
     // A chain whose parents have already lived when it begins emits from its next frame on.
     if (!now.at_start || record.h == 0) broods = clock_.births(parents, plan, now);
@@ -258,7 +258,7 @@ void Spawn::bear(Flow& flow, const Flow& from, const Evaluation& now)
     const Offspring offspring(parents, broods, traits, now);
     offspring.make_columns(flow.points);
     require_room(flow.points, broods);
-    if (kill_parent && !is_sample) remove_parents(flow, from, parents, broods, now);
+    if (kill_parent && !is_sample) remove_parents(flow, parent_flow, parents, broods, now);
     const std::size_t born =
         offspring.append_to(flow.points, flow.simulation->next_id, is_trial ? trial_births : SIZE_MAX);
     now.figures.born += born;

@@ -3,13 +3,13 @@
 # A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
 # that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
 # ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
-# time. They are the part of the library that is loaded when it is first needed (runtime/base/deferred.h). LIGHT: it goes over no
-# points (RapidPrecompiled.cmake).
+# time. They are the part of the library that is loaded when it is first needed (runtime/base/deferred.h). LIGHT: the layer
+# does not iterate over points (RapidPrecompiled.cmake).
 #
 # rapid_in_batches(TARGET), called after the target's libraries are linked, compiles its sources sixteen at a time if
-# RAPID_BATCHES is on: headers and the templates that several files use take most of the time of a file. Batches of
-# sixteen take 15 % less than those of eight, which take half of the time of single files. So no two files of a target may give different things
-# one name, in anonymous namespaces either.
+# RAPID_BATCHES is on, because headers and templates that several files use take most of the time of a file. Batches of
+# eight take half of the time of single files, and batches of sixteen take 15 % less. Two files of a target must not use
+# one name for different things, not even in anonymous namespaces.
 #
 # rapid_link_layers(TARGET [WITHOUT_DEFERRED] NAME...) links layers into a target, with both parts or the first;
 # rapid_link_parts(TARGET PART...) links parts.

@@ -25,10 +25,6 @@ ColumnMemory memory_of(const Column<T>& column)
     return {reinterpret_cast<const char*>(values.data), values.stride * sizeof(T)};
 }
 
-}  // namespace
-
-namespace {
-
 thread_local const Kernel::StepShapes* shapes_of_pass = nullptr;
 
 }  // namespace

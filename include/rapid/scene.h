@@ -426,9 +426,9 @@ public:
     Result<SceneSnapshot> save();
     Result<Done> restore(const SceneSnapshot& snapshot);
 
-    // Ends the current computation (frames, also of trace(); shapes), or else the next one, with the error Cancelled:
-    // in a frame at the next chunk of points or substep, and at once in a script. Callable from any thread. restart(),
-    // restore() and set() clear it.
+    // Ends the current computation (frames, also of trace() and points_behind(); shapes), or else the next one, with
+    // the error Cancelled: in a frame at the next chunk of points or substep, and at once in a script. Callable from
+    // any thread. restart(), restore() and set() clear it.
     void cancel();
 
     // Explains what the plan of the scene keeps and prunes, and why: nodes, attributes with their bytes per point,

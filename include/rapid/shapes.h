@@ -50,7 +50,7 @@ public:
     // Both are in the order of the nodes; infinite shapes other than planes are omitted.
     std::vector<ShapeMesh> meshes() const;
     std::vector<ShapePlane> planes() const;
-    // Returns true if the scene sets the camera of its pictures; SceneFrame::camera() returns it.
+    // Returns true if the scene sets the camera of its pictures.
     bool has_camera() const;
     // Returns the warnings of making them, such as a mesh with holes.
     std::vector<std::string> warnings() const;

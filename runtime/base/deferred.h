@@ -1,7 +1,7 @@
 // Functions in the deferred part of the library, which is everything that needs OpenVDB or Assimp. It is a separate
 // library (rapid_deferred) that is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols
 // takes 40 ms at each start, and many scenes need none of them, namely those without mesh files, .vdb files, and uses
-// of the grid of a level set (grid_on_demand.h).
+// of the grid of a level set (baked_level_set.h).
 //
 // A function is declared in the header of its subject:
 //

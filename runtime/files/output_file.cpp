@@ -141,10 +141,6 @@ Entry* claim_entry()
     return entry;
 }
 
-}  // namespace
-
-namespace {
-
 std::array<std::atomic<pid_t>, 16> writing_programs{};  // 0: none
 static_assert(std::atomic<pid_t>::is_always_lock_free, "a signal handler reads them");
 

@@ -289,10 +289,6 @@ private:
     std::vector<std::size_t> readers_of_all_;
 };
 
-}  // namespace
-
-namespace {
-
 // Checks the names that nodes read from the points of this simulation as their source.
 void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t simulation, const MadeNames& made)
 {
@@ -308,10 +304,6 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
             });
         }
 }
-
-}  // namespace
-
-namespace {
 
 // Throws Error if no node makes the attribute, or only nodes after this one do.
 void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std::vector<PlannedNode>& nodes,

@@ -158,10 +158,6 @@ AttributeDifference compare_group(const std::string& name, const PointSet& a, co
     return result;
 }
 
-}  // namespace
-
-namespace {
-
 void check_ids_differ(const PointSet& points, const char* set)
 {
     const std::vector<std::size_t> order = id_order(points.id());

@@ -5,7 +5,7 @@
 //
 // P is points, v is velocities, id is ids, pscale is half of widths, N is normals, Cd is primvars:displayColor, Alpha
 // is primvars:displayOpacity. Any other attribute is primvars:NAME, and a group is bool[] primvars:group_NAME. Floats
-// have 9 significant digits, which identify the float. For reading see usda_points.h.
+// have 9 significant digits, which identify the float.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 //
 // P is the Points, a string attribute is an Array of type String (its bytes: each string and a zero byte), any other
 // attribute is an array of the PointData, and a group is UInt8 group_NAME. One cell with all points makes them visible.
-// The field TimeValue is the time of the frame, s. For reading see vtk_arrays.h.
+// The field TimeValue is the time of the frame, s.
 #include <fmt/format.h>
 #include <zlib.h>
 

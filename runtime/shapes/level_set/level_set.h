@@ -1,7 +1,7 @@
 // A narrow-band level set: the general shape that particles collide with (paper §4).
 //
 // Queries use a flat table of blocks with a coarse index (baked_grid.h), because a sample of OpenVDB's tree costs
-// several times more. The OpenVDB grid is for tools and files and is created on demand (grid_on_demand.h).
+// several times more. The OpenVDB grid is for tools and files and is created on demand (baked_level_set.h).
 #pragma once
 
 #include <filesystem>
@@ -37,7 +37,7 @@ public:
 using LevelSetPtr = std::shared_ptr<const LevelSet>;
 
 // Builds the level set of a mesh. The inside is where the winding number of the mesh is not 0: pieces may overlap, and
-// an inward-facing piece inside another is a cavity. Holes smaller than a voxel are closed (see grid_on_demand.h).
+// an inward-facing piece inside another is a cavity. Holes smaller than a voxel are closed (see baked_level_set.h).
 //
 // Problems that still give a usable level set (holes, faces turned inside out) are appended to `warnings`, with
 // numbers. Throws Error if the mesh is empty, or if the voxel size would need over 2^31 voxels or is larger than the

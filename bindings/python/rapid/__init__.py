@@ -26,7 +26,7 @@ __all__ = ["Constraint", "Edit", "Error", "Force", "Frame", "Mesh", "Picture", "
 
 
 def version():
-    """"1.0.0", of the library."""
+    """Returns the library's version, such as "1.0.0"."""
     return library.rapid_version().decode()
 
 
@@ -37,7 +37,7 @@ _string = 6
 
 
 class _Handle:
-    """An open handle of the library, closed when nobody holds it, or by close()."""
+    """An open handle of the library. It is closed by close(), or when it is garbage-collected."""
 
     def __init__(self, value, closer):
         self.value = value
@@ -47,7 +47,7 @@ class _Handle:
     def _end(closer, value):
         try:
             call(closer, value)
-        except Error:  # it was closed by hand
+        except Error:  # already closed explicitly
             pass
 
     def close(self):
@@ -59,7 +59,7 @@ class _Released:
 
 
 class Picture:
-    """The bytes of a .png. A notebook shows it."""
+    """The bytes of a .png. A notebook displays them as a picture."""
 
     def __init__(self, png):
         self.png = png
@@ -85,7 +85,8 @@ def _camera(position, target, fov):
 
 
 class Frame:
-    """A computed frame: frame["P"] is an array that shares memory with the run, and stays as it is while it is held."""
+    """A computed frame. frame["P"] is an array that shares memory with the run; it does not change while it is
+    referenced."""
 
     def __init__(self, handle, scene):
         self._handle, self._scene = _Handle(handle, "frame_release"), scene
@@ -110,8 +111,9 @@ class Frame:
         return iter(self.columns)
 
     def __getitem__(self, name):
-        """The column: shape (points,) of numbers, (points, 3) of vec3, (points, 4) of quaternions. It can't be written:
-        the run shares it. Of texts it is an array of str, which is a copy; categories() does without."""
+        """Returns a column: shape (points,) for numbers, (points, 3) for vec3, (points, 4) for quaternions. It is
+        read-only because the run shares it. A column of strings is copied into an array of str; categories() avoids the
+        copy."""
         if name not in self.columns:
             try:
                 call("frame_column", self._handle.value, name.encode(), byref(sized(Column)))
@@ -123,11 +125,11 @@ class Frame:
         return self[name]
 
     def expanded(self, name):
-        """The column, where values that all points share are written out: no stride is 0."""
+        """Returns a column with a value for each point, even if all points share one value: no stride is 0."""
         return self._array("frame_expanded", name)
 
     def places(self, ids):
-        """Where the points of these ids are in the columns; 2**32 - 1 of an id that no point has."""
+        """Returns the index in the columns of each id, or 2**32 - 1 if no point has that id."""
         ids = numpy.ascontiguousarray(ids, numpy.int64)
         places = numpy.empty(len(ids), numpy.uint32)
         call("frame_places", self._handle.value, ids.ctypes.data_as(ctypes.POINTER(c_int64)), len(ids),
@@ -136,7 +138,7 @@ class Frame:
 
     @staticmethod
     def text_of(token):
-        """The text of a token: equal texts have equal tokens in a process."""
+        """Returns the string of a token. Within a process, equal strings have equal tokens."""
         return get("frame_text_of", token, c_char_p()).value.decode()
 
     @staticmethod
@@ -144,7 +146,7 @@ class Frame:
         return get("frame_token_of", encoded(text), c_uint32()).value
 
     def categories(self, name):
-        """Of a column of texts: a list of the different ones, in order, and for each point the place of its own."""
+        """Returns the sorted distinct strings of a column, and for each point the index of its string in that list."""
         tokens, places = numpy.unique(self._array("frame_column", name, texts=False), return_inverse=True)
         words = [self.text_of(int(token)) for token in tokens]
         order = sorted(range(len(words)), key=words.__getitem__)
@@ -153,54 +155,56 @@ class Frame:
         return [words[k] for k in order], rank[places]
 
     def group(self, name):
-        """Of each point, whether it is in the group."""
+        """Returns a boolean for each point: true if the point is in the group."""
         return self._array("frame_group", name).view(numpy.bool_)
 
     def detail(self, name):
-        """A value of the whole set: a number, or three."""
+        """Returns a value of the whole point set: a number, or three."""
         value = Value()
         call("frame_detail", self._handle.value, name.encode(), byref(value))
         return from_value(value)
 
     def output(self, name):
-        """The same frame's other output."""
+        """Returns another output of the same frame."""
         handle = c_void_p()
         call("frame_output", self._handle.value, name.encode(), byref(handle))
         return Frame(handle, self._scene)
 
     @property
     def statistics(self):
-        """The figures that are asked for most: frame.statistics.penetration_max."""
+        """The most used figures, such as frame.statistics.penetration_max."""
         return get("frame_statistics", self._handle.value, sized(Statistics))
 
     @property
     def statistics_json(self):
-        """What `rapid run --stats` writes of a frame, as a dict."""
+        """The statistics that `rapid run --stats` writes for a frame, as a dict."""
         return json.loads(get("frame_statistics_json", self._handle.value, c_char_p()).value)
 
     @property
     def profile_json(self):
-        """Where its time went: [{"nodes", "stage", "begin", "seconds", "points", "bytes"}], a pass over the points each."""
+        """The frame's time by stage: [{"nodes", "stage", "begin", "seconds", "points", "bytes"}], one entry per
+        pass."""
         return json.loads(get("frame_profile_json", self._handle.value, c_char_p()).value)
 
     def write(self, path):
-        """Writes the points to a file of a format that Rapid knows, by the extension."""
+        """Writes the points to a file. The extension selects the format."""
         call("frame_write", self._handle.value, str(path).encode())
 
     @staticmethod
     def read(path):
-        """The points of a file of a format that Rapid knows, by the extension, as a Frame of number 0."""
+        """Reads the points of a file, as a Frame with number 0. The extension selects the format."""
         handle = c_void_p()
         call("frame_read", str(path).encode(), byref(handle))
         return Frame(handle, None)
 
     def describe(self):
-        """What `rapid info` tells: how many points there are, their bounds, the range of each attribute, the groups."""
+        """Returns what `rapid info` prints: the number of points, their bounds, the range of each attribute, the
+        groups."""
         return json.loads(get("frame_describe", self._handle.value, c_char_p()).value)
 
     def compare(self, other, tolerance=1e-6):
-        """What `rapid diff` tells of the differences to another frame, between points of the same id; whether there are
-        none beyond the tolerance is in ["same"]."""
+        """Returns the differences to another frame between points with the same id, as `rapid diff` reports them.
+        ["same"] is true if all differences are within the tolerance."""
         if not isinstance(other, Frame):
             raise TypeError(f"the other frame is a {type(other).__name__}; it must be a rapid.Frame")
         text = c_char_p()
@@ -208,20 +212,20 @@ class Frame:
         return json.loads(text.value)
 
     def picture(self, shapes, position=None, target=None, fov=None, width=640, height=360):
-        """A Picture of the points among these Shapes; what is None of the camera is fitted."""
+        """Returns a Picture of the points among these Shapes. A camera value of None is chosen to fit."""
         if not isinstance(shapes, Shapes):
             raise TypeError(f"the shapes are a {type(shapes).__name__}; they must be rapid.Shapes")
         return _picture("frame_picture", self._handle.value, shapes._handle.value, byref(_camera(position, target, fov)),
                         width, height)
 
     def show(self, width=640, height=360):
-        """A Picture with the shapes of the scene."""
+        """Returns a Picture with the shapes of the scene."""
         if self._scene is None:
             raise Error("wrong call", "the frame was read from a file, and has no scene to be shown with")
         return self._scene.picture(self, width, height)
 
     def release(self):
-        """Gives the memory back before Python does. Arrays that are held keep theirs."""
+        """Frees the memory now instead of at garbage collection. Arrays that are still referenced keep theirs."""
         self._handle = _Released
 
     def _array(self, function, name, texts=True):
@@ -240,7 +244,7 @@ class Frame:
 
 
 class _Memory:
-    """Memory of a frame as NumPy asks for it; arrays hold it, and it holds the frame."""
+    """A frame's memory as a NumPy array interface. Arrays reference it, and it references the frame."""
 
     def __init__(self, frame, address, shape, strides, dtype):
         self._frame = frame
@@ -249,8 +253,8 @@ class _Memory:
 
 
 class Shapes:
-    """The shapes of a scene in a frame: meshes [{"role", "positions", "triangles"}], whose arrays share memory with them,
-    and planes [{"normal", "offset"}]. role: "collider" or "emitter"."""
+    """The shapes of a scene in a frame: meshes [{"role", "positions", "triangles"}], whose arrays share memory with
+    this object, and planes [{"normal", "offset"}]. The role is "collider" or "emitter"."""
 
     def __init__(self, handle):
         self._handle = _Handle(handle, "shapes_release")
@@ -285,12 +289,12 @@ class Shapes:
         return numpy.asarray(_Memory(self._handle, address, (count, 3), (12, 4), numpy.dtype(dtype)))
 
     def release(self):
-        """Gives the memory back before Python does. Arrays that are held keep theirs."""
+        """Frees the memory now instead of at garbage collection. Arrays that are still referenced keep theirs."""
         self._handle = _Released
 
 
 class Snapshot:
-    """All that the next frames depend on."""
+    """The state that determines all following frames."""
 
     def __init__(self, handle):
         self._handle = _Handle(handle, "snapshot_release")
@@ -301,14 +305,14 @@ class Snapshot:
 
     @property
     def size(self):
-        """Bytes."""
+        """Size in bytes."""
         return value_of("snapshot_size", self._handle.value)
 
     def release(self):
         self._handle.close()
 
     def write(self, path):
-        """Writes it to a file, for Snapshot.read()."""
+        """Writes the snapshot to a file, for Snapshot.read()."""
         call("snapshot_write", self._handle.value, str(path).encode())
 
     @staticmethod
@@ -319,24 +323,24 @@ class Snapshot:
 
 
 def _each_once(values, parameters):
-    """Both together. Raises TypeError if a name is in both."""
+    """Merges two dicts. Raises TypeError if a name is in both."""
     for name in parameters.keys() & values.keys():
         raise TypeError(f"{name} is given twice, by name and in a dictionary; keep one of them")
     return {**values, **parameters}
 
 
 class _Program:
-    """What scenes and runs have in common: their options, and callbacks, which live as long as they do."""
+    """The common base of Scene and Run: their options, and the callbacks, which live as long as the object."""
 
     def __init__(self):
-        self._raised = None  # by a callback: raised when the call ends
+        self._raised = None  # an exception of a callback, raised when the call ends
         self._handle = None
-        self._held = {}      # texts that callbacks have returned
+        self._held = {}      # strings that callbacks have returned
 
     def _scene_options(self, set=None, seed=None, paths=(), threads=0, script_seconds=600, script_memory=1 << 30, memory=0,
                        estimate_errors=True, keep_all=False, log=None, progress=None, find_module=None, find_file=None,
                        objects=None, nodes=(), **parameters):
-        """The library's options; their offers are to be released."""
+        """Returns the library's options. The caller releases their offers."""
         options = sized(Options)
         settings = to_settings(_each_once(set or {}, parameters))
         options.set, options.set_count = settings, len(settings)
@@ -362,7 +366,7 @@ class _Program:
             self.cancel()
 
     def release(self):
-        """Gives its memory back before Python does. Frames and snapshots stay."""
+        """Frees the memory now instead of at garbage collection. Frames and snapshots stay valid."""
         self._handle.close()
 
     def __enter__(self):
@@ -384,13 +388,13 @@ class _Program:
             raise self._raised
 
     def _guard(self, function, otherwise):
-        """A callback whose exception is kept until the call ends: none may pass through C."""
+        """Wraps a callback: its exception is stored until the call ends, because exceptions cannot pass through C."""
         program = weakref.ref(self)
 
         def guarded(*arguments):
             try:
                 return function(*arguments)
-            except BaseException as error:  # KeyboardInterrupt, too
+            except BaseException as error:  # includes KeyboardInterrupt
                 program()._raised = error
                 return otherwise
         return guarded
@@ -406,17 +410,19 @@ class _Program:
 
 
 class Scene(_Program):
-    """A scene of a file, or with text= of a text, whose messages name it so.
+    """A scene from a file, or from the string text=, in which case `file` is its name in messages.
 
-    Parameters of the scene are given by name (rate=5000); those of nodes, and names that are no words of Python, in
-    set={"solve.substeps": 4}; so are parameters that are called as one of the options here. seed replaces the seed of
-    every create, but no rapid.param "seed". paths: folders where modules are looked for. threads: 0 for all. script_seconds,
-    script_memory, memory: limits. estimate_errors=False estimates none. log(text) is told of what scripts print, and of
-    warnings; progress(frame, last) of each frame that advance_to() has done, and ends it where it returns False.
-    find_module(name) gives the text of a module, or None; find_file(path) the path of a file that the scene names, or None.
+    Scene parameters are keyword arguments (rate=5000). Parameters of nodes, parameters with the name of an option, and
+    names that are not Python identifiers go into set={"solve.substeps": 4}. seed replaces the seed of every create, but
+    does not set a rapid.param "seed". paths: folders in which modules are searched. threads: 0 for all. script_seconds,
+    script_memory, memory: limits. estimate_errors=False switches the error estimates off. log(text) receives the output
+    of scripts and the warnings. progress(frame, last) is called after each frame of advance_to(), which ends if it
+    returns False. find_module(name) returns the source of a module or None; find_file(path) returns the path of a file
+    that the scene names, or None.
 
-    objects={"floor": rapid.Shape(...)}: what the scene takes as rapid.host "floor", and set={"collide2.shape": "host:floor"}
-    for a parameter of a node. nodes: further types of nodes, rapid.Force, rapid.Edit and rapid.Constraint.
+    objects={"floor": rapid.Shape(...)}: objects that the scene uses as rapid.host "floor", or that
+    set={"collide2.shape": "host:floor"} gives to a parameter of a node. nodes: more node types, each a rapid.Force,
+    rapid.Edit or rapid.Constraint.
     """
 
     def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=600,
@@ -441,12 +447,12 @@ class Scene(_Program):
 
     @staticmethod
     def load_plugin(path):
-        """Loads types of nodes from a library that is built against the runtime's headers, for scenes that are opened
-        later."""
+        """Loads node types from a library that was built against the runtime's headers. Scenes opened later can use
+        them."""
         call("scene_load_plugin", str(path).encode())
 
     def _refuse_ambiguous(self, options, settings):
-        """Raises TypeError if an option was given that is also the name of a parameter, which it does not set."""
+        """Raises TypeError if a given option is also the name of a parameter, which the option would not set."""
         defaults = Scene.__init__.__kwdefaults__
         parameters = self.parameters
         for name, value in options.items():
@@ -456,7 +462,7 @@ class Scene(_Program):
 
     @property
     def parameters(self):
-        """By name: {"value", "default", "doc"}."""
+        """The parameters by name: {"value", "default", "doc"}."""
         result = {}
         for place in range(value_of("scene_parameter_count", self._handle.value)):
             one = sized(Parameter)
@@ -467,7 +473,7 @@ class Scene(_Program):
 
     @property
     def nodes(self):
-        """[{"name", "type", "file", "line"}], in the order in which the scene makes them."""
+        """The nodes, [{"name", "type", "file", "line"}], in the order in which the scene creates them."""
         result = []
         for place in range(value_of("scene_node_count", self._handle.value)):
             one = sized(Node)
@@ -478,7 +484,7 @@ class Scene(_Program):
 
     @property
     def node_types(self):
-        """By name: what `rapid nodes` tells."""
+        """The node types by name, as `rapid nodes` describes them."""
         types = json.loads(get("scene_node_types", self._handle.value, c_char_p()).value)
         return {one.pop("name"): one for one in types}
 
@@ -488,13 +494,13 @@ class Scene(_Program):
     next_frame = property(lambda self: value_of("scene_next_frame", self._handle.value))
 
     def set(self, values=None, /, **parameters):
-        """Gives parameters values, as Scene() does, and goes back to the start."""
+        """Sets parameters as Scene() does, and restarts the scene."""
         settings = to_settings(_each_once(values or {}, parameters))
         self._call("scene_set", self._handle.value, settings, len(settings))
 
     def offer(self, name, thing):
-        """Replaces or adds an object: functions of the frame that say rapid.host "NAME" get it from the next frame on, all
-        else when the scene is set()."""
+        """Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on,
+        all other uses when the scene is set()."""
         offers = make_offers({name: thing}, (), self._guard)
         try:
             self._call("scene_offer", self._handle.value, offers)
@@ -502,15 +508,15 @@ class Scene(_Program):
             call("offers_release", offers)
 
     def advance(self):
-        """Computes the next frame. Ctrl-C cancels it; the scene then has to be restarted."""
+        """Computes the next frame. Ctrl-C cancels it; the scene must then be restarted."""
         return self._frame("scene_advance")
 
     def advance_to(self, frame):
-        """Computes frames up to this one, and returns it."""
+        """Computes all frames up to this one, and returns it."""
         return self._frame("scene_advance_to", frame)
 
     def run(self, first, last):
-        """The frames from first to last, one by one; those before are computed too."""
+        """Yields the frames from first to last. Earlier frames are computed too."""
         if first > self.next_frame:
             self.advance_to(first - 1).release()
         elif first < self.next_frame:
@@ -524,7 +530,7 @@ class Scene(_Program):
         self._call("scene_restart", self._handle.value)
 
     def save(self):
-        """A Snapshot, after at least one frame."""
+        """Returns a Snapshot. At least one frame must have been computed."""
         handle = c_void_p()
         self._call("scene_save", self._handle.value, byref(handle))
         return Snapshot(handle)
@@ -535,17 +541,17 @@ class Scene(_Program):
         self._call("scene_restore", self._handle.value, snapshot._handle.value)
 
     def explain(self):
-        """What the plan keeps and leaves out, and why, as `rapid explain --json` tells it."""
+        """Returns what the plan keeps and prunes, and why, as `rapid explain --json` reports it."""
         return json.loads(get("scene_explain", self._handle.value, c_char_p()).value)
 
     def points_behind(self, node, frame):
-        """The points as they leave a node in a frame, as a Frame with the output of the node's name. The scene is then at
-        its start."""
+        """Returns the points as they leave a node in a frame, as a Frame whose output has the node's name. Afterwards
+        the scene is at its start."""
         return self._frame("scene_points_behind", node.encode(), frame)
 
     def graph(self, form="svg"):
-        """The scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with their
-        places. All but "dot" need Graphviz's program `dot`."""
+        """Returns the scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with
+        their positions. "svg" and "json" need Graphviz's program `dot`."""
         forms = ["dot", "svg", "json"]
         if form not in forms:
             raise ValueError(f"form = {form!r}; it must be one of {', '.join(forms)}")
@@ -554,49 +560,49 @@ class Scene(_Program):
         return json.loads(text.value) if form == "json" else text.value.decode()
 
     def trace(self, ids, first, last, create=None):
-        """The lives of points by their ids, as `rapid trace --json` tells them, in the frames from first to last; create:
-        the name of the node that makes them. The scene is then at its start."""
+        """Returns the lives of points, selected by id, in the frames from first to last, as `rapid trace --json`
+        reports them. create: the name of the node that creates the points. Afterwards the scene is at its start."""
         text, places = c_char_p(), (c_int64 * len(ids))(*(Int64.checked(one) for one in ids))
         self._call("scene_trace", self._handle.value, places, len(ids), create.encode() if create else None, first, last,
                    byref(text))
         return json.loads(text.value)
 
     def cancel(self):
-        """Ends the advance that is running in another thread, or else the next one."""
+        """Cancels the advance that is running in another thread, or the next one if none is running."""
         call("scene_cancel", self._handle.value)
 
     def _frame(self, name, *arguments):
-        """The frame that a function of the scene computes."""
+        """Calls a function of the scene that computes a frame, and returns the frame."""
         handle = c_void_p()
         try:
             self._call(name, self._handle.value, *arguments, byref(handle))
         except BaseException:
-            if handle:  # a handler of Ctrl-C raised after the frame was complete
+            if handle:  # a Ctrl-C handler raised after the frame was complete
                 call("frame_release", handle)
             raise
         return Frame(handle, self)
 
     def shapes(self, frame):
-        """The Shapes of a frame, which need not be computed."""
+        """Returns the Shapes of a frame, which need not have been computed."""
         handle = c_void_p()
         self._call("scene_shapes", self._handle.value, frame, byref(handle))
         return Shapes(handle)
 
     def picture(self, frame, width=640, height=360):
-        """A Picture of a Frame of the scene, with its shapes."""
+        """Returns a Picture of a Frame of the scene, with the scene's shapes."""
         return _picture("scene_picture", self._handle.value, frame._handle.value, width, height)
 
 
 class Run(_Program):
-    """A run that writes files, as `rapid run` does: prepare() it, and run() it, once.
+    """A run that writes files, as `rapid run` does. Call prepare(), then run(), once each.
 
-    outputs: patterns of files, "first.####.vdb". frames: (first, last) or (first, last, step); 48 from the scene's first
-    without. Pictures: width, height, and position, target and fov of their camera, fitted where they are None. statistics,
-    profile, events: names of files. cache: a folder from which it goes on where an earlier run ended, with a snapshot
-    after each cache_every-th frame; cache_again computes all frames again, cache_replace takes the folder of another run.
-    part: (number, count), one of the subsets of the points; sample: the fraction of them. frame(number, points, seconds,
-    is_known) is told of each frame that is done, line(text) of files, warning(text) of warnings. All else is for the scene,
-    as Scene takes it.
+    outputs: file patterns such as "first.####.vdb". frames: (first, last) or (first, last, step); by default 48 from
+    the scene's first frame. width, height, and the camera's position, target and fov are for pictures; a camera value
+    of None is chosen to fit. statistics, profile, events: file names. cache: a folder from which the run resumes where
+    an earlier run ended, with a snapshot after every cache_every frames; cache_again recomputes all frames,
+    cache_replace takes over the folder of another run. part: (number, count), one of several disjoint subsets of the
+    points. sample: the fraction of points to simulate. frame(number, points, seconds, is_known) is called after each
+    frame, line(text) with messages about files, warning(text) with warnings. All other arguments are those of Scene.
     """
 
     def __init__(self, file, outputs=(), frames=None, *, text=None, width=1280, height=720, position=None, target=None,
@@ -631,20 +637,20 @@ class Run(_Program):
         self._handle = _Handle(handle, "run_release")
 
     def prepare(self):
-        """Opens and plans the scene, and finds what is wrong with the names of files."""
+        """Opens and plans the scene, and checks the names of the output files."""
         self._call("run_prepare", self._handle.value)
 
     first_frame = property(lambda self: value_of("run_first_frame", self._handle.value), doc="Of the scene.")
 
     @property
     def frames(self):
-        """(first, last, step) of those that are written."""
+        """The frames that are written, as (first, last, step)."""
         frames = get("run_frames", self._handle.value, Frames())
         return frames.first, frames.last, frames.step
 
     def run(self):
         """Computes and writes the frames. Returns {"ending", "last_frame", "unwritten", "summary"}, where the ending is
-        "complete", or "ended" by end_after_frame(); raises the error of a frame."""
+        "complete", or "ended" after end_after_frame(). Raises Error if a frame fails."""
         outcome = sized(Outcome)
         self._call("run_run", self._handle.value, byref(outcome))
         return {"ending": ["complete", "ended", "failed"][outcome.ending], "last_frame": outcome.last_frame,
@@ -652,18 +658,18 @@ class Run(_Program):
                 "summary": outcome.summary.decode()}
 
     def end_after_frame(self):
-        """Ends it behind the frame that is being computed, with a snapshot where it has a cache. From any thread."""
+        """Ends the run after the current frame, with a snapshot if there is a cache. Can be called from any thread."""
         call("run_end_after_frame", self._handle.value)
 
     def cancel(self):
-        """Ends it at once. From any thread."""
+        """Ends the run at once. Can be called from any thread."""
         call("run_cancel", self._handle.value)
 
 
 def merge_files(parts, output, progress=None):
-    """Puts the files of the parts of a run together, as the whole run would have written them. parts: patterns, where {part}
-    stands for all parts. progress(frame, points) is told of each frame, and ends it where it returns False. Returns
-    {"parts", "frames", "points"}. Meanwhile no scene may run."""
+    """Merges the files of the parts of a run into those that the whole run would have written. parts: patterns, in
+    which {part} stands for every part. progress(frame, points) is called for each frame, and ends the merge if it
+    returns False. Returns {"parts", "frames", "points"}. No scene may run at the same time."""
     merged, raised = sized(Merged), []
 
     def told(_, frame, points):

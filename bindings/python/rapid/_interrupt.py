@@ -1,4 +1,4 @@
-"""Ctrl-C during a call of the library."""
+"""Ctrl-C during a call into the library."""
 import contextlib
 import os
 import signal
@@ -7,10 +7,11 @@ import threading
 
 
 class _Watcher:
-    """Cancels the call that runs when SIGINT arrives.
+    """Cancels the current call when SIGINT arrives.
 
-    Python runs its signal handlers between the bytecodes of the main thread, so none runs while that thread is inside
-    the library. The interpreter writes the signal's number to its wake-up descriptor at once, where a thread waits.
+    Python runs its signal handlers between bytecodes of the main thread, so no handler runs while that thread is inside
+    the library. But the interpreter writes the signal's number to its wake-up descriptor at once, and a thread waits on
+    it.
     """
 
     def __init__(self):
@@ -29,10 +30,11 @@ class _Watcher:
                     self._cancel()
 
     def _take(self):
-        """The numbers of the signals that came, which the descriptor of the program gets as well. The lock is held."""
+        """Returns the numbers of the pending signals, and forwards them to the program's own wake-up descriptor. The
+        caller holds the lock."""
         try:
             numbers = self._read.recv(256, socket.MSG_DONTWAIT)
-        except BlockingIOError:  # the call that they came in took them when it ended
+        except BlockingIOError:  # the call in which they arrived took them when it ended
             return b""
         if self._before != -1:
             os.write(self._before, numbers)
@@ -70,11 +72,11 @@ def _forget_watcher():
 
 @contextlib.contextmanager
 def interruptible(cancel):
-    """Around a call of the library: Ctrl-C cancels it and raises KeyboardInterrupt after it has returned.
+    """Wraps a call into the library: Ctrl-C cancels it and raises KeyboardInterrupt after it has returned.
 
-    A handler of the program's own runs when Python has the main thread again, and what it raises is raised after the
-    call: an exception inside a callback would be lost on its way through C. Python handles signals in the main thread
-    alone, so in other threads this does nothing.
+    A handler of the program runs when the main thread is back in Python. Its exception is raised after the call,
+    because an exception inside a callback would be lost on its way through C. Python handles signals only in the main
+    thread, so this does nothing in other threads.
     """
     handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
     if not callable(handler):

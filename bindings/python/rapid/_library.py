@@ -1,4 +1,4 @@
-"""The C interface (rapid/rapid.h) by ctypes: the library, its structs, and its errors as exceptions."""
+"""The C interface (rapid/rapid.h) through ctypes: the library, its structs, and its errors as exceptions."""
 import ctypes
 import ctypes.util
 import operator
@@ -12,7 +12,7 @@ STATUS = {1: "wrong call", 2: "wrong scene", 3: "failed frame", 4: "cancelled", 
 
 
 def encoded(text):
-    """A str for the library, for which a text ends at a character 0."""
+    """Encodes a str for the library. Raises ValueError if it contains a NUL, where C would end the string."""
     if not isinstance(text, str):
         raise TypeError(f"{text!r} is a {type(text).__name__}; it must be a str")
     if "\0" in text:
@@ -31,7 +31,8 @@ class _Text(c_char_p):
 
 
 def _whole(c_type):
-    """An argument of a type of integer, and a function that converts to that. ctypes would take a number modulo 2^64."""
+    """Returns an argument type for an integer type, and a function that converts to it. Both check the range: ctypes
+    alone would take a number modulo 2^64."""
     bits = 8 * ctypes.sizeof(c_type)
     signed = c_type(-1).value < 0
     least, most = (-2**(bits - 1), 2**(bits - 1) - 1) if signed else (0, 2**bits - 1)
@@ -173,8 +174,8 @@ class NodeType(ctypes.Structure):
 
 
 def _load():
-    """RAPID_LIBRARY; else beside the installed package (PREFIX/lib/python3/dist-packages/rapid); else of a checkout's
-    builds the newest; else where the system's loader looks."""
+    """Loads the library from RAPID_LIBRARY, or from the installed package (PREFIX/lib/python3/dist-packages/rapid), or
+    from the newest build of a checkout, or from the system's search path."""
     name = "librapid_host.so"
     named = os.environ.get("RAPID_LIBRARY")
     if named:
@@ -209,7 +210,7 @@ library.rapid_error_line.argtypes = library.rapid_error_release.argtypes = [c_vo
 library.rapid_error_release.restype = None
 library.rapid_version.restype = c_char_p
 
-# Getters, which can't fail.
+# Getters, which have no error to return.
 for _name, _result in {
         "scene_parameter_count": c_size_t, "scene_node_count": c_size_t, "scene_fps": c_double,
         "scene_first_frame": c_int64, "scene_next_frame": c_int64, "snapshot_frame": c_int64, "snapshot_size": c_uint64,
@@ -293,8 +294,8 @@ for _name, _types in {
 
 
 class Error(RuntimeError):
-    """What went wrong: text and str() have FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line, node and
-    kind; script_stack has the calls of the script in which it was raised, the innermost first."""
+    """An error of the library. text and str() are FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line,
+    node and kind. script_stack is the call stack of the script that raised it, innermost call first."""
 
     def __init__(self, kind, message, file="", line=0, node="", text=None, script_stack=""):
         super().__init__(text or message)
@@ -303,7 +304,7 @@ class Error(RuntimeError):
 
 
 def call(name, *arguments):
-    """Calls rapid_NAME. Raises Error, or what a callback of the call has raised."""
+    """Calls rapid_NAME. Raises Error, or the exception of a callback."""
     fault = c_void_p()
     status = getattr(library, f"rapid_{name}")(*arguments, byref(fault))
     if status == 0:
@@ -317,18 +318,18 @@ def call(name, *arguments):
 
 
 def get(name, handle, result):
-    """The result of a function that writes one behind its handle."""
+    """Calls a function that writes a result after its handle, and returns the result."""
     call(name, handle, byref(result))
     return result
 
 
-# By subject, what fails where a getter returns 0 for a handle that is released, or a scene that is in another call.
+# For each subject, a function that fails where getters return 0: for a released handle, or a scene inside another call.
 _checked = {"scene": ("scene_warnings", c_char_p), "frame": ("frame_outputs", c_char_p),
             "shapes": ("shapes_warnings", c_char_p), "run": ("run_frames", Frames)}
 
 
 def value_of(name, handle):
-    """What a getter gives. Raises Error as call() does."""
+    """Returns the value of a getter. Raises Error as call() does."""
     value = getattr(library, f"rapid_{name}")(handle)
     if not value:
         subject = name.split("_")[0]
@@ -341,13 +342,13 @@ def value_of(name, handle):
 
 
 def lines(name, handle):
-    """The list that a function gives as lines."""
+    """Returns a list that the library gives as lines."""
     text = get(name, handle, c_char_p()).value
     return text.decode().split("\n") if text else []
 
 
 def texts(values, name, what):
-    """An array of texts for the library, with their number."""
+    """Returns an array of strings for the library, and its length."""
     if isinstance(values, (str, bytes)):
         raise TypeError(f"{name} = {values!r}; it must be a list of {what}")
     return (c_char_p * len(values))(*(encoded(str(one)) for one in values)), len(values)
@@ -360,7 +361,7 @@ def sized(struct):
 
 
 def to_value(value, name):
-    """A number, a boolean, a text or three numbers, for the library."""
+    """Converts a number, a boolean, a string or three numbers for the library."""
     result = Value()
     if isinstance(value, bool):
         result.type, result.number[0] = BOOLEAN, value

@@ -1,4 +1,5 @@
-"""What Python offers to scenes: arrays as meshes and points, functions of arrays as shapes, forces and edits."""
+"""Objects that Python offers to scenes: arrays as meshes and points, functions of arrays as shapes, forces and
+edits."""
 import ctypes
 import itertools
 from ctypes import byref, c_void_p
@@ -16,15 +17,16 @@ _string = 6
 
 
 def _tokens(array):
-    """The library's numbers of texts."""
+    """Returns the library's tokens for strings."""
     texts, places = numpy.unique(array, return_inverse=True)
     tokens = [get("frame_token_of", encoded(str(text)), ctypes.c_uint32()).value for text in texts]
     return numpy.array(tokens, numpy.uint32)[places]
 
 
 class _Arrays:
-    """The arrays of one callback. They are copies: the library's memory ends with the call, and a program may keep them.
-    give_back() stores those that are outputs and makes all of them read-only, so that a late write raises ValueError."""
+    """The arrays of one callback. They are copies, because the library's memory ends with the call and a program may
+    keep the arrays. give_back() stores the outputs and makes all arrays read-only, so a late write raises
+    ValueError."""
 
     def __init__(self):
         self._all, self._outputs = [], []
@@ -45,7 +47,7 @@ class _Arrays:
 
 
 def _numbers_of(array, name):
-    """An array of real numbers as float32."""
+    """Converts an array of real numbers to float32."""
     array = numpy.asarray(array)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"{name} is of {array.dtype}; it must be of numbers")
@@ -53,7 +55,7 @@ def _numbers_of(array, name):
 
 
 def _indices_of(array, name):
-    """An array of integers as int32."""
+    """Converts an array of integers to int32."""
     array = numpy.asarray(array)
     if array.dtype.kind not in "iu" and array.size > 0:
         raise TypeError(f"{name} are of {array.dtype}; they must be of integers")
@@ -63,7 +65,7 @@ def _indices_of(array, name):
 
 
 class Points:
-    """Points of arrays: see from_numpy()."""
+    """Points from arrays: see from_numpy()."""
 
     def __init__(self, P, columns):
         arrays = {"P": _numbers_of(P, "P"), **columns}
@@ -92,8 +94,8 @@ class Points:
 
 
 def from_numpy(P, **columns):
-    """Points for a scene: P of shape (points, 3), and any other columns: of shape (points,), (points, 3) or, quaternions,
-    (points, 4); of texts, (points,) of str. They are copied when they are offered."""
+    """Returns points for a scene: P of shape (points, 3), and further columns of shape (points,), (points, 3), (points,
+    4) for quaternions, or (points,) of str. They are copied when they are offered."""
     return Points(P, columns)
 
 
@@ -113,8 +115,9 @@ class Mesh:
 
 
 class Shape:
-    """A shape by its signed distance. distance(P, gradient) returns the distances, shape (n,), of the places P, shape
-    (n, 3), negative inside; unless gradient is None it writes that of the distance there, shape (n, 3)."""
+    """A shape defined by its signed distance. distance(P, gradient) returns the distances at the positions P: shape
+    (n,) for P of shape (n, 3), negative inside. Unless gradient is None, it also writes the distance's gradient there,
+    of shape (n, 3)."""
 
     def __init__(self, distance, lower=(-numpy.inf,) * 3, upper=(numpy.inf,) * 3, slope_bound=1, smallest_feature=0):
         self._distance, self._lower, self._upper = distance, lower, upper
@@ -148,7 +151,8 @@ class _Node:
 
     @staticmethod
     def _columns(names):
-        """Names, or {name: 1 or 3}: P, v, N, Cd are vectors, others numbers."""
+        """Returns (name, width) pairs of names, or of {name: 1 or 3}. In a list, P, v, N and Cd are vectors, others
+        numbers."""
         widths = names if isinstance(names, dict) else {n: 3 if n in ("P", "v", "N", "Cd") else 1 for n in names}
         return list(widths.items())
 
@@ -183,8 +187,8 @@ class _Node:
 
 
 class Now:
-    """The points that a node's function works on: count, frame, time, dt; now["heat"] is a column that it reads or writes. A
-    force has P and v, an edit kill, a constraint P and id. The arrays are for the call: kept longer, they are read-only
+    """The points that a node's function works on: count, frame, time, dt. now["heat"] is a column that the node reads
+    or writes. A force also has P and v, an edit kill, a constraint P and id. After the call the arrays are read-only
     copies."""
 
     def __init__(self, now, node, arrays):
@@ -207,8 +211,8 @@ class Now:
 
 
 class Force(_Node):
-    """A force: function(now, **parameters) returns accelerations, shape (count, 3), m/s². It is called for chunks of points
-    in each sub-step."""
+    """A force: function(now, **parameters) returns accelerations, shape (count, 3), m/s². It is called for chunks of
+    points in each substep."""
     _kind = 0
 
     def _call(self, now, numbers):
@@ -216,7 +220,8 @@ class Force(_Node):
 
 
 class Edit(_Node):
-    """An edit: function(now, **parameters) changes the columns that it writes, and sets now.kill, once a frame."""
+    """An edit: function(now, **parameters) changes the columns that it writes and sets now.kill. It is called once a
+    frame."""
     _kind = 1
 
     def _call(self, now, numbers):
@@ -224,8 +229,8 @@ class Edit(_Node):
 
 
 class Constraint(_Node):
-    """A constraint: function(now, **parameters) returns rods [(id, id, length in m, compliance in m/N), ...] for the points
-    now.id at now.P, once a frame."""
+    """A constraint: function(now, **parameters) returns rods [(id, id, length in m, compliance in m/N), ...] between
+    the points now.id at now.P. It is called once a frame."""
     _kind = 2
 
     def _call(self, now, numbers):
@@ -234,20 +239,20 @@ class Constraint(_Node):
 
 
 class Callbacks(list):
-    """The callbacks of a set of offers; guard(function, otherwise) wraps a function so that what it raises is kept."""
+    """The callbacks of a set of offers. guard(function, otherwise) wraps a function and stores its exception."""
 
     def __init__(self, guard):
         super().__init__()
         self.guard = guard
 
 
-_used_callbacks = {}  # by number: those that the library may call
+_used_callbacks = {}  # callbacks by number, while the library may call them
 _numbers = itertools.count(1)
 _forget = Release(lambda number: _used_callbacks.pop(number, None))
 
 
 def make_offers(objects, nodes, guard):
-    """A handle of all that is offered; guard: see Callbacks."""
+    """Returns a handle to all offered objects and nodes. guard: see Callbacks."""
     offers = c_void_p()
     call("offers_new", byref(offers))
     try:

@@ -1,5 +1,5 @@
-# OpenVDB::openvdb. Debian's own FindOpenVDB asks for a Boost library that libopenvdb-dev does not bring and nobody here
-# uses; what the headers do need is Imath's half, TBB, and Boost's headers.
+# OpenVDB::openvdb. Debian's own FindOpenVDB requires a Boost library that libopenvdb-dev does not install and that we
+# do not use. The headers need Imath's half, TBB, and Boost's headers.
 find_path(OpenVDB_INCLUDE_DIR openvdb/openvdb.h)
 find_library(OpenVDB_LIBRARY openvdb)
 find_path(OpenVDB_IMATH_INCLUDE_DIR Imath/half.h)

@@ -1,4 +1,4 @@
-# Random123::Random123, headers alone.
+# Random123::Random123, a header-only library.
 find_path(Random123_INCLUDE_DIR Random123/philox.h)
 
 include(FindPackageHandleStandardArgs)

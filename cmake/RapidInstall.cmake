@@ -1,5 +1,6 @@
-# bin/rapid and its programs; rapid::host (include/rapid, promised) with its module for Python; the library and its deferred part, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the package
-# config for find_package(rapid).
+# Installs bin/rapid and its programs; rapid::host (include/rapid, a stable interface) with its Python module; the
+# library and its deferred part, its headers (include/rapid/runtime), the Lua modules and scenes (share/rapid), and the
+# package config for find_package(rapid).
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/rapid)
@@ -10,8 +11,8 @@ install(TARGETS rapid_command)
 get_property(rapid_programs GLOBAL PROPERTY rapid_programs)
 install(TARGETS ${rapid_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/rapid)
 install(TARGETS rapid_deferred LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-# Of the runtime's headers those that are promised to plugins and to programs without Lua, and what they include; the
-# others are the library's own.
+# The runtime's headers that are promised to plugins and to programs without Lua. The headers that they include are
+# installed too; all others are internal.
 set(promised
   runtime/base/error.h runtime/files/input_file.h runtime/graph/node.h runtime/graph/plugin.h runtime/graph/registry.h
   runtime/graph/stateful.h runtime/io/format.h runtime/base/parallel.h runtime/points/members.h runtime/points/point_set.h
@@ -20,7 +21,7 @@ set(promised
 set(installed "")
 while(promised)
   list(POP_FRONT promised header)
-  if(header IN_LIST installed OR NOT EXISTS ${PROJECT_SOURCE_DIR}/${header})  # abi.h is made
+  if(header IN_LIST installed OR NOT EXISTS ${PROJECT_SOURCE_DIR}/${header})  # abi.h is generated
     continue()
   endif()
   list(APPEND installed ${header})

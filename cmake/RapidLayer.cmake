@@ -1,20 +1,20 @@
 # rapid_layer(NAME [LIGHT] SOURCE...)
 #
-# A layer of the runtime as an OBJECT library rapid_NAME: so it builds alone, and links whole, with the nodes and formats
-# that register themselves and that nothing refers to by name. Sources that include OpenVDB, directly or by a header of
-# ours, or Assimp are compiled apart (rapid_NAME_deferred), with OpenVDB's headers precompiled: they take seconds, each
-# time. They are the part of the library that is loaded when it is first needed (runtime/base/deferred.h). LIGHT: the layer
-# does not iterate over points (RapidPrecompiled.cmake).
+# A layer of the runtime as an OBJECT library rapid_NAME. It builds alone, and it is linked as a whole, because nodes
+# and formats register themselves and nothing refers to them by name. Sources that include Assimp or OpenVDB, directly
+# or through one of our headers, take seconds each. They are compiled separately (rapid_NAME_deferred), with OpenVDB's
+# headers precompiled. They form the part of the library that is loaded on first use (runtime/base/deferred.h). LIGHT:
+# the layer does not iterate over points (RapidPrecompiled.cmake).
 #
-# rapid_in_batches(TARGET), called after the target's libraries are linked, compiles its sources sixteen at a time if
-# RAPID_BATCHES is on, because headers and templates that several files use take most of the time of a file. Batches of
-# eight take half of the time of single files, and batches of sixteen take 15 % less. Two files of a target must not use
-# one name for different things, not even in anonymous namespaces.
+# rapid_in_batches(TARGET) is called after the target's libraries are linked. If RAPID_BATCHES is on, it compiles the
+# sources sixteen at a time, because shared headers and templates take most of the time of a file. Batches of eight take
+# half of the time of single files, and batches of sixteen take 15 % less. Two files of a target must not use one name
+# for different things, not even in anonymous namespaces.
 #
-# rapid_link_layers(TARGET [WITHOUT_DEFERRED] NAME...) links layers into a target, with both parts or the first;
+# rapid_link_layers(TARGET [WITHOUT_DEFERRED] NAME...) links layers into a target, with or without the deferred parts.
 # rapid_link_parts(TARGET PART...) links parts.
 
-# The headers of ours that bring OpenVDB with them.
+# Lists our headers that include OpenVDB.
 function(rapid_openvdb_headers result)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.h)
   set(found "")
@@ -47,15 +47,15 @@ function(rapid_split_deferred with without)
   set(${without} ${result_without} PARENT_SCOPE)
 endfunction()
 
-# What is no fault of a file that is included: anonymous namespaces outside of the main file (g++), and a local name that
-# another file has.
+# Disables warnings that do not apply to an included file: anonymous namespaces outside of the main file (g++), and
+# local names that another file also uses.
 add_library(rapid_batched INTERFACE)
 target_compile_options(rapid_batched INTERFACE
   -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 
 function(rapid_in_batches target)
   if(RAPID_BATCHES)
-    # Batches have about the same size, so that no small remainder pays for all headers again.
+    # Batches have about the same size, because a small last batch would compile all headers again.
     get_target_property(sources ${target} SOURCES)
     list(LENGTH sources count)
     math(EXPR batches "(${count} + 8) / 16")
@@ -99,7 +99,7 @@ function(rapid_layer name)
 endfunction()
 
 function(rapid_link_parts target)
-  # The linker takes of the libraries what the parts refer to.
+  # The linker takes from the libraries only the symbols that the parts use.
   target_link_libraries(${target} PRIVATE ${ARGN} OpenVDB::openvdb assimp::assimp PNG::PNG Minizip::Minizip ZLIB::ZLIB
     pugixml::pugixml Blosc::blosc Deflate::deflate Xxhash::Xxhash ${CMAKE_DL_LIBS})
   target_link_options(${target} PRIVATE -Wl,--as-needed)

@@ -1,17 +1,17 @@
-# Levels of processors: the hot files of the library compiled again for newer processors, each time linked with the
-# objects of all others into a librapid of its own, in the folder below the library's where glibc's loader looks first
-# on such a processor (ld.so(8), glibc-hwcaps).
+# Processor levels: the hot files of the library are compiled again for newer processors. For each level they are linked
+# with the objects of all other files into a separate librapid, in the subfolder in which glibc's loader looks first on
+# such a processor (ld.so(8), glibc-hwcaps).
 #
-# Hot files and the others pass objects to each other, so their types have one size and alignment at all levels:
-# runtime/processor_levels lists them, and the library checks that when it is loaded.
+# Hot files and the others pass objects to each other, so the size and alignment of their types must be the same at all
+# levels. runtime/processor_levels lists these types, and the library checks them when it is loaded.
 #
-# The same bits: a level changes which instructions compute, not what. No product is fused with a sum (rapid_public), and
-# loops become vectors lane by lane, however wide. Eigen alone asks what the processor has: of __FMA__ it makes fused
-# products, and the order of its sums follows the width of its vectors. With these undefined it is that of x86-64-v2 at
-# each level, while the compiler may still use all of it.
+# All levels give the same bits: a level changes the instructions, not the arithmetic. Products and sums are not fused
+# (rapid_public), and loops are vectorised lane by lane, whatever the width. Only Eigen adapts to the processor: it
+# fuses products if __FMA__ is defined, and the width of its vectors determines the order of its sums. With these macros
+# undefined it uses the order of x86-64-v2 at each level, while the compiler may still use all instructions.
 set(RAPID_LEVELS "" CACHE STRING "Processors that the hot files are compiled for besides RAPID_ARCH, such as x86-64-v3;x86-64-v4")
 
-# By the profile of the scenes of graphs and of tests/bench.
+# Selected by a profile of the scenes of graphs and of tests/bench.
 set(rapid_hot_files
   lanes/lane_operations.cpp math/elementary.cpp math/noise.cpp math/power.cpp math/random.cpp
   operators/births/draws.cpp points/cell_grid.cpp processor_levels/shared_types_of_level.cpp
@@ -21,19 +21,19 @@ set(rapid_hot_files
   solver/constraints/neighbour_list.cpp solver/constraints/pair_blocks.cpp solver/motion/ballistic_batch.cpp
   solver/motion/damped_motion.cpp solver/motion/free_paths.cpp)
 
-# Each an object of its own where a level replaces it.
+# Each hot file is a separate object, which a level replaces.
 if(RAPID_LEVELS)
   set_source_files_properties(${rapid_hot_files} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endif()
 
-# rapid_level(LEVEL PART...): the library for processors of this level. Parts: all of the library.
+# rapid_level(LEVEL PART...): the library for processors of this level. PART...: all parts of the library.
 function(rapid_level level)
   add_library(rapid_hot_${level} OBJECT ${rapid_hot_files})
   target_link_libraries(rapid_hot_${level} PRIVATE rapid_private)
   target_precompile_headers(rapid_hot_${level} PRIVATE ${rapid_common_headers})
   set_property(TARGET rapid_hot_${level} PROPERTY RAPID_LEVEL ${level})
   target_compile_options(rapid_hot_${level} PRIVATE -U__AVX__ -U__AVX2__ -U__AVX512F__ -U__FMA__
-    -Wno-psabi)  # vectors wider than its registers are returned within a file alone
+    -Wno-psabi)  # wider vectors than its registers are returned only within a file
 
   list(TRANSFORM rapid_hot_files REPLACE "\\.cpp$" "" OUTPUT_VARIABLE hot)
   list(JOIN hot "|" hot)
@@ -49,6 +49,6 @@ function(rapid_level level)
   set(folder glibc-hwcaps/${level})
   set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/${folder})
   install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/${folder} NAMELINK_SKIP)
-  # Programs are linked with `rapid` and load a level's library instead, which must not be older.
+  # Programs are linked with `rapid` but load a level's library, so a build of `rapid` must update that too.
   add_dependencies(rapid ${name})
 endfunction()

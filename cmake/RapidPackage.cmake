@@ -1,9 +1,9 @@
-# The Debian package: `cpack` in a build folder writes rapid_VERSION_ARCHITECTURE.deb. The preset `package` builds one for
-# any x86-64-v2 processor; of any other build the package is for the processors of that build.
+# The Debian package: `cpack` in a build folder writes rapid_VERSION_ARCHITECTURE.deb. The preset `package` builds it
+# for any x86-64-v2 processor. The package of any other build is for that build's processors.
 set(manual_dir ${CMAKE_INSTALL_MANDIR}/man1)
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/rapid)
 
-# Manual pages, where there is help2man: made of what the command says of itself. `-n`: no time in the file.
+# Generates manual pages from the command's --help if help2man is installed. `-n` leaves the time out of the file.
 find_program(HELP2MAN help2man)
 if(HELP2MAN AND NOT RAPID_SANITIZE)
   set(pages ${PROJECT_BINARY_DIR}/man)
@@ -16,7 +16,7 @@ if(HELP2MAN AND NOT RAPID_SANITIZE)
   install(DIRECTORY ${pages}/ DESTINATION ${manual_dir} FILES_MATCHING PATTERN "*.1.gz")
 endif()
 
-# The documents that Debian asks for.
+# The documents that Debian requires.
 configure_file(setup/debian/changelog.in debian/changelog @ONLY)
 configure_file(CHANGES.md debian/CHANGES.md COPYONLY)
 set(documents "")
@@ -44,13 +44,13 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
-# What the libraries are linked with, by dpkg-shlibdeps.
+# dpkg-shlibdeps finds the libraries that ours are linked with.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 configure_file(setup/debian/shlibs.in debian/shlibs @ONLY)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_BINARY_DIR}/debian/shlibs ${PROJECT_SOURCE_DIR}/setup/debian/triggers)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
-# The viewer's page, `rapid graph`, films, `rapid test`, and the module for Python.
+# Needed by the viewer's page, `rapid graph`, films, `rapid test`, and the Python module.
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "ffmpeg, graphviz, libjs-three, lua-busted, python3-numpy")
-# Plugins, which the runtime's own headers are for, and farms.
+# Needed by plugins, which use the runtime's headers, and by farms.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libfmt-dev, librandom123-dev, libtbb-dev, slurm-client")
 include(CPack)

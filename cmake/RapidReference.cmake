@@ -1,5 +1,5 @@
-# The reference of include/rapid, where there is Doxygen: `ninja rapid_reference` writes reference/html in the build
-# folder, and fails where something is undocumented.
+# The reference of include/rapid, if Doxygen is installed: `ninja rapid_reference` writes reference/html in the build
+# folder, and fails if anything is undocumented.
 find_program(DOXYGEN doxygen)
 if(DOXYGEN)
   configure_file(docs/reference/Doxyfile.in reference/Doxyfile @ONLY)

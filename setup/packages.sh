@@ -1,7 +1,7 @@
-# Debian 12 packages, the one list of them. To be sourced.
+# The only list of the Debian 12 packages. This file is sourced.
 
-# What the command needs, to be built and to run (lua-busted for `rapid test`). libopenvdb-dev's headers include
-# Boost's, though it does not depend on them.
+# Packages to build and run the command (lua-busted for `rapid test`). libopenvdb-dev's headers include Boost's, though
+# the package does not depend on them.
 build_packages=(
     ccache cmake g++ graphviz ninja-build
     libassimp-dev libblosc-dev libboost-dev libcereal-dev libcli11-dev libdeflate-dev libeigen3-dev libfmt-dev
@@ -11,7 +11,7 @@ build_packages=(
     lua-busted
 )
 
-# What its tests need besides.
+# Further packages for the tests.
 test_packages=(
     abigail-tools binutils catch2 clang-14 clang-format-14 doxygen dpkg-dev ffmpeg help2man libbenchmark-dev
     libclang-rt-14-dev librapidcheck-dev lua-check munge python3 python3-numpy slurm-wlm universal-ctags

@@ -1,10 +1,10 @@
-# What ./rapid and tests/run share: installing what is missing, configuring, building. To be sourced, with `root` set to
-# the checkout. All that is said here goes to standard error.
+# Shared by ./rapid and tests/run: installs missing packages, configures, and builds. This file is sourced, with `root`
+# set to the checkout. All messages go to standard error.
 . "$root/setup/packages.sh"
 
 say() { printf 'rapid: %s\n' "$*" >&2; }
 
-# fail MESSAGE...: what was asked for can't be started; status 2, as for all that is found before a run.
+# fail MESSAGE...: exits with status 2, as for every error that is found before a run.
 fail() {
     say "$@"
     exit 2
@@ -12,7 +12,7 @@ fail() {
 
 # install_missing PACKAGE...
 install_missing() {
-    command -v dpkg-query apt-get >/dev/null || return 0  # not Debian: CMake will say what it does not find
+    command -v dpkg-query apt-get >/dev/null || return 0  # not Debian: CMake will report missing packages
     local package status missing=() install
     local -A installed=()
     while read -r package status; do
@@ -29,7 +29,7 @@ install_missing() {
         if ! command -v sudo >/dev/null; then
             fail "these packages are missing, and installing them needs root; type"$'\n'"    su -c 'apt-get update && $install'"
         fi
-        # sudo may ask for a password on a terminal; without one only where it needs none.
+        # sudo may ask for a password only on a terminal.
         if [[ ! -t 0 ]] && ! sudo -n true 2>/dev/null; then
             fail "these packages are missing, and sudo needs a password; type"$'\n'"    sudo apt-get update && sudo $install"
         fi
@@ -47,8 +47,8 @@ install_missing() {
     rm -f "$log"
 }
 
-# build PRESET TARGET...: configures where that was not done since the presets changed, and builds. Shows the compiler's output when it fails,
-# and returns 1 then.
+# build PRESET TARGET...: configures if the presets have changed since the last time, and builds. Returns 1 and shows
+# the compiler's output if the build fails.
 build() {
     local preset=$1 started=$SECONDS
     shift
@@ -80,7 +80,7 @@ build() {
     ((SECONDS - started < 2)) || say "built build/$preset in $((SECONDS - started)) s"
 }
 
-# Passes on all but ninja's status lines; on a terminal these are one line that counts.
+# Passes on everything but ninja's status lines. On a terminal these become one line with a counter.
 show_progress() {
     local line
     while IFS= read -r line; do

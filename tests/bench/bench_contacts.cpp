@@ -1,11 +1,12 @@
-// Contacts: the search for all pairs of a million points, and a column of grain that collapses; the same by averaged
-// Jacobi in place of coloured Gauss-Seidel.
+// Contacts: the search for all pairs among a million points, and a collapsing column of grains, solved by coloured
+// Gauss-Seidel and by averaged Jacobi.
 //
-// The column is a lattice of spheres of 0.02 m, 2.1 radii apart and a little out of line, as deep as wide and four
-// times as high, against the wall of a box three times as long; or of three sizes, 1 : 3 : 10, the large below. Frames
-// of 1/24 s, for 2 s, of ten sub-steps of one iteration: 10,000 grains of one size then end with the deepest 1 % of
-// overlaps below 0.05 of the smaller radius, and all below 0.15. Three sizes take more, as what a sub-step leaves grows
-// as g dt²/r, and the small are of 0.008 m. Compare the ratios of one run, not figures of different ones.
+// The column is a slightly irregular lattice of spheres with a radius of 0.02 m, 2.1 radii apart. It is as deep as wide
+// and four times as high, against the wall of a box three times as long. Another column has three sizes, 1 : 3 : 10,
+// with the large ones below. Frames of 1/24 s, for 2 s, with ten substeps of one iteration: 10,000 grains of one size
+// then end with the 99th percentile of overlaps below 0.05 of the smaller radius, and all below 0.15. Three sizes have
+// larger overlaps, because the error of a substep grows as g dt²/r and the small ones have r = 0.008 m. Compare the
+// ratios of one run, not figures of different runs.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -45,7 +46,7 @@ void search(benchmark::State& state)
     std::uniform_real_distribution<double> in(0, 1);
     std::vector<Vec3d> at(n);
     for (Vec3d& x : at) x = Vec3d(in(random), in(random), in(random));
-    // 3.5 of the others within twice the radius of each.
+    // On average 3.5 other points lie within twice the radius of each point.
     const float radius = static_cast<float>(0.5 * std::cbrt(3.5 / (static_cast<double>(n) * 4 / 3 * EIGEN_PI)));
     const RadiusGrids grids({&radius, 0}, n, 0, 1);
     ContactSearch contacts;
@@ -101,7 +102,7 @@ private:
     float top = 0;
 };
 
-// Of pairs that touch, in smaller radii.
+// Overlaps of touching pairs, in units of the smaller radius.
 struct Overlaps {
     double p99 = 0, worst = 0;
 
@@ -126,12 +127,12 @@ struct Overlaps {
     }
 };
 
-// The rows of contacts.h by averaged Jacobi (Macklin et al. 2014): all of them from the same places and velocities,
-// each by its part: one over the larger number of rows that act on one of its two points, so that momentum is kept. For
-// spheres of one mass that do not bounce; on one thread.
+// The rows of contacts.h solved by averaged Jacobi (Macklin et al. 2014). All rows start from the same positions and
+// velocities, and each correction is divided by the larger number of rows that act on one of its two points, so
+// momentum is conserved. For spheres of equal mass without bounce; on one thread.
 class AveragedJacobi : public Coupling {
 public:
-    double relaxation = 1;  // what each part is multiplied by (Macklin et al.: 1 to 2)
+    double relaxation = 1;  // factor on each correction (Macklin et al.: 1 to 2)
 
     void follow(const PointSet& points, const ContactOptions& options)
     {
@@ -186,7 +187,7 @@ private:
         std::uint32_t i, j, pair;
         double reach, allowed, normal_impulse, carried, per_w;
         Vec3d n, tangential_impulse;
-        Vec3d change, shift;  // N s, and kg m: what a pass gives the velocities, and the places
+        Vec3d change, shift;  // N s and kg m: a pass's change of momentum and of mass times position
     };
 
     void enter(std::uint32_t i, std::uint32_t k, const Substep& step)
@@ -230,7 +231,7 @@ private:
         }
     }
 
-    // Gives each row's change to its points: to the places, too, over so many seconds.
+    // Applies each row's change to its points, and to their positions as well, over this many seconds.
     void apply(Substep& step, double over, bool averaged)
     {
         count_.assign(step.size(), 0);
@@ -290,7 +291,7 @@ public:
     std::shared_ptr<AveragedJacobi> rows = std::make_shared<AveragedJacobi>();
 };
 
-// s of rest after which points sleep, the default of the node Solve.
+// s of rest after which points sleep, the default of the Solve node.
 constexpr double default_sleep = 0.25;
 
 // Advances the column by this many frames with these contacts; after_frame is not timed.
@@ -360,8 +361,8 @@ BENCHMARK(column)
     ->Unit(benchmark::kMillisecond)
     ->Iterations(1);
 
-// Error against time, of the column of 10,000 on one thread: coloured Gauss-Seidel, and averaged Jacobi with a
-// relaxation of so many tenths. The overlaps are means over all frames.
+// Error against time for the column of 10,000 on one thread: coloured Gauss-Seidel, and averaged Jacobi with a
+// relaxation given in tenths. The overlaps are means over all frames.
 template <bool jacobi>
 void contacts_by(benchmark::State& state)
 {
@@ -382,7 +383,7 @@ void contacts_by(benchmark::State& state)
             contacts = spheres;
         }
         p99 = worst = 0;
-        // No point sleeps: the overlaps are those of the iterations alone.
+        // Points never sleep, so the overlaps come from the iterations alone.
         constexpr double never = std::numeric_limits<double>::infinity();
         collapse(state, start, contacts, frames, static_cast<int>(state.range(0)), static_cast<int>(state.range(1)),
                  never, [&](const PointSet& points) {

@@ -1,6 +1,7 @@
-// Births a second of the emit node by itself: a frame's births from a mesh's surface, with what most scenes ask for.
+// Births per second of the emit node alone: a frame's births from a mesh's surface, with the attributes that most
+// scenes use.
 //
-// The numbers are births a second of wall time; the threads are those that the arena has.
+// Births are counted per second of wall time, on all threads of the arena.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
@@ -36,7 +37,7 @@ std::map<std::string, Value> sparks()
     return arguments;
 }
 
-// A torus of 5,000 faces that turns, and as files of its frames, so that each birth has the spline of its face.
+// A rotating torus of 5,000 faces, and the same as files of its frames, so that each birth has the spline of its face.
 std::map<std::string, Value> moving(bool deforming)
 {
     const MeshPtr torus = make_torus(1, 0.25, 100, Vec3d::Zero());
@@ -97,7 +98,7 @@ BENCHMARK_CAPTURE(emit, sparks, sparks())->Arg(1)->Arg(2)->UseRealTime()->Unit(b
 BENCHMARK_CAPTURE(emit, moving, moving(false))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(emit, deforming, moving(true))->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
-// 100,000 parents, each of which bears ten points in a frame along its path.
+// 100,000 parents, each of which emits ten points in a frame along its path.
 void parents(benchmark::State& state, const char* birth, const char* event)
 {
     constexpr std::size_t size = 100000;

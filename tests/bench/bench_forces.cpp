@@ -1,6 +1,6 @@
-// What forces cost, on one thread: gravity, drag and wind together, the same with rates of the points' own, and
-// turbulence, at one sub-step a frame and at sixteen: `each` is the time a point and sub-step. And what it costs to
-// tell how wrong the positions are.
+// The cost of forces on one thread: gravity, drag and wind together, the same with rates per point, and turbulence, at
+// one substep per frame and at sixteen. `each` is the time per point and substep. Also measures the cost of the
+// position error estimate.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 using Arguments = std::map<std::string, Value>;
 
-// What the node adds to the points that travel down the chain.
+// Returns the force that the node adds to the points that pass through it.
 Dynamics force(const std::string& type, Arguments arguments)
 {
     static const Registry registry;
@@ -48,7 +48,7 @@ Dynamics turbulence(double speed)
     return force("turbulence", {{"amplitude", 5.0}, {"octaves", 3.0}, {"speed", speed}});
 }
 
-// Points all over a cube, each with a rate of its own.
+// Points throughout a cube, each with its own rate.
 PointSet crowd(std::size_t count)
 {
     std::mt19937 random(1);
@@ -80,7 +80,7 @@ void frames(benchmark::State& state, const Dynamics& forces)
     state.counters["each"] = benchmark::Counter(steps, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-// What telling the error costs: the shadows' part of the time of Solve, in percent.
+// The cost of the error estimate: the shadows' share of the time of Solve, in percent.
 void error_estimate(benchmark::State& state, const Dynamics& forces)
 {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
@@ -102,7 +102,7 @@ void error_estimate(benchmark::State& state, const Dynamics& forces)
         telling += begun - begin + end - solved;
         all += end - begin;
     };
-    frame();  // all points are born here, and looked at once
+    frame();  // all points are born and estimated for the first time
     telling = all = 0;
     for (auto _ : state) frame();
     state.counters["percent"] = 100.0 * static_cast<double>(telling) / static_cast<double>(all);

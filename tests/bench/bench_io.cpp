@@ -1,6 +1,5 @@
-// Writing a million points of 32 bytes (P, v, int64 id) in each format, beside what the machine allows: the same bytes
-// from one interleaved array, and what OpenVDB's own tools take. On a memory file system, so that the disk does not
-// count.
+// Writing a million points of 32 bytes (P, v, int64 id) in each format, compared with the machine's limit (the same
+// bytes from one interleaved array) and with OpenVDB's own tools. The files are in memory, so the disk does not count.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
 #include <openvdb/points/PointConversion.h>
@@ -64,7 +63,7 @@ void raw_interleaved(benchmark::State& state)
 }
 BENCHMARK(raw_interleaved)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
-// What OpenVDB's own tools make of the same arrays: an index, a grid, attributes and a file packed with Blosc.
+// OpenVDB's own tools on the same arrays: an index, a grid, attributes and a file packed with Blosc.
 void bare_openvdb(benchmark::State& state)
 {
     namespace vdb = openvdb;

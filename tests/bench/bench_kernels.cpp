@@ -1,13 +1,13 @@
-// Kernels in Lua beside the same loops in C++, in one run: on one thread, on data in cache, through the whole of what a
-// node does in a frame. Items per second are points; compare the ratios of one run, not figures of different ones.
+// Kernels in Lua compared with the same loops in C++, in one run: on one thread, on data in cache, including all the
+// work of a node in a frame. Items per second are points; compare the ratios of one run, not figures of different runs.
 //
 //   in_lua/NAME, in_cpp/NAME    one kernel, and the same loop over the same columns
-//   among_eleven/NAME           the same kernel with ten others of different shapes in the scene, run by turns;
-//                               `slower` is its median time over that in a scene of its own
-//   two_threads/NAME            a million points; `faster` is the least time of one thread over that of two: a machine
-//                               that does something else has no second core to give
+//   among_eleven/NAME           the same kernel with ten others of different shapes in the scene, run in turn;
+//                               `slower` is its median time divided by that in its own scene
+//   two_threads/NAME            a million points; `faster` is the least time on one thread divided by that on two
+//                               (a busy machine has no second core to give)
 //   one_point                   a kernel called on a set of one point
-//   worker_state                starting a state for a worker thread: the scene's file runs in it
+//   worker_state                the start of a worker thread's state, in which the scene's file runs
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -36,11 +36,11 @@ Vec3d widened(const Vec3f& a) { return a.cast<double>(); }
 struct Subject {
     const char* name;
     const char* lua;
-    void (*cpp)(const Columns&);  // null for the shapes that are there to be many
+    void (*cpp)(const Columns&);  // null for the shapes that only add variety
 };
 
-// In double, as Lua computes. `branching` soon takes the same way for all points, as they all become hot; `chance`
-// takes either by the toss of a coin, which no processor foresees.
+// In double precision, as in Lua. `branching` soon takes the same branch for all points because they all become hot;
+// `chance` branches at random, which no processor predicts.
 const Subject subjects[] = {
     {"branching",
      "if p.heat > 0.5 then p.v = p.v * 0.98 + g * frame.dt end "
@@ -88,7 +88,7 @@ const Subject subjects[] = {
 };
 constexpr std::size_t subject_count = std::size(subjects);
 
-// A scene of kernels; `helper` calls what other kernels may call, too.
+// A scene of kernels. `helper` calls functions that other kernels may call too.
 std::string scene_of(const std::vector<const Subject*>& which)
 {
     std::string text =
@@ -101,7 +101,7 @@ std::string scene_of(const std::vector<const Subject*>& which)
     return text + "  :solve {}";
 }
 
-// A scene that has been loaded, and a set for each of its kernels to run over.
+// A loaded scene, and a point set for each of its kernels.
 class Scene {
 public:
     Scene(const std::vector<const Subject*>& which, std::size_t n) : folder_(make_folder())
@@ -123,7 +123,7 @@ public:
     }
     ~Scene() { std::filesystem::remove_all(folder_); }
 
-    // As the node does in a frame.
+    // Runs a kernel as the node does in a frame.
     void run(std::size_t kernel)
     {
         const Evaluation now{{2, dt, dt}, false, node_, location_, RandomKey(1, node_), figures_, warnings_, nothing_};
@@ -170,7 +170,7 @@ double median(std::vector<double> times)
 }
 
 constexpr std::size_t in_cache = 16384;  // points: 450 KB
-constexpr int warm = 40;                 // runs in which traces are made, and once made again
+constexpr int warm = 40;                 // runs in which traces are compiled, and recompiled once
 constexpr int samples = 200;
 
 void in_lua(benchmark::State& state, const Subject& subject)

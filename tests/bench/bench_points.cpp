@@ -1,5 +1,5 @@
-// The cost of what every frame does to a point set: births, deaths, and a copy of which one column is written; and of
-// finding neighbours.
+// The cost of a frame's operations on a point set: births, deaths, and a copy in which one column is written; and the
+// search for neighbours.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -26,7 +26,7 @@ PointSet ten_columns(std::size_t size)
     return points;
 }
 
-// 48 frames' births of an emitter, into a set that starts empty.
+// Appends 48 frames of an emitter's births to an empty set.
 void append(benchmark::State& state)
 {
     const auto births = static_cast<std::size_t>(state.range(0));
@@ -51,7 +51,7 @@ void append(benchmark::State& state)
 }
 BENCHMARK(append)->Arg(2000)->Arg(20000)->Arg(200000)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-// A tenth of the points dies, spread over the set.
+// Kills a tenth of the points, spread over the set.
 void kill_a_tenth(benchmark::State& state)
 {
     const auto size = static_cast<std::size_t>(state.range(0));
@@ -82,7 +82,7 @@ void copy_and_write_one(benchmark::State& state)
 }
 BENCHMARK(copy_and_write_one)->Arg(10000)->Arg(1000000)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-// A lattice of points a metre apart, each moved by up to 0.3 m along each axis, in the order of the lattice.
+// A lattice of points a metre apart, each displaced by up to 0.3 m along each axis, in lattice order.
 std::vector<Vec3f> jittered_lattice(int edge)
 {
     std::vector<Vec3f> P;
@@ -97,9 +97,9 @@ std::vector<Vec3f> jittered_lattice(int edge)
     return P;
 }
 
-constexpr double reach = 1.1;  // m, between neighbours; some six of each
+constexpr double reach = 1.1;  // m, of the neighbour search; about six neighbours each
 
-// On one thread: what :interact and :detail do for each point, and the search for contacts of as many grains.
+// On one thread: the per-point work of :interact and :detail, and the search for contacts among as many grains.
 void find_neighbours(benchmark::State& state)
 {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);

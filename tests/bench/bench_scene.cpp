@@ -1,10 +1,10 @@
-// What it costs to embed Rapid: the figures that docs/host.md promises.
+// The cost of embedding Rapid: the figures that docs/host.md promises.
 //
-//   open             opening and closing the C handle of a scene that has one node more than nothing; below 10 ms
-//   advance          an advance and release of a frame of one point through the C interface
-//   column           asking a frame of ten million points for P; below 10 µs
-//   open_many        100,000 scenes, opened and closed: `growth` is what the second half adds to the process's resident
-//                    memory, MiB
+//   open             opening and closing the C handle of a nearly empty scene; below 10 ms
+//   advance          advancing and releasing a frame of one point through the C interface
+//   column           getting P of a frame of ten million points; below 10 µs
+//   open_many        100,000 scenes, opened and closed: `growth` is what the second half adds to the process's
+//                    resident memory, in MiB
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 

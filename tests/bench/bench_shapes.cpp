@@ -1,6 +1,6 @@
-// Asking a level set for distance and gradient, against OpenVDB's own stencil and a dense array, in one run: a sphere
-// of 188,000 active voxels (radius 1 m, voxel 0.02 m), points within a voxel of its surface in random order, or far
-// outside. Items per second are points; compare the ratios of one run, not figures of different ones.
+// Queries of distance and gradient of a level set, compared with OpenVDB's own stencil and a dense array in one run: a
+// sphere of 188,000 active voxels (radius 1 m, voxel 0.02 m), with points within a voxel of its surface in random
+// order, or far outside. Items per second are points; compare the ratios of one run, not figures of different runs.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <openvdb/math/Stencils.h>
@@ -44,7 +44,7 @@ const std::vector<Vec3d>& points_near()
     return points;
 }
 
-// The same points, those of a block of 8 voxels after one another: what it would bring to keep points in such an order.
+// The same points, sorted by blocks of 8 voxels: the possible gain from storing points in this order.
 const std::vector<Vec3d>& points_in_order()
 {
     static const auto points = [] {
@@ -75,7 +75,7 @@ const ShapePtr& sphere()
     return made;
 }
 
-// The same field in one array, and the same interpolation: what memory allows.
+// The same field in one array with the same interpolation: the limit set by memory.
 struct Dense {
     std::vector<float> values;
     int size = 0;
@@ -110,7 +110,7 @@ struct Dense {
     }
 };
 
-// Runs `ask` over all points in chunks, on the threads that the benchmark's argument says.
+// Runs `ask` over all points in chunks, on the number of threads given by the benchmark's argument.
 template <class Ask>
 void run(benchmark::State& state, const std::vector<Vec3d>& points, const Ask& ask)
 {
@@ -165,7 +165,7 @@ void far_outside_rapid(benchmark::State& state)
 }
 void far_outside_box_stencil(benchmark::State& state) { ask_stencil(state, points_far()); }
 
-// The whole of it: the tree, and its baked copy.
+// Builds both the tree and its baked copy.
 void build_sphere(benchmark::State& state)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
@@ -181,8 +181,8 @@ void build_from_mesh(benchmark::State& state)
     for (auto _ : state) benchmark::DoNotOptimize(level_set_from_mesh(mesh, {voxel, 3}, warnings));
 }
 
-// A body of 5,000 vertices in 0.02 m voxels that deforms and turns, frame by frame; and what OpenVDB alone takes for a
-// band of that width.
+// A body of 5,000 vertices in 0.02 m voxels that deforms and turns every frame, compared with the time of OpenVDB alone
+// for a band of that width.
 MeshPtr body() { return make_torus(0.6, 0.2, 120, Vec3d::Zero()); }
 
 void deform_rapid(benchmark::State& state)

@@ -1,6 +1,6 @@
-// Solve beside what memory allows, in one run: free fall against a hand-written loop over the same arrays, and what
-// colliders cost that points are far from, rest on, slide on, and fall on. Items per second are point-frames; compare
-// the ratios of one run, not figures of different ones.
+// Solve compared with the memory limit in one run: free fall against a hand-written loop over the same arrays, and the
+// cost of colliders that points are far from, rest on, slide on, and fall on. Items per second are point-frames;
+// compare the ratios of one run, not figures of different runs.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -38,7 +38,7 @@ const ShapePtr& ball()
     return made;
 }
 
-// Points in the box around a height, with velocities of up to `speed` m/s an axis.
+// Points in a box around a height, with velocities of up to `speed` m/s per axis.
 PointSet points(std::size_t n, float height, float spread, float speed)
 {
     std::mt19937 random(1);
@@ -51,8 +51,8 @@ PointSet points(std::size_t n, float height, float spread, float speed)
     return set;
 }
 
-// One frame of 1/24 s from the same state, again and again: on the number of threads that the benchmark's argument
-// says. What must be restored between frames is not counted.
+// Repeats one frame of 1/24 s from the same state, on the number of threads given by the benchmark's argument. The time
+// to restore the state between frames is not counted.
 void advance(benchmark::State& state, PointSet start, Dynamics dynamics, int substeps = 1, int warm = 0)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));

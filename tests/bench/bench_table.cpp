@@ -1,9 +1,9 @@
-// The table of how near Rapid is to its limits: each figure beside one of the same run on the same machine, so that the
-// ratios can be read anywhere. Runs the other benchmarks that stand beside it, and whole scenes with the command.
+// The table of how near Rapid is to its limits. Each figure stands next to one of the same run on the same machine, so
+// the ratios hold anywhere. Runs the other benchmarks in this folder, and whole scenes with the command.
 //
 //   tests/bench/run [--json FILE] [--repeat N] [--only TEXT | --write]
 //
-// Quoted are ratios of medians. What is compared runs in turn, so that a machine that is busy for a while is busy for
+// The table quotes ratios of medians. The programs that are compared run in turn, so other load on the machine affects
 // both sides.
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -44,7 +44,7 @@ struct Row {
     bool reached() const { return at_least ? value >= limit : value <= limit; }
 };
 
-// Why rows miss their targets, by a part of their names; the first that fits.
+// Reasons why rows miss their targets, by a part of the row's name; the first that matches.
 constexpr std::pair<std::string_view, std::string_view> reasons[] = {
     {"a program by hand", "the program by hand estimates no error, keeps no audit and is not reproducible"},
     {"time of one thread alone", "births and the order of points are computed on one thread"},
@@ -69,11 +69,11 @@ double median(std::vector<double> x)
 
 struct Ended {
     double seconds;
-    double processor;  // s, of all threads
-    double bytes;      // the most that were resident
+    double processor;  // s, summed over all threads
+    double bytes;      // peak resident memory
 };
 
-// Runs a program to its end. Error: it fails.
+// Runs a program to its end. Throws std::runtime_error if it fails.
 Ended run(const Words& words, const fs::path& output = "/dev/null")
 {
     std::vector<char*> arguments;
@@ -101,7 +101,8 @@ Ended run(const Words& words, const fs::path& output = "/dev/null")
             1024.0 * static_cast<double>(usage.ru_maxrss)};
 }
 
-// How many points there are and where: what two runs of one scene with other random numbers have in common.
+// The number of points and the moments of their positions, which two runs of a scene with different random numbers have
+// in common.
 struct Moments {
     double points;
     std::array<double, 3> mean, deviation;  // m, of P along each axis
@@ -120,8 +121,8 @@ Moments moments_of(const rapid::PointSet& points)
     return m;
 }
 
-// Error: the two differ by more than chance has it, five standard errors of all that is compared, and a thousandth of
-// the points' extent, for what a table of distances and a level set differ by.
+// Throws std::runtime_error if the two runs differ by more than chance: five standard errors of each moment, plus a
+// thousandth of the points' extent for the difference between a table of distances and a level set.
 void require_alike(const std::string& scene, const Moments& a, const Moments& b)
 {
     const double n = std::min(a.points, b.points), shape = 1e-3;
@@ -170,7 +171,7 @@ public:
         output();
         examples();
         growth();
-        by_hand();  // last: it reads points, and the peak of a process counts what it was forked with
+        by_hand();  // last: it reads points, and a forked process's peak memory includes its parent's
     }
 
     // All rows, with the reason if one misses its target.
@@ -182,7 +183,7 @@ public:
         return text;
     }
 
-    // The rows for which a user chooses a particle system.
+    // The rows that matter when choosing a particle system.
     std::string chosen_as_markdown() const
     {
         std::string text = "| | measured | target |\n|---|---|---|\n";
@@ -233,7 +234,7 @@ private:
         rows_.push_back(std::move(row));
     }
 
-    // Medians of several benchmarks of one program, run in turn: times in ms, and counters.
+    // Returns medians of several benchmarks of one program, run in turn: times in ms, and counters.
     std::map<std::string, json> measure(const std::string& program, const Words& names) const
     {
         const fs::path answer = scratch_ / "benchmarks.json";
@@ -274,7 +275,7 @@ private:
         return words;
     }
 
-    // The frames of a run, as --stats tells of them.
+    // Returns the frames of a run from its --stats file.
     json frames_of(const fs::path& graph, Words options) const
     {
         const fs::path stats = scratch_ / "stats.json";
@@ -284,7 +285,7 @@ private:
         return json::parse(file).at("frames");
     }
 
-    // s, in which the bands of its level sets were built.
+    // Returns the time to build the bands of the frame's level sets, s.
     static double band_seconds(const json& frame)
     {
         double seconds = 0;
@@ -292,7 +293,7 @@ private:
         return seconds;
     }
 
-    // Medians of whole runs, in turn.
+    // Returns medians of whole runs, executed in turn.
     std::vector<Ended> in_turn(const std::vector<Words>& commands) const
     {
         std::vector<std::vector<double>> seconds(commands.size()), processor(commands.size()), bytes(commands.size());
@@ -339,7 +340,7 @@ private:
                 "far_from_level_set/threads:2/real_time", "nothing_to_hit/threads:2/real_time", 1.2);
     }
 
-    // By the time of one thread; overlaps at the end, in smaller radii.
+    // By the time on one thread; overlaps at the end, in units of the smaller radius.
     void grains()
     {
         const std::string name = "column of 10,000 grains, a frame";
@@ -369,7 +370,7 @@ private:
              ""});
     }
 
-    // Six of each of a million points, on one thread.
+    // About six neighbours for each of a million points, on one thread.
     void neighbours()
     {
         const std::string name = "a million neighbour queries / the search for contacts";
@@ -410,7 +411,7 @@ private:
         add({points, (ended[1].bytes - ended[0].bytes) / 1e7, 72, "bytes", false, ""});
     }
 
-    // What is spent outside of scripts and Solve, and on the level set's band, when the first two frames are past.
+    // The time outside of scripts and Solve, and the time for the level set's band, after the first two frames.
     void static_level_set()
     {
         const std::string name = "a static level set, frames after the first: time in the graph";
@@ -431,7 +432,7 @@ private:
         add({name, median(ms), 0.1, "ms", false, fmt::format("the first two: {:.3g} ms", 2 * median(of_first))});
     }
 
-    // A ring that leans from frame to frame, 96 around by 32 across.
+    // A ring that leans from frame to frame, 96 by 32 vertices.
     void write_figure(int frames) const
     {
         constexpr int around = 96, across = 32;
@@ -452,7 +453,7 @@ private:
         }
     }
 
-    // The time that building its bands takes, by --stats.
+    // The time to build its bands, from --stats.
     void deforming_figure()
     {
         const std::string name = "three :collide on a deforming level set / one, time to build it";
@@ -474,7 +475,7 @@ private:
              fmt::format("{:.3f} s, {:.3f} s", median(three), median(one))});
     }
 
-    // Of the frames after the first two, by --stats.
+    // The frames after the first two, from --stats.
     void still_points()
     {
         const std::string name = "a million points at rest, a frame";
@@ -498,8 +499,8 @@ private:
         add({name, 1000 * ended.seconds, 50, "ms", false, fmt::format("{:.3f} s of processor", ended.processor)});
     }
 
-    // Frames of first.lua that have 60,000 points, less the same without pictures, of as many attributes, and less what
-    // the first two take.
+    // The frames of first.lua with 60,000 points, minus the same without pictures and with as many attributes, minus
+    // the first two frames.
     void pictures()
     {
         const std::string name = "a .png of 1280 x 720, 60,000 points, processor time";
@@ -514,8 +515,9 @@ private:
         add({name, 1000 * seconds / 48, 40, "ms", false, ""});
     }
 
-    // Of the README's scenes mill alone has a tolerance. It is checked in each of the first four steps, of few points,
-    // and then in every fourth: what a frame with the check takes more than the two beside it.
+    // Among the README's scenes only mill has a tolerance. It is checked in each of the first four steps, which have
+    // few points, and then in every fourth: the extra time of a frame with the check over the frames before and after
+    // it.
     void tolerance_check()
     {
         const std::string name = "mill.lua: checking its tolerance, of the time of the run";
@@ -566,7 +568,7 @@ private:
         add({name, 10.7 / seconds, 25, "", true, fmt::format("{:.3f} s", seconds)});
     }
 
-    // Against programs that are written for the one scene (by_hand/by_hand.h), by the time of all threads.
+    // Compares with programs written for one scene each (by_hand/by_hand.h), by the time of all threads.
     void by_hand()
     {
         struct Scene {
@@ -597,8 +599,8 @@ private:
         }
     }
 
-    // As many points in each frame, so that one frame's files are hidden behind the next one's computation. The writing
-    // alone is that of the last frame's points, as often.
+    // The number of points is constant, so the files of one frame are written during the computation of the next. The
+    // writing alone repeats the last frame's points equally often.
     void output()
     {
         const std::string name = "a run with -o .vdb / the longer of computing and writing";
@@ -623,7 +625,7 @@ private:
              fmt::format("{:.3f} s, {:.3f} s, {:.3f} s", both, computing, writing)});
     }
 
-    // Half a million points and more, so that starting does not count.
+    // Half a million points or more, so that the start does not count.
     void examples()
     {
         const std::vector<std::pair<std::string, std::string>> scenes = {
@@ -634,7 +636,7 @@ private:
                 return command(graphs_ / (file + ".lua"), more);
             };
             compare_runs(scene + ".lua: two threads / one", with({"--threads", "2"}), with({"--threads", "1"}), 0.56);
-            // What is done beside it makes wall time too rough for what is a few percent.
+            // Other load makes wall time too noisy for a difference of a few percent.
             const std::string time = scene + ".lua: pruned / --keep-all, processor time";
             const std::string memory = scene + ".lua: pruned / --keep-all, memory";
             if (!asked(time) && !asked(memory)) continue;
@@ -646,8 +648,8 @@ private:
         }
     }
 
-    // The exponent of the processor time in the number of points, over two decades, and the part of a run in which one
-    // of two threads waits for the other; of each run less its first frame, for what starting takes.
+    // The exponent of processor time in the number of points, over two decades, and the fraction of a run in which one
+    // of two threads waits for the other. The first frame is subtracted from each run, because it includes the start.
     void growth()
     {
         const std::vector<std::pair<std::string, double>> scenes = {
@@ -679,8 +681,8 @@ private:
     std::vector<Row> rows_;
 };
 
-// Replaces the text between the two lines of the document that name the benchmark. Throws std::runtime_error if it has
-// no such lines.
+// Replaces the text between the document's two lines that name the benchmark. Throws std::runtime_error if the document
+// lacks these lines.
 void write_table(const fs::path& path, const std::string& table)
 {
     const std::string begin = "<!-- table of tests/bench/run -->\n", end = "<!-- end of the table -->\n";

@@ -1,6 +1,7 @@
-// What the programs by hand share: the scenes of graphs/, each written as one program for that scene alone, as fast as
-// we can, for bench_table to compare with. Single precision, columns of floats, dense tables of distances, two threads;
-// no errors, no audit, no order of points, other bits in each run of several threads.
+// Shared by hand-written programs, one for each of several scenes of graphs/, as fast as we can make them, for
+// bench_table to compare with. They use single precision, columns of floats, dense tables of distances and two threads.
+// They have no error messages, no audit and no order of points, and differ in their bits between runs on several
+// threads.
 //
 //   by_hand_SCENE RATE FRAMES        simulates the frames from 1 on, and prints the moments of the last one's points
 #pragma once
@@ -61,7 +62,7 @@ inline V operator*(float s, V a) { return {s * a.x, s * a.y, s * a.z}; }
 inline float dot(V a, V b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline float length(V a) { return std::sqrt(dot(a, a)); }
 
-// Turned uniformly within a cone; its length stays.
+// Turns a vector uniformly within a cone and keeps its length.
 inline V turned(V mean, float half_angle, Random& random)
 {
     const float size = length(mean);
@@ -73,7 +74,7 @@ inline V turned(V mean, float half_angle, Random& random)
     return size * ((1 - fall) * d + side * (std::cos(angle) * e1 + std::sin(angle) * e2));
 }
 
-// The triangles of a torus about the y axis, as rapid.mesh.torus has it with 24 divisions.
+// The triangles of a torus about the y axis, as in rapid.mesh.torus with 24 divisions.
 class TorusMesh {
 public:
     struct Place {
@@ -96,7 +97,7 @@ public:
             }
     }
 
-    // Uniform by area.
+    // Picks a point uniformly by area.
     Place place(Random& random) const
     {
         const float area = random.next() * triangles_.back().area;
@@ -111,7 +112,7 @@ private:
 
     struct Triangle {
         V P, a, b, N;
-        float area;  // with those before
+        float area;  // including those before
     };
 
     void add(V P, V Q, V R)
@@ -124,13 +125,13 @@ private:
     std::vector<Triangle> triangles_;
 };
 
-// Columns of floats with room for all points there will be; the last frame's dead are overwritten by the last points.
+// Columns of floats with room for all points of the run. The last points replace those that died in a frame.
 template <int columns>
 class Points {
 public:
     explicit Points(std::size_t room) : room_((room + 2 * chunk) / chunk * chunk + 64)
     {
-        // Staggered: columns at the same place of their pages would fight for the same sets of the caches.
+        // Staggered columns: at the same offset within their pages they would compete for the same cache sets.
         memory_ = static_cast<float*>(std::aligned_alloc(64, sizeof(float) * (columns * (room_ + 1040) + 1024)));
         if (!memory_) throw std::bad_alloc();
     }
@@ -162,7 +163,7 @@ private:
     std::size_t room_, size_ = 0;
 };
 
-// Collects what several threads find, chunk by chunk.
+// Collects results of several threads, chunk by chunk.
 class Dead {
 public:
     void begin(std::size_t points) { chunks_.resize((points + chunk - 1) / chunk); }
@@ -182,7 +183,7 @@ private:
     std::vector<std::uint32_t> all_;
 };
 
-// A dense table of distances.
+// A dense table of signed distances.
 class Distances {
 public:
     template <class F>
@@ -197,7 +198,7 @@ public:
                     table_[at(i, j, k)] = distance(V{low.x + i * voxel, low.y + j * voxel, low.z + k * voxel});
     }
 
-    // A distance within which there is nothing; from the nearest entry.
+    // Returns a distance within which there is no surface, from the nearest entry.
     float clearance(float x, float y, float z) const
     {
         const auto nearest = [](float u, int n) {
@@ -207,7 +208,7 @@ public:
                   k = nearest((z - low_.z) * per_, nz_);
         return table_[at(i, j, k)] - margin_;
     }
-    // Trilinear; beyond the table less than it is.
+    // Trilinear interpolation; outside of the table, a lower bound.
     float distance(float x, float y, float z) const
     {
         const auto into = [](float u, int n) { return std::min(std::max(u, 0.0f), static_cast<float>(n) - 1.001f); };
@@ -255,11 +256,11 @@ private:
     std::vector<float> table_;
 };
 
-// What bounces off a surface, and rests where all further bounces would end within the time.
+// Bounces a point off a surface, and lets it rest if all further bounces would end within the time.
 struct Surface {
     float bounce, friction;
 
-    // Whether the point rests from now on, on a surface of the normal n, under a pull into it.
+    // Returns true if the point rests from now on, on a surface with the normal n, under a pull towards it.
     bool respond(V& v, V n, float pull, float time) const
     {
         const float vn = dot(v, n);
@@ -277,7 +278,7 @@ struct Surface {
         }
         return rests;
     }
-    // Along a surface that pulls act on, for a time.
+    // Slides a point along a surface under an acceleration, for a time.
     void slide(V& P, V& v, V n, V a, float time) const
     {
         const float pull = -dot(a, n);
@@ -306,15 +307,15 @@ struct Surface {
     }
 };
 
-// The time at which a point meets a floor that it is pulled to, within the time.
+// Returns the time at which a point meets a floor that it is pulled towards, within the time.
 inline float to_floor(float height, float vy, float pull, float time)
 {
     const float at = (vy + std::sqrt(std::max(0.0f, vy * vy + 2 * pull * height))) / pull;
     return std::min(time, std::max(0.0f, at));
 }
 
-// A fall above a floor, without branches for vectors of points: a miss, one bounce, or a slide to rest. Where the point
-// bounces again it is left as it was, and true returned.
+// A fall above a floor, without branches, for vectors of points: a miss, one bounce, or a slide to rest. Returns true,
+// and leaves the point unchanged, if it would bounce again.
 inline bool fall(const Surface& floor, float radius, float time, float& x, float& y, float& z, float& vx, float& vy,
                  float& vz)
 {
@@ -357,7 +358,7 @@ inline void bounce(const Surface& floor, float radius, float time, V& P, V& v)
     }
 }
 
-// A table as a field that is the same at all times.
+// A table as a field that does not change with time.
 struct StaticField {
     const Distances& table;
 
@@ -365,11 +366,11 @@ struct StaticField {
     float distance(float x, float y, float z, float) const { return table.distance(x, y, z); }
     V normal(V P, float) const { return table.normal(P); }
     V velocity(V) const { return {0, 0, 0}; }
-    static constexpr float fastest = 0;  // m/s, of its surface
+    static constexpr float fastest = 0;  // m/s, of the surface
 };
 
-// Points of a block that come near a field of distances, on their way from contact to contact: all of them walk at
-// once.
+// The points of a block that approach a field of distances, on their paths from contact to contact. All advance
+// together.
 class Walkers {
 public:
     void add(int point, V P, V v, V a, float time)
@@ -378,7 +379,7 @@ public:
         ax_[n_] = a.x, ay_[n_] = a.y, az_[n_] = a.z, begun_[n_] = 0, left_[n_++] = time;
     }
 
-    // done(point, P, v) is called once for each.
+    // Calls done(point, P, v) once for each point.
     template <class Field, class Done>
     void walk(const Field& field, float radius, const Surface& body, const Surface& floor, const Done& done)
     {
@@ -425,7 +426,7 @@ public:
     }
 
 private:
-    // Puts what has slid along the tangent back on the surface, unless that has fallen away from it or ended.
+    // Projects points that slid along the tangent back onto the surface, unless it has moved away or ended.
     template <class Field>
     static void keep_on(const Field& field, float radius, V before, V& P, V& v, V a, float now, float slid)
     {
@@ -457,7 +458,7 @@ private:
             s_[i] = low_[i] = 0;
             inside_[i] = 0;
         }
-        // On the surface it matters which way they go.
+        // On the surface the direction of motion matters.
         for (int i = 0; i < n_; ++i) {
             if (above_[i] > flush) continue;
             const V P{x_[i], y_[i], z_[i]}, n = field.normal(P, begun_[i]);
@@ -494,13 +495,13 @@ private:
     }
 
     int n_ = 0;
-    std::int32_t point_[block], inside_[block];  // 1: since the beginning, 2: at s
+    std::int32_t point_[block], inside_[block];  // 1: since the start, 2: at s
     float x_[block], y_[block], z_[block], vx_[block], vy_[block], vz_[block], ax_[block], ay_[block], az_[block];
     float begun_[block], left_[block];  // s, of the step
     float lands_[block], slowness_[block], above_[block], below_[block], low_[block], s_[block];
 };
 
-// The moments of the points' places, as JSON.
+// Prints the moments of the points' positions as JSON.
 template <int columns>
 int report(const Points<columns>& points)
 {

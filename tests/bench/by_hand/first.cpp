@@ -9,7 +9,7 @@ enum { x, y, z, vx, vy, vz, age, life, red, green, blue, columns };
 
 const Surface body{0.4f, 0.2f}, ground{0.3f, 0.3f};
 
-// Of the mesh's facets: each of the 64 parts of the ring is a prism over a polygon with 23 sides.
+// The distances to the mesh's facets: each of the ring's 64 segments is a prism over a polygon with 23 sides.
 const Distances& torus()
 {
     constexpr float half = 3.1415927f / 64, step = 6.2831853f / 23;

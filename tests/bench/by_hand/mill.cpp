@@ -1,4 +1,4 @@
-// graphs/mill.lua by hand, with two sub-steps a frame, and no look at their error.
+// graphs/mill.lua by hand, with two substeps per frame and without an error estimate.
 #include "tests/bench/by_hand/by_hand.h"
 
 using namespace by_hand;
@@ -24,10 +24,10 @@ const Distances& cross()
     return made;
 }
 
-// The cross as it turns, from a time on.
+// The rotating cross, from a time on.
 struct Paddles {
     const Distances& table = cross();
-    float c, s;  // of the angle at first
+    float c, s;  // of the initial angle
 
     explicit Paddles(float time) : c(std::cos(turns * time)), s(std::sin(turns * time)) {}
 
@@ -134,7 +134,7 @@ void add_turbulence(int n, const float* px, const float* py, const float* pz, fl
     }
 }
 
-// A sub-step. end: s since the start, of the frame; part: of each point's own step.
+// Advances a substep. end: s since the start of the frame; part: the fraction of each point's own step.
 template <class Time>
 void substep(const Points<columns>& p, std::size_t begin, int n, float end, float part, const Time& time_of)
 {
@@ -154,7 +154,7 @@ void substep(const Points<columns>& p, std::size_t begin, int n, float end, floa
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
         const float dt = time_of(begin + i) * (1.0f / substeps);
-        const float left = (1 - std::exp(-0.3f * dt)) / dt;  // of the velocity relative to the wind's, a second
+        const float left = (1 - std::exp(-0.3f * dt)) / dt;  // of the velocity relative to the wind's, per second
         const float u = c[vx][i], v = c[vy][i], w = c[vz][i];
         const float a = left * (3 + ax[i] / 0.3f - u), b = left * ((ay[i] - gravity) / 0.3f - v),
                     d = left * (az[i] / 0.3f - w);
@@ -222,7 +222,7 @@ int main(int count, char** words)
         in_parallel(births, [&](std::size_t begin, std::size_t end) {
             Random random(born + begin);
             for (std::size_t i = begin; i < end; ++i) {
-                // The box's faces by area: above and below, in front and behind, at the sides.
+                // The box's faces by area: top and bottom, front and back, left and right.
                 const float u = random.next() - 0.5f, v = random.next() - 0.5f, face = random.next() * 0.82f;
                 const float side = random.next() < 0.5f ? -0.5f : 0.5f;
                 const V at = face < 0.7f ? V{u, side, v} : face < 0.77f ? V{u, v, side} : V{side, u, v};
@@ -240,7 +240,7 @@ int main(int count, char** words)
                 for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
                 own[i] = frame_time * random.next();
             }
-            // Those of one block as if they were born together.
+            // Sorts the births of a block together.
             std::sort(own.begin() + static_cast<std::ptrdiff_t>(begin), own.begin() + static_cast<std::ptrdiff_t>(end));
             step(
                 p, old + begin, old + end, now, [&](std::size_t i) { return own[i - old]; },

@@ -1,8 +1,8 @@
-# Suites of tests for tests/run: each runs, is counted and timed, and shows its output only if it fails. To be sourced,
-# with `root` set to the checkout.
+# Test suites for tests/run: each is run, counted and timed, and its output is shown only if it fails. This file is
+# sourced, with `root` set to the checkout.
 passed=0 failed=0 skipped=0
 jobs=$(nproc)
-output=$(mktemp)     # of the suite that runs
+output=$(mktemp)     # output of the current suite
 durations=$(mktemp)  # lines "SECONDS s: TEST"
 trap 'rm -f "$output" "$durations"' EXIT
 
@@ -13,7 +13,7 @@ suite() {
     "$@" >"$output" 2>&1 || status=$?
     counts=$(tail -n 1 "$output")
     if [[ ! $counts =~ ^([0-9]+)\ passed,\ ([0-9]+)\ failed,\ ([0-9]+)\ skipped$ ]]; then
-        counts="0 passed, 1 failed, 0 skipped"  # it broke before it could count
+        counts="0 passed, 1 failed, 0 skipped"  # it failed before it could count
         status=1
     fi
     read -r p _ f _ s _ <<<"$counts"
@@ -71,8 +71,8 @@ catch_filter() {
 # lua_tests BUILD FILE...
 lua_tests() { "$1/bin/rapid" test --slowest 30 "${@:2}"; }
 
-# sanitized SUITE PRESET FOLDER...: builds the Catch2 tests of these folders with a sanitizer and assertions, and runs
-# them; FOLDER_thorough runs the cases of the folder that are tagged [slow].
+# sanitized SUITE PRESET FOLDER...: builds the Catch2 tests of the folders with a sanitizer and assertions, and runs
+# them. FOLDER_thorough runs the folder's cases that are tagged [slow].
 sanitized() {
     local name=$1 preset=$2
     shift 2

@@ -1,5 +1,5 @@
-// What every test includes: Catch2, RapidCheck's rc::prop, vectors compared within a tolerance, point sets in a line,
-// and columns compared to the bit.
+// Included by every test: Catch2, RapidCheck's rc::prop, comparisons of vectors within a tolerance, short constructors
+// of point sets, and bitwise comparisons of columns.
 #pragma once
 
 #include <rapidcheck/catch.h>
@@ -17,7 +17,7 @@
 #include "runtime/math/vec.h"
 #include "runtime/points/point_set.h"
 
-// How a failed check shows a vector: all digits, on one line.
+// A failed check prints a vector with all digits, on one line.
 namespace Catch {
 
 template <class Scalar>
@@ -35,11 +35,11 @@ struct StringMaker<Eigen::Matrix<Scalar, 3, 1>> {
 
 namespace rapid::test {
 
-// RapidCheck's scenes are the same in each run, unless RC_PARAMS asks for others.
+// RapidCheck generates the same cases in each run, unless RC_PARAMS requests others.
 inline const bool has_fixed_seed = setenv("RC_PARAMS", "seed=1", /*overwrite=*/0) == 0;
 
 // Compares vectors by the largest difference of a component; `tolerance` is absolute, in the vector's unit. NaN is
-// close to nothing.
+// never close.
 template <class Vec>
 class CloseTo : public Catch::MatcherBase<Vec> {
 public:
@@ -63,7 +63,7 @@ private:
 inline CloseTo<Vec3f> close_to(const Vec3f& expected, double tolerance) { return {expected, tolerance}; }
 inline CloseTo<Vec3d> close_to(const Vec3d& expected, double tolerance) { return {expected, tolerance}; }
 
-// A vector of which {} is zero: Eigen leaves one that is made of nothing uninitialised.
+// A vector that {} initialises to zero. Eigen's default constructor leaves it uninitialised.
 struct InitialisedVec3f : Vec3f {
     InitialisedVec3f() : Vec3f(Vec3f::Zero()) {}
     InitialisedVec3f(float x, float y, float z) : Vec3f(x, y, z) {}
@@ -72,8 +72,8 @@ struct InitialisedVec3f : Vec3f {
 template <class T>
 using Initialised = std::conditional_t<std::is_same_v<T, Vec3f>, InitialisedVec3f, T>;
 
-// points({{0, 1, 0}, {0, 2, 0}}).v({{0, -3, 0}, {}}).set<float>("heat", {1, 2}).group("hot", {1}): a set with ids from
-// 0.
+// A point set with ids from 0: points({{0, 1, 0}, {0, 2, 0}}).v({{0, -3, 0}, {}}).set<float>("heat", {1,
+// 2}).group("hot", {1}).
 class Points : public PointSet {
 public:
     explicit Points(std::initializer_list<InitialisedVec3f> positions)
@@ -105,7 +105,7 @@ public:
         return *this;
     }
 
-    // The members are places in the set, from 0.
+    // The members are indices into the set, from 0.
     using PointSet::group;
     Points& group(std::string_view name, std::initializer_list<std::size_t> members)
     {
@@ -118,7 +118,7 @@ public:
 inline Points points(std::initializer_list<InitialisedVec3f> positions) { return Points(positions); }
 inline Points points(const std::vector<Vec3f>& positions) { return Points(positions); }
 
-// Whether two columns hold the same values, to the bit (NaN and -0 included).
+// Returns true if two columns are bitwise equal, NaN and -0 included.
 template <class T>
 bool same_bits(const Column<T>& a, const Column<T>& b)
 {

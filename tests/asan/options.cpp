@@ -1,4 +1,4 @@
-// How a build with the address sanitizer runs: linked into each of its programs, so that none needs ASAN_OPTIONS.
+// Options of the address sanitizer, linked into each program of such a build so that none needs ASAN_OPTIONS.
 #include <cstddef>
 #include <cstdlib>
 #include <new>
@@ -6,17 +6,17 @@
 extern "C" const char* __asan_default_options()
 {
     return
-        // No status of the command's own, which would hide what was found.
+        // A status that the command itself never uses; one of its own would hide a report.
         "exitcode=99:"
-        // Memory that runs out is an error, and not the end of the process.
+        // An allocation that fails is an error; it does not end the process.
         "allocator_may_return_null=1:"
-        // What nobody has written is not 0.
+        // Uninitialised memory is not 0.
         "max_malloc_fill_size=1048576:malloc_fill_byte=165:"
-        // Of the functions below some are the sanitizer's own.
+        // Some of the functions below are the sanitizer's own.
         "alloc_dealloc_mismatch=0";
 }
 
-// The sanitizer's own end the process where memory runs out.
+// The sanitizer's own versions end the process if memory runs out.
 void* operator new(std::size_t bytes)
 {
     if (void* const memory = std::malloc(bytes)) return memory;

@@ -1,5 +1,5 @@
-// A program that embeds Rapid goes on where memory runs out, while a state of Lua is made or anywhere else: an error
-// says so, and the next scene opens.
+// A program that embeds Rapid survives exhausted memory, while a Lua state is created or anywhere else. An error
+// reports it, and the next scene opens.
 #include <cstdlib>
 #include <fstream>
 
@@ -15,8 +15,8 @@ namespace fs = std::filesystem;
 
 constexpr char tried_again[] = "opens a scene where memory runs out and another";
 
-// Runs that test in a process of its own, in which the n-th request of memory for a state fails; whether it passed.
-// counted: receives the number of these requests.
+// Runs that test in a separate process, in which the nth allocation for a state fails. Returns true if it passed.
+// counted: receives the number of these allocations.
 bool passes(int n, const fs::path& counted)
 {
     const fs::path program = fs::read_symlink("/proc/self/exe");
@@ -28,8 +28,8 @@ bool passes(int n, const fs::path& counted)
     return std::system(command.c_str()) == 0;
 }
 
-// Runs the program that uses all of the interface (tests/faults/embedding.cpp) so many times with these variables in
-// this folder; what it says goes to the file `said`.
+// Runs the program that uses the whole interface (tests/faults/embedding.cpp) this many times, with these variables, in
+// this folder. Its output goes to the file `said`.
 bool runs(const fs::path& folder, const std::string& variables, int times)
 {
     const fs::path build = fs::read_symlink("/proc/self/exe").parent_path().parent_path();

@@ -1,7 +1,7 @@
-// Random sequences of calls of rapid.h (tests/scene/call_model.h): handles that are closed, of something else, made up
-// or NULL are refused, and so are wrong names, sizes, numbers, files and arrays.
+// Random sequences of calls of rapid.h (tests/scene/call_model.h). Handles that are closed, of another type, made up or
+// NULL are refused, and so are wrong names, sizes, numbers, files and arrays.
 //
-//   HOST_CALLS=24000 test_c "any sequence*"      more of them; RC_PARAMS="seed=7" others
+//   HOST_CALLS=24000 test_c "any sequence*"      more sequences; RC_PARAMS="seed=7" generates others
 #include <exception>
 #include <limits>
 #include <thread>
@@ -44,7 +44,7 @@ Hostile hostile_call(Function call)
 
 rapid_setting number_setting(const char* name, double value) { return {name, {RAPID_NUMBER, {value, 0, 0}, nullptr}}; }
 
-// Offers something to a scene that is refused, at once or when the scene gets it.
+// Offers an invalid object to a scene. It is refused at once, or when the scene gets it.
 template <class Function>
 Hostile hostile_offer(rapid_scene* scene, Function call)
 {
@@ -65,7 +65,7 @@ Hostile hostile_text(const char* text, const rapid_options& options = rapid_defa
         rapid_scene* scene = nullptr;
         const int status = rapid_scene_open_text("hostile.lua", text, &options, &scene, e);
         if (scene) rapid_scene_release(scene, nullptr);
-        return scene && status != RAPID_OK ? static_cast<int>(RAPID_OK) : status;  // a scene in spite of an error
+        return scene && status != RAPID_OK ? static_cast<int>(RAPID_OK) : status;  // a scene despite an error
     });
 }
 
@@ -185,7 +185,7 @@ private:
         return result;
     }
 
-    // Handles of something else, made up, or NULL.
+    // Returns handles of another type, made-up handles and NULL.
     std::vector<Hostile> forged(Scene open)
     {
         std::vector<Hostile> all;

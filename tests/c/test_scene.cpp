@@ -1,4 +1,4 @@
-// The C interface: what wrong calls get, and that handles know what they are of. What scenes do is in test_scene.cpp.
+// Wrong calls of the C interface, and handles that know their objects. tests/scene/test_scene.cpp tests scenes.
 #include <atomic>
 #include <cstring>
 #include <fstream>
@@ -319,7 +319,7 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
     CHECK(rapid_scene_release(scene, nullptr) == RAPID_OK);
     CHECK(rapid_scene_release(scene, nullptr) == RAPID_WRONG_CALL);
     CHECK(rapid_scene_advance(scene, nullptr, nullptr) == RAPID_WRONG_CALL);
-    rapid_scene* next = opened();  // may have the place of the one before
+    rapid_scene* next = opened();  // may have the address of the previous one
     CHECK(next != scene);
     CHECK(rapid_scene_next_frame(scene) == 0);
     CHECK(rapid_scene_next_frame(next) == 1);
@@ -425,13 +425,13 @@ TEST_CASE("a struct's size says what the program knows", "[c]")
     CHECK(rapid_scene_open_text("a.lua", fall, &options, &scene, told) == RAPID_WRONG_CALL);
     CHECK_THAT(told.message(), Contains("sizeof(*options)"));
 
-    // Of a program that knows no more than the settings.
+    // Options of an older program, whose struct ends after the settings.
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
     options = rapid_default_options();
     options.size = offsetof(rapid_options, seed);
     options.set = &height;
     options.set_count = 1;
-    options.threads = -5;  // beyond
+    options.threads = -5;  // not part of the older struct
     REQUIRE(rapid_scene_open_text("a.lua", fall, &options, &scene, nullptr) == RAPID_OK);
     auto parameter = sized<rapid_parameter>();
     REQUIRE(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_OK);
@@ -446,7 +446,7 @@ TEST_CASE("a struct's size says what the program knows", "[c]")
     CHECK(rapid_scene_parameter(scene, 0, &parameter, nullptr) == RAPID_WRONG_CALL);
     rapid_scene_release(scene, nullptr);
 
-    // Of a newer program: what is not asked for is zero.
+    // Options of a newer program. A newer field that is not used is zero.
     struct Newer {
         rapid_options known;
         void* more;
@@ -476,7 +476,7 @@ TEST_CASE("callbacks get the program's pointer, and may not call the scene", "[c
     CHECK(rapid_scene_advance_to(seen.scene, 9, nullptr, nullptr) == RAPID_CANCELLED);
     CHECK(seen.frames == 3);
     CHECK(seen.status == RAPID_BUSY);
-    // Closed within its own call, it goes on to the end of that.
+    // If the scene is closed during its own call, that call still completes.
     options.progress = [](void* user, int64_t, int64_t) {
         auto& s = *static_cast<Seen*>(user);
         s.status = rapid_scene_release(s.scene, nullptr);

@@ -1,5 +1,5 @@
-// Each function of rapid.h with handles that are wrong, within a call of its scene, and behind a frame that failed. The
-// table of functions is held against the header.
+// Calls each function of rapid.h with wrong handles, during a call of its scene, and after a failed frame. The table of
+// functions is checked against the header.
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -42,7 +42,7 @@ T sized()
     return result;
 }
 
-// What functions are called with.
+// The handles that functions are called with.
 struct Handles {
     rapid_scene* scene = nullptr;
     rapid_frame* frame = nullptr;
@@ -91,13 +91,13 @@ struct Opened : Handles {
     }
 };
 
-// A function with right arguments. takes: the handles that it takes, of "scene frame snapshot offers shapes run" the
-// first letters, where a snapshot is "n" and shapes are "h".
+// A function with valid arguments. takes: the initials of the handles that it takes, among scene, frame, snapshot
+// ("n"), offers, shapes ("h") and run.
 struct Function {
     const char* name;
     std::string takes;
     std::function<int(const Handles&, rapid_error**)> call;
-    bool is_for_any_thread = false;  // at any time
+    bool is_for_any_thread = false;  // may be called at any time
 };
 
 template <class T>
@@ -107,7 +107,7 @@ int released(int (*release)(T*, rapid_error**), T* made, int status)
     return status;
 }
 
-// One that gives a text of a frame.
+// A function that returns a string of a frame.
 Function text_of_frame(const char* name, int (*function)(rapid_frame*, const char**, rapid_error**))
 {
     return {name, "f", [=](const Handles& h, rapid_error** e) {
@@ -381,7 +381,7 @@ const std::vector<Function>& functions()
          }},
         {"rapid_run_run", "r",
          [](const Handles& h, rapid_error** e) {
-             rapid_run_prepare(h.run, nullptr);  // unless it is
+             rapid_run_prepare(h.run, nullptr);  // unless it is already prepared
              auto outcome = sized<rapid_outcome>();
              return rapid_run_run(h.run, &outcome, e);
          }},
@@ -393,12 +393,12 @@ const std::vector<Function>& functions()
     return all;
 }
 
-// A function that can't fail, and returns 0 of a handle that is wrong and of a scene that is in another call.
+// A getter, which has no error. It returns 0 for a wrong handle and for a scene inside another call.
 struct Getter {
     const char* name;
-    std::size_t takes;  // the place of its handle
+    std::size_t takes;  // index of its handle
     std::function<double(const Handles&)> get;
-    double value;  // of Opened
+    double value;  // for the handles of Opened
 };
 
 const std::vector<Getter>& getters()
@@ -425,7 +425,7 @@ const std::vector<Getter>& getters()
     return all;
 }
 
-// The status of a function, whose error has a message where there is one.
+// Returns the status of a function, and checks that an error has a message.
 int status_of(const Function& function, const Handles& handles)
 {
     rapid_error* error = nullptr;
@@ -445,7 +445,7 @@ TEST_CASE("the table has all functions of the header", "[c]")
 {
     std::ifstream file(RAPID_SOURCE_DIR "/include/rapid/rapid.h");
     const std::string header(std::istreambuf_iterator<char>(file), {});
-    // Those that take no handle, or take NULL for one; what merges parts is in test_scene.cpp.
+    // Functions that take no handle, or accept NULL. test_scene.cpp tests the merge of parts.
     std::set<std::string> known = {
         "rapid_version",      "rapid_error_message",      "rapid_error_file",        "rapid_error_line",
         "rapid_error_node",   "rapid_error_text",         "rapid_error_release",     "rapid_error_kind",
@@ -723,10 +723,10 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("its type is 17", [&](auto e) { return rapid_offers_points(h.offers, "a", 1, &column, 1, e); });
     CHECK(scene == nullptr);
     CHECK(frame == nullptr);
-    CHECK(rapid_scene_advance(h.scene, nullptr, nullptr) == RAPID_OK);  // nothing of that has changed anything
+    CHECK(rapid_scene_advance(h.scene, nullptr, nullptr) == RAPID_OK);  // none of these calls changed anything
 }
 
-// What callbacks of a program do wrong, as C sees them.
+// Misbehaving callbacks of a program, as C sees them.
 TEST_CASE("what a callback does wrong is an error of the scene, which goes on behind it", "[c]")
 {
     struct Program {

@@ -1,4 +1,4 @@
-// A document in Markdown as the tests of documents see it: its text, its headings, the code that it quotes inline.
+// A Markdown document for the tests of documents: its text, headings and inline code.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,7 @@ inline std::string read_text(const std::filesystem::path& file)
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// Of each match of the pattern, what its groups match; the whole of it at 0.
+// Returns the groups of each match of the pattern; index 0 is the whole match.
 inline std::vector<std::vector<std::string>> matches(const std::string& text, const std::regex& pattern)
 {
     std::vector<std::vector<std::string>> all;
@@ -31,7 +31,7 @@ inline std::vector<std::vector<std::string>> matches(const std::string& text, co
     return all;
 }
 
-// Text between fences is no prose.
+// Returns the text without fenced code blocks.
 inline std::string without_fenced_code(const std::string& text)
 {
     std::string prose;
@@ -79,7 +79,7 @@ inline std::string section(const std::string& text, const std::string& title)
     return found;
 }
 
-// The fragment by which a heading is linked: lower case, spaces as hyphens, without punctuation.
+// Returns the fragment that links to a heading: lower case, spaces as hyphens, without punctuation.
 inline std::string anchor_of(const std::string& title)
 {
     std::string anchor;

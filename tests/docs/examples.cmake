@@ -1,5 +1,5 @@
-# rapid_examples(RESULT DOCUMENT FOLDER): writes the examples of a document in Markdown, fenced blocks that say which file
-# they are (```cpp runtime/operators/shear.cpp), to that file below FOLDER; RESULT lists them.
+# rapid_examples(RESULT DOCUMENT FOLDER): extracts the examples of a Markdown document, fenced blocks that name a file
+# (```cpp runtime/operators/shear.cpp), into these files below FOLDER, and lists them in RESULT.
 function(rapid_examples result document folder)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${document})
   file(READ ${document} text)
@@ -16,7 +16,7 @@ function(rapid_examples result document folder)
     string(SUBSTRING "${text}" ${at} -1 text)
     string(FIND "${text}" "\n```\n" end)
     string(SUBSTRING "${text}" 0 ${end} example)
-    # Written where it has changed, so that nothing else is compiled again.
+    # Writes a file only if it has changed, because others would be compiled again.
     file(CONFIGURE OUTPUT ${file} CONTENT "${example}\n" @ONLY)
     list(APPEND files ${file})
     math(EXPR end "${end} + 5")

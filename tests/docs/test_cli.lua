@@ -1,4 +1,4 @@
--- docs/cli.md against the command: every option and JSON key that one has, the other has too.
+-- Compares docs/cli.md with the command: both have the same options and JSON keys.
 local command = require "testing.command"
 local document = require "testing.document"
 local json = require "dkjson"
@@ -16,14 +16,14 @@ local function sorted(set)
   return list
 end
 
--- The long options of a help page or of a text.
+-- Returns the long options in a text or help page.
 local function options_of(text)
   local options = {}
   for option in text:gmatch "%-%-(%l[%l-]*)" do options[option] = true end
   return options
 end
 
--- All keys of a value, at any depth; those of tables that hold results by name are left out.
+-- Returns all keys of a value, at any depth, except those of tables that hold results by name.
 local function keys_of(value, open, keys)
   keys = keys or {}
   if type(value) == "table" then

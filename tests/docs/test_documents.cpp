@@ -1,4 +1,4 @@
-// What the documents say of the code is still so: files, folders, names and sections that they mention exist.
+// Checks that files, folders, names and sections that the documents mention exist.
 #include "tests/docs/document.h"
 
 namespace rapid {
@@ -11,7 +11,7 @@ const std::vector<std::string> documents = {"docs/architecture.md", "docs/numeri
                                             "docs/host.md",         "docs/reliability.md", "docs/cli.md",
                                             "docs/guide.md",        "SECURITY.md",         "CONTRIBUTING.md"};
 
-// Files that a document's examples are, which a reader would write.
+// Returns the files that a document's examples create.
 std::set<std::string> example_files(const std::string& text)
 {
     std::set<std::string> files;
@@ -32,7 +32,7 @@ std::vector<fs::path> sources()
     return files;
 }
 
-// The rows of the tables whose last column is "its test".
+// Returns the rows of tables whose last column is "its test".
 std::vector<std::string> promises_of(const std::string& text)
 {
     std::vector<std::string> rows;
@@ -79,7 +79,7 @@ TEST_CASE("each promise names its test", "[docs]")
     }
 }
 
-// Of commands such as RAPID_MUTANTS=20000 build/test/bin/test_mutants "[mutants]".
+// Matches commands such as RAPID_MUTANTS=20000 build/test/bin/test_mutants "[mutants]".
 TEST_CASE("variables, test programs and tags in the commands of a document are those of tests", "[docs]")
 {
     std::string code;

@@ -1,4 +1,4 @@
-// The examples of docs/extending.md, compiled into this program, do what their comments say.
+// The examples of docs/extending.md, compiled into this program, do as their comments say.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -17,9 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path examples = RAPID_EXAMPLES;  // where the build has written them
+const fs::path examples = RAPID_EXAMPLES;  // the folder into which the build extracts them
 
-// The points of a chain of nodes after so many frames of 1/24 s. The example in Lua lies beside the scene.
+// Returns the points of a chain of nodes after a number of frames of 1/24 s. The example in Lua is next to the scene.
 PointSet run(const std::string& chain, int frames)
 {
     const test::TemporaryFolder folder;
@@ -33,7 +33,7 @@ PointSet run(const std::string& chain, int frames)
     return points;
 }
 
-// What is written to standard output meanwhile.
+// Returns the output that f writes to standard output.
 template <class F>
 std::string printed_by(const F& f)
 {
@@ -86,7 +86,7 @@ TEST_CASE("the example of a constraint holds what hangs from it, and leaves alon
 
 TEST_CASE("the example of a shape is hit where its edge is", "[docs]")
 {
-    // Straight down on the rounding of the upper edge, 0.06 m inside the side; it sticks where it hits.
+    // The point falls straight down onto the rounded upper edge, 0.06 m inside the side, and sticks where it hits.
     const PointSet points =
         run("rapid.create { points = rapid.points.from { P = {{0.44, 3, 0}, {0, 3, 0}} } }"
             ":gravity {} :collide { shape = rapid.shape.rounded_box { size = {1, 2, 1}, radius = 0.1 }, response = "
@@ -107,7 +107,7 @@ TEST_CASE("the example of a shape moves by :transform, and carries what sticks t
             " return rapid.translate(0.01 * (frame.number - 25), 0, 0) end), response = \"stick\" } :solve {}",
             24);
     CHECK(points.P()[0].y() == Approx(1).epsilon(1e-5));
-    CHECK(points.v()[0].x() == Approx(0.24).epsilon(1e-5));  // 0.01 m a frame of 1/24 s
+    CHECK(points.v()[0].x() == Approx(0.24).epsilon(1e-5));  // 0.01 m per frame of 1/24 s
 }
 
 TEST_CASE("the example of a format is read as it was written", "[docs]")

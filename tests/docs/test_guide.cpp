@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A box on the ground stands in for the reader's model.
+// A box on the ground replaces the reader's model.
 const char* const box =
     "v -1 0 -1\nv 1 0 -1\nv 1 1 -1\nv -1 1 -1\nv -1 0 1\nv 1 0 1\nv 1 1 1\nv -1 1 1\n"
     "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n";

@@ -1,4 +1,5 @@
--- docs/lua-api.md against the program: nodes, parameters, fields, methods and constructors, both ways; its scenes run.
+-- Compares docs/lua-api.md with the program: both have the same nodes, parameters, fields, methods and constructors,
+-- and the document's scenes run.
 local command = require "testing.command"
 local document = require "testing.document"
 local json = require "dkjson"
@@ -7,7 +8,7 @@ local page = document.read "docs/lua-api.md"
 local annotations = command.rapid "nodes --annotations".stdout
 local nodes = json.decode(command.rapid "nodes --json".stdout)
 
--- The rows of "## Nodes": a node's name and what stands in backticks behind it.
+-- The rows of "## Nodes": a node's name and the words in backticks after it.
 local documented = {}
 for cells in document.rows(document.section(page, "## Nodes")) do
   local name = cells[1]:match "^`:([%w_]+)`$" or cells[1]:match "^`rapid%.(create)`$"

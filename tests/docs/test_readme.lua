@@ -1,4 +1,4 @@
--- README.md: its samples are those of the scene, its output is what the command prints, its links lead somewhere.
+-- README.md: its samples are taken from the scene, its output is the command's, and its links exist.
 local command = require "testing.command"
 local document = require "testing.document"
 

@@ -1,11 +1,11 @@
--- --farm slurm, and rapid farm, against a Slurm of one node that these tests start and end.
+-- Tests --farm slurm and rapid farm with a Slurm cluster of one node that these tests start and stop.
 local command = require "testing.command"
 local json = require "dkjson"
 
 local folder = command.folder()
 local slurm = folder:file "slurm"
 
--- The cluster ends with this process, whose id the shell has as its parent's.
+-- The cluster ends with this process, the shell's parent.
 local started = command.shell(("exec tests/farm/slurm_daemons start %s %s 4"):format(
   slurm, command.shell("echo $PPID").stdout:gsub("%s+$", "")))
 local environment = { SLURM_CONF = slurm .. "/slurm.conf" }
@@ -25,7 +25,7 @@ local function shell(line)
   return command.shell(line, { cwd = folder.path, environment = environment })
 end
 
--- Waits until nothing of a job is open; at most a minute. "waits": something does that will never run.
+-- Waits up to a minute until all tasks of a job are settled. "waits": a task will never run.
 local function settled(file)
   local tasks
   for _ = 1, 300 do
@@ -92,7 +92,7 @@ describe("rapid run --farm slurm", function()
   end)
 
   it("leaves the others where a task fails, and runs again what is missing", function()
-    shell "mkdir -p fail/a_part2of3.0003.bgeo" -- a folder where a file should be
+    shell "mkdir -p fail/a_part2of3.0003.bgeo" -- a folder with the name of an output file
     done "run drops.lua -f 1-8 -o 'fail/a.####.bgeo' --farm slurm --parts 3"
     assert.equal("done failed done waiting", states(settled "fail/FARM.json"))
     local status = rapid "farm status fail/FARM.json"
@@ -149,10 +149,10 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
     assert.equal(0, shell(("scancel --signal=KILL %d_2"):format(array)).status)
     assert.equal(0, shell(("scontrol requeue %d_1"):format(array)).status)
     shell "sleep 2"
-    assert.equal(0, shell(("scontrol update JobId=%d_1 StartTime=now"):format(array)).status) -- not in two minutes
+    assert.equal(0, shell(("scontrol update JobId=%d_1 StartTime=now"):format(array)).status) -- skips a delay
     assert.matches("^done %l+ waiting$", states(settled "slow/FARM.json"))
     assert.equal(1, rapid("farm status slow/FARM.json").status)
-    assert.is_nil(folder:read "slow/a_part2of2.0040.ply") -- it was killed on the way
+    assert.is_nil(folder:read "slow/a_part2of2.0040.ply") -- it was killed while running
     done "farm retry slow/FARM.json"
     assert.equal("done done done", states(settled "slow/FARM.json"))
     for frame = 1, 40 do
@@ -234,7 +234,7 @@ describe("rapid farm", function()
     local status = rapid "farm status held/FARM.json"
     assert.equal(1, status.status)
     assert.matches("4 lost", status.stdout)
-    -- Held again, as its options say; then let go.
+    -- The retried job is held again, as its options demand, and then released.
     done "farm retry held/FARM.json"
     local submitted = json.decode((folder:read "held/FARM.json"))
     shell(("scontrol release %d %d"):format(submitted.tasks[1].job, submitted.last.job))

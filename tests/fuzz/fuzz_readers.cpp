@@ -1,7 +1,7 @@
-// A target of libFuzzer for each of Rapid's own readers: those of the registered formats of points, and those below.
-// RAPID_FUZZ_READER names one; without it their names are printed. tests/fuzz/run builds and runs it.
+// A libFuzzer target for each of Rapid's own readers: those of the registered point formats, and those below.
+// RAPID_FUZZ_READER selects one; without it the names are printed. tests/fuzz/run builds and runs this program.
 //
-// Lengths and checksums that would be wrong after every change are put in here.
+// Correct lengths and checksums are inserted here, because mutations would almost always break them.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@
 
 namespace {
 
-// A file without a name: the readers take a path.
+// Returns the path of an unnamed file with this content, because readers take a path.
 const std::string& path_of(std::string_view text)
 {
     static const int file = ::memfd_create("input", 0);
@@ -47,7 +47,7 @@ std::string number(std::uint64_t value)
     return bytes;
 }
 
-// What has its length, of two bytes, before it.
+// Takes the next part, which is preceded by its length in two bytes.
 std::string_view take_stretch(std::string_view& input)
 {
     std::size_t length = 0;
@@ -58,7 +58,7 @@ std::string_view take_stretch(std::string_view& input)
     return stretch;
 }
 
-// Of a header and the blocks.
+// Builds a state file from a header and blocks.
 std::string state_file(std::string_view input)
 {
     const std::string_view header = take_stretch(input);
@@ -77,7 +77,7 @@ std::string record_log(std::string_view input)
     return file;
 }
 
-// A .glb of a document and its buffer.
+// Builds a .glb file from a document and its buffer.
 std::string binary_gltf(std::string_view input)
 {
     const auto word = [](std::size_t value) { return number(value).substr(0, 4); };
@@ -95,7 +95,7 @@ void read_state(std::string_view input)
 
 void read_log(std::string_view input)
 {
-    // A log follows no link, which the path of a file without a name is.
+    // A log is not read through a symbolic link, so it needs a named file.
     const std::string path = std::filesystem::temp_directory_path() / ("rapid-fuzz-log-" + std::to_string(::getpid()));
     std::ofstream(path, std::ios::binary) << record_log(input);
     const rapid::RecordLog log(path);
@@ -124,7 +124,7 @@ std::map<std::string, Reader> readers()
     return all;
 }
 
-// Files that a format writes, of two points and of none, for its fuzzer to begin with.
+// Writes files of a format, with two points and with none, as the fuzzer's first inputs.
 void write_seeds(const std::string& extension)
 {
     rapid::PointSet points;

@@ -1,4 +1,4 @@
-// Dependencies point downward: the includes of the runtime, read from its sources, against a table of allowed edges.
+// Dependencies point downward: compares the includes of all sources with a table of allowed edges.
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -14,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The folders that a folder's files may include besides their own. runtime/base (errors, memory,
-// threads) and runtime/math (vectors, random numbers) are the bottom.
+// The folders that a folder's files may include, besides their own. runtime/base (errors, memory, threads) and
+// runtime/math (vectors, random numbers) are at the bottom.
 const std::map<std::string, std::set<std::string>> below = {
     {"runtime/base", {}},
     {"runtime/math", {}},
@@ -77,8 +77,8 @@ const std::map<std::string, std::set<std::string>> below = {
     {"runtime/report", {"runtime/base", "runtime/math", "runtime/files", "runtime/points", "runtime/graph"}},
 };
 
-// What files of the command include of the runtime besides the promised headers: small tools that know nothing of
-// points and scenes. All of runtime/files is of this kind.
+// Runtime headers that the command's files may include besides the promised ones: small tools that do not depend on
+// points or scenes. All of runtime/files is of this kind.
 const std::set<std::string> small_tools = {
     "runtime/base/cancellation.h",  "runtime/base/checked_json.h",  "runtime/base/error.h",
     "runtime/base/first_error.h",   "runtime/base/json_text.h",     "runtime/base/memory_budget.h",
@@ -86,13 +86,13 @@ const std::set<std::string> small_tools = {
     "runtime/picture/tone.h",       "runtime/report/number_text.h", "runtime/report/progress.h",
     "runtime/base/setting_names.h", "runtime/base/stopwatch.h",     "runtime/base/threads.h"};
 
-// What they include besides these of the library's inside: each is for them alone, and no program of others needs it.
+// Internal headers of the library that only the command's files may include; other programs do not need them.
 const std::set<std::string> for_our_programs = {"bindings/host/graph_parameter.h", "bindings/run/study_scene.h",
                                                 "bindings/scene/installation.h",   "bindings/scene/picture_sheet.h",
                                                 "bindings/scene/scene_film.h",     "bindings/scene/scene_inside.h",
                                                 "bindings/scene/scene_tests.h"};
 
-// The folder of the command, or of a program that `rapid` becomes.
+// Returns true for the folder of the command, or of a program that `rapid` executes.
 bool is_program(const std::string& folder)
 {
     return folder == "bindings/command" || fs::exists(fs::path(RAPID_SOURCE_DIR) / folder / "program.txt");
@@ -100,7 +100,7 @@ bool is_program(const std::string& folder)
 
 const std::string shared_by_programs = "bindings/command_line";
 
-// Of programs, and what they share.
+// Returns the folders of programs, and of the code that they share.
 std::vector<std::string> folders_of_programs()
 {
     std::vector<std::string> folders = {shared_by_programs};
@@ -119,11 +119,11 @@ bool is_inside_of_rapid(const std::string& header)
 
 struct Include {
     std::string file, folder;  // relative to the checkout
-    std::string included;      // as it is written, without quotes or angles
+    std::string included;      // as written, without quotes or angle brackets
     bool ours;                 // in quotes
 };
 
-// Of all sources below a folder, and of the examples in docs/extending.md that are to become one.
+// Returns the includes of all sources below a folder, and of the examples in docs/extending.md for that folder.
 std::vector<Include> includes_below(const std::string& folder)
 {
     const fs::path root = RAPID_SOURCE_DIR;
@@ -154,7 +154,7 @@ std::vector<Include> includes_below(const std::string& folder)
 TEST_CASE("a file of the runtime includes only its own folder and those below", "[layers]")
 {
     const auto includes = includes_below("runtime");
-    REQUIRE(includes.size() > 100);  // the sources were found and read
+    REQUIRE(includes.size() > 100);  // fails if no sources were found
 
     for (const Include& include : includes) {
         if (!include.ours) continue;
@@ -223,7 +223,7 @@ TEST_CASE("neither the command nor a program knows another one, and what they sh
 
 TEST_CASE("a command is a program like others", "[layers]")
 {
-    // By file, what it includes in quotes.
+    // The quoted includes of each file.
     std::map<std::string, std::set<std::string>> includes;
     const std::vector<std::string> folders = folders_of_programs();
     REQUIRE(folders.size() >= 3);
@@ -232,7 +232,7 @@ TEST_CASE("a command is a program like others", "[layers]")
             if (include.ours) includes[include.file].insert(include.included);
     REQUIRE(includes.size() > 50);
 
-    // With the headers of the command that it includes, and what these include.
+    // Follows the command's own headers, and the headers that these include.
     const auto knows_inside = [&](const std::string& file) {
         std::set<std::string> seen = {file};
         for (std::vector<std::string> open = {file}; !open.empty();) {
@@ -253,7 +253,7 @@ TEST_CASE("a command is a program like others", "[layers]")
 
 TEST_CASE("the library does not speak of the command's options", "[layers]")
 {
-    // What files of runs call their entries, and arguments of ffmpeg.
+    // Names of cache entries, and of arguments of ffmpeg.
     const std::set<std::string> others = {"bindings/run/setting_entries.h", "runtime/io/film.cpp"};
     const std::regex text(R"re("((?:[^"\\]|\\.)*)")re"), option(R"re((^|[^-\w])(--[a-z]{2,}|-[ofj](?=[ :]|$)))re");
     const fs::path root = RAPID_SOURCE_DIR;
@@ -275,7 +275,7 @@ TEST_CASE("the library does not speak of the command's options", "[layers]")
 TEST_CASE("only shapes and formats know OpenVDB", "[layers]")
 {
     for (const Include& include : includes_below("runtime")) {
-        const std::string grids = "runtime/base/openvdb_grids.h";  // what both know of it
+        const std::string grids = "runtime/base/openvdb_grids.h";  // shared by both
         if (include.file == grids || (include.included.rfind("openvdb/", 0) != 0 && include.included != grids))
             continue;
         CAPTURE(include.file, include.included);

@@ -1,4 +1,4 @@
-// Warnings of frames: what is told as it comes, and what is counted.
+// Warnings of frames: which are printed as they occur, and which are only counted.
 #include <fmt/format.h>
 
 #include "runtime/report/frame_warnings.h"

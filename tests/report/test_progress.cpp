@@ -11,7 +11,7 @@ using namespace rapid;
 
 namespace {
 
-// A stream that keeps its text.
+// A stream that stores its text.
 class Memory {
 public:
     Memory() : file_(open_memstream(&text_, &size_)) {}
@@ -36,7 +36,7 @@ private:
     std::FILE* file_;
 };
 
-// A bar of 40 columns, the widest there is.
+// A bar of 40 columns, the maximum.
 std::string bar_of(int done) { return fmt::format("[{:=<{}}{: <{}}]", "", done, "", 40 - done); }
 
 }  // namespace

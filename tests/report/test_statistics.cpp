@@ -28,14 +28,14 @@ FrameResult frame_result()
     result.figures.script_seconds = 0.125;
     result.figures.solve_seconds = 0.5;
     result.total_seconds = 1;
-    // Of a frame of two sub-frames.
+    // The work of a frame with two subframes.
     result.work = {{{"emit1"}, NodeWork::Stage::Graph, 0, 0.25, 2, 64},
                    {{"tint", "fade"}, NodeWork::Stage::Script, 0.25, 0.125, 2, 64},
                    {{"emit1"}, NodeWork::Stage::Graph, 0.5, 0.125, 3, 96}};
     return result;
 }
 
-// A run with its frames, which a run itself does not keep.
+// A run with its frames, which RunStatistics itself does not store.
 struct Recorded : RunStatistics {
     std::vector<FrameStatistics> frames;
 };
@@ -113,7 +113,7 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
     CHECK(json["peak_bytes"] == 3 << 20);
     CHECK(json["seconds"] == 0.5);
     REQUIRE(json["frames"].size() == 1);
-    // No "error": nothing is estimated, so nothing is said.
+    // Without an estimate there is no "error" entry.
     CHECK(json["frames"][0] == ordered_json::parse(R"({
         "frame": 7, "points": 5, "born": 4, "died": 1, "substeps": 2,
         "seconds": { "total": 1.25, "graph": 0.375, "script": 0.125, "solve": 0.5, "write": 0.25 },

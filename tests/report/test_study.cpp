@@ -10,7 +10,7 @@ using namespace rapid;
 
 namespace {
 
-// Lines by method, steps by substeps.
+// Creates a study with a line per method and a step per number of substeps.
 Study study_of_methods(std::vector<Value> methods, std::vector<Value> substeps)
 {
     Study study;
@@ -21,7 +21,7 @@ Study study_of_methods(std::vector<Value> methods, std::vector<Value> substeps)
     return study;
 }
 
-// Every row ran, with the error and time that the functions give for its sub-steps.
+// Fills in every row with the error and time that the functions return for its substeps.
 template <class Error, class Seconds>
 StudyResult run(const Study& study, const Error& error, const Seconds& seconds)
 {
@@ -98,7 +98,7 @@ TEST_CASE("a row is best where none is as good in error and time and better in o
     StudyResult result = run(
         study, [&](const std::string&, double n) { return error[static_cast<std::size_t>(n) - 1]; },
         [&](double n) { return seconds[static_cast<std::size_t>(n) - 1]; });
-    result.rows[5].failed = "it crashed";  // and so beats nobody
+    result.rows[5].failed = "it crashed";  // so it beats no other row
 
     CHECK(result.best() == std::vector<bool>{true, true, false, true, false, false});  // 4 and 5 are both exact
 }
@@ -159,7 +159,7 @@ TEST_CASE("a failed row is in the JSON and the table as failed, with its reason,
     CHECK_THAT(to_text(result), Catch::Contains("failed: method a, substeps 2: signal 11 <Segmentation fault>"));
     const std::string svg = to_svg(result);
     CHECK_THAT(svg, Catch::Contains(">1 failed<"));
-    CHECK(svg.find("<circle") != svg.rfind("<circle"));  // the row and the legend's
+    CHECK(svg.find("<circle") != svg.rfind("<circle"));  // the row's and the legend's
     CHECK(svg.find("<title>error 0.05") == std::string::npos);
 }
 

@@ -1,9 +1,10 @@
-// What oneTBB orders, told to the thread sanitizer.
+// Declares to the thread sanitizer the ordering that oneTBB establishes.
 //
-// Debian's libtbb is not instrumented: that a task begins after it was spawned, that a loop returns after its last
-// task, and that memory of a task is given to the next one are all atomics that the sanitizer does not see. The
-// functions that the library exports for the templates in its headers are replaced here by ones that say so, and then
-// call them. Without this every parallel loop would look like a race, and suppressed, no race in a loop would be found.
+// Debian's libtbb is not instrumented, so the sanitizer does not see the atomics by which a task begins after it was
+// spawned, a loop returns after its last task, and a task's memory is reused by the next one. This file replaces the
+// functions that the library exports for its header templates by ones that declare the ordering and then call the
+// originals. Without it, every parallel loop would look like a race. If these reports were suppressed, no race in a
+// loop would be found.
 #include <dlfcn.h>
 #include <oneapi/tbb/detail/_small_object_pool.h>
 #include <oneapi/tbb/detail/_task.h>
@@ -14,7 +15,7 @@
 
 namespace tbb::detail {
 
-// A task that was spawned, within one that begins after the spawning.
+// Wraps a spawned task, so that it begins after the spawning.
 class OrderedTask final : public d1::task {
 public:
     explicit OrderedTask(d1::task& task) : task_(task) { __tsan_release(this); }
@@ -22,7 +23,7 @@ public:
     d1::task* execute(d1::execution_data& data) override
     {
         __tsan_acquire(this);
-        d1::task* next = task_.execute(data);  // where it throws, the library calls cancel() next
+        d1::task* next = task_.execute(data);  // if it throws, the library calls cancel() next
         delete this;
         return next;
     }
@@ -40,7 +41,7 @@ private:
 
 namespace {
 
-// The library's own function of this name, as the linker knows it.
+// The library's own function of this name.
 template <class... Arguments>
 auto library_function(const char* name) -> void (*)(Arguments...)
 {
@@ -49,8 +50,8 @@ auto library_function(const char* name) -> void (*)(Arguments...)
     return reinterpret_cast<void (*)(Arguments...)>(found);
 }
 
-// The last task of a loop counts the references of its wait_context down to 0, in a header: that is seen. The thread
-// that waits reads them in the library.
+// The last task of a loop counts the references of its wait_context down to 0 in a header, which the sanitizer sees.
+// The waiting thread reads them inside the library.
 void acquire_end(d1::wait_context& context)
 {
     auto* words = reinterpret_cast<std::uint64_t*>(&context);
@@ -92,7 +93,7 @@ void execute_and_wait(d1::task& task, d1::task_group_context& context, d1::wait_
     struct Acquire {
         d1::wait_context& end;
         ~Acquire() { acquire_end(end); }
-    } const acquire{end};  // where a task has thrown, too
+    } const acquire{end};  // also if a task has thrown
     real(task, context, end, waiting);
 }
 
@@ -107,7 +108,7 @@ void wait(d1::wait_context& end, d1::task_group_context& context)
     real(end, context);
 }
 
-// Memory of tasks and containers, from an allocator that the sanitizer knows.
+// Allocates the memory of tasks and containers with an allocator that the sanitizer knows.
 void* allocate(d1::small_object_pool*& pool, std::size_t bytes)
 {
     static char none;

@@ -1,8 +1,8 @@
--- Runs the file of tests UNCHANGED_TESTS, and writes to UNCHANGED_RECORD what its scenes and commands gave: run by
--- tests/unchanged/run as a test itself, so that the tests find everything as `rapid test` has it.
+-- Runs the test file UNCHANGED_TESTS, and writes the output of its scenes and commands to UNCHANGED_RECORD.
+-- tests/unchanged/run runs it as a test, so the tests see the environment of `rapid test`.
 --
--- A record is a line of JSON: the test's name, the label, and the outputs by name. Points are written as a hash of
--- their bits, a frame each.
+-- Each record is a line of JSON: the test's name, the label, and the outputs by name. Points are written as a hash of
+-- their bits per frame.
 local command = require "testing.command"
 local json = require "dkjson"
 local bit = require "bit"
@@ -11,7 +11,7 @@ local rapid = require "rapid"
 
 local path = assert(os.getenv "UNCHANGED_TESTS")
 local record = assert(io.open(assert(os.getenv "UNCHANGED_RECORD"), "wb"))
-local most_points = 2000 -- hashed one by one; of more, every n-th, and the sums and bounds of all
+local most_points = 2000 -- hashed one by one; of larger sets every nth, and the sums and bounds of all
 
 local current = "outside of tests"
 
@@ -40,7 +40,7 @@ local function mixed_text(hash, text)
   return mixed(hash, #text)
 end
 
--- A value by its components: a number, a vec3 or a quat.
+-- Hashes a value by its components: a number, a vec3 or a quat.
 local function mixed_value(hash, value, kind)
   if kind == "number" then return mixed(hash, value) end
   hash = mixed(mixed(mixed(hash, value.x), value.y), value.z)
@@ -75,11 +75,12 @@ local function text_of(value)
   if type(value) ~= "table" then return tostring(value) end
   local words = {}
   for name, member in pairs(value) do words[#words + 1] = tostring(name) .. " = " .. text_of(member) end
-  table.sort(words) -- LuaJIT's order of names is not the same in every process
+  table.sort(words) -- LuaJIT's order of names differs between processes
   return "{ " .. table.concat(words, ", ") .. " }"
 end
 
--- What was run. Many tests go through tables in no order, so that a run is known by this, not by its place.
+-- Returns a label for a run. Many tests iterate over tables in no particular order, so the position does not identify
+-- it.
 local function label_of(scene, options)
   return ("%s %s\n%s"):format(tostring(scene), text_of(options), type(scene) == "string" and read(scene) or "")
 end
@@ -102,14 +103,14 @@ function rapid.run(scene, options)
   return result
 end
 
--- What a command wrote into its folder; of points, pictures and all that is long a hash. A picture of a study shows
--- times alone.
+-- Returns the files that a command wrote into its folder; points, pictures and long files as hashes. Pictures of a
+-- study are skipped, because they show times.
 local function files_of(folder, stamp, outputs)
   local pipe = io.popen(("cd %s && find . -type f -newer %s ! -name '*.svg' | LC_ALL=C sort")
     :format(command.quoted(folder), command.quoted(stamp)))
   for name in pipe:lines() do
     local text = read(folder .. "/" .. name)
-    -- A level set that a scene writes has a random UUID behind the head of its file, as all that OpenVDB writes.
+    -- OpenVDB writes a random UUID after the header of a level set's file.
     if text and name:match "%.vdb$" then text = text:sub(1, 21) .. text:sub(58) end
     if text and (#text > 50000 or name:match "%.csv$" or text:find "[%z\1-\8]") then
       text = ("%d bytes, %s"):format(#text, bit.tohex(mixed_text(14695981039346656037ULL, text), 16))
@@ -133,7 +134,7 @@ function command.shell(line, options)
   return result
 end
 
--- `it` of the tests tells which one runs.
+-- A replacement of `it` that records the name of the running test.
 local environment = setmetatable({}, { __index = getfenv(1) })
 function environment.it(name, body)
   return it(name, body and function(...)

@@ -1,5 +1,5 @@
--- Writes the random scenes of tests/stability into files. Run by tests/unchanged/run, with the folder and the number of
--- scenes in UNCHANGED_FOLDER and UNCHANGED_COUNT.
+-- Writes the random scenes of tests/stability to files. tests/unchanged/run runs it, with the folder in
+-- UNCHANGED_FOLDER and the number of scenes in UNCHANGED_COUNT.
 local random_scenes = require "tests.stability.random_scenes"
 
 local folder = assert(os.getenv "UNCHANGED_FOLDER")

@@ -1,4 +1,4 @@
-// States with values that no run would leave, the same for the same seed.
+// Builds states with values that no run would store, reproducibly from a seed.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ class Forger {
 public:
     explicit Forger(std::uint64_t seed) : random_(seed) {}
 
-    // Some values become others: in what is kept as bytes, or in columns.
+    // Changes some values of a state, in its bytes or in its columns.
     SavedState operator()(SavedState state)
     {
         for (std::size_t left = 1 + below(4); left > 0; --left)
@@ -31,7 +31,7 @@ public:
 private:
     std::size_t below(std::size_t n) { return n == 0 ? 0 : static_cast<std::size_t>(random_() % n); }
 
-    // What is likely to harm: counts, indices and ids out of range, numbers that are none.
+    // Returns values that are likely to cause harm: counts, indices and ids out of range, and NaN.
     std::uint64_t word()
     {
         static constexpr std::uint64_t words[] = {0,
@@ -68,7 +68,7 @@ private:
             case 1:
                 bytes[at] = static_cast<char>(bytes[at] + (below(2) ? 1 : -1));
                 break;
-            case 2:  // what is elsewhere
+            case 2:  // a copy of other bytes
                 std::copy_n(
                     bytes.begin() + static_cast<std::ptrdiff_t>(below(bytes.size() - std::min(size, bytes.size()) + 1)),
                     std::min(size, bytes.size() - at), bytes.begin() + static_cast<std::ptrdiff_t>(at));

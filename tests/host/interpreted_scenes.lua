@@ -6,6 +6,6 @@ it("runs each scene of the list", function()
     local file = assert(io.open(folder .. "/interpreted", "wb"))
     file:write((kernel_modes.outcome(folder, { threads = 1 })))
     file:close()
-    collectgarbage() -- the collector does not count what a result holds outside of Lua
+    collectgarbage() -- the collector does not see the memory that a result holds outside of Lua
   end
 end)

@@ -1,20 +1,20 @@
--- Runs a scene in each of the modes that kernels have, and compares the results bit by bit.
+-- Runs a scene in each mode of its kernels, and compares the results bitwise.
 --
 --   local kernel_modes = require "tests.host.kernel_modes"     from the folder of the project
 --   kernel_modes.interpret(folders)          runs scenes in the interpreter; a scene is a folder with a scene.lua
 --   kernel_modes.difference(folder, modes)   nil if these modes have the same results, or the same error, as traces
 --   kernel_modes.outcome(folder, options)    all values of all frames as text, or the error
 --
--- The modes are "lanes", on one thread; "threads", lanes on seven; and "interpreted". Traces take one point at a time.
--- No scene can turn the compiler off: interpreted scenes run in a process of its own that reads a copy of Rapid's Lua
--- files with one call removed.
+-- The modes are "lanes", on one thread; "threads", lanes on seven threads; and "interpreted". They are compared with
+-- traces, which take one point at a time. No scene can turn the compiler off, so interpreted scenes run in a separate
+-- process that reads a copy of Rapid's Lua files with one call removed.
 local command = require "testing.command"
 local ffi = require "ffi"
 local vector = require "vec3"
 
 local kernel_modes = {}
 
-local rapid = require "rapid" -- the module of tests
+local rapid = require "rapid" -- the module for tests
 
 local frames = {1, 3}
 
@@ -25,7 +25,7 @@ local function text_of(value)
   return ffi.istype(vector.quat, value) and ("%s %.17g"):format(text, value.w) or text
 end
 
--- Also returns the list of kernels that are not programs of lanes.
+-- Also returns the list of kernels that are not lane programs.
 function kernel_modes.outcome(folder, options)
   options.frames = frames
   local ok, result = pcall(rapid.run, folder .. "/scene.lua", options)
@@ -45,7 +45,7 @@ function kernel_modes.outcome(folder, options)
   return table.concat(lines, "\n"), result.no_lanes or {}
 end
 
--- Makes an installation whose Lua files do not turn the compiler on again after the graph is loaded.
+-- An installation whose Lua files do not turn the compiler on again after the graph is loaded.
 local interpreter
 local function make_interpreter()
   interpreter = command.folder()
@@ -61,7 +61,7 @@ cp -rL "$(dirname "$RAPID")/../share/rapid/lua" "$AT/share/rapid/"]], { environm
   interpreter:write(path, text)
 end
 
--- Runs scenes in the interpreter. Their outcomes go to the file `interpreted` in the folder of each.
+-- Runs scenes in the interpreter. The outcome of each is written to the file `interpreted` in its folder.
 function kernel_modes.interpret(folders)
   if not interpreter then make_interpreter() end
   local list = interpreter:write("folders", table.concat(folders, "\n") .. "\n")
@@ -79,8 +79,8 @@ local function first_difference(a, b)
   return ("%s\n  and %s"):format(tostring(line_a), tostring(line_b))
 end
 
--- modes: the names of those that are compared with traces. Also returns the list of kernels that are not programs of
--- lanes, and the outcome.
+-- modes: the names of the modes that are compared with traces. Also returns the list of kernels that are not lane
+-- programs, and the outcome.
 function kernel_modes.difference(folder, modes)
   local traced = kernel_modes.outcome(folder, { threads = 1, watch_traces = true })
   local no_lanes = {}

@@ -1,12 +1,12 @@
--- Templates of which random_kernels.lua makes kernels. A letter after $ stands for an expression of a kind:
+-- Templates from which random_kernels.lua makes kernels. A letter after $ stands for an expression of a kind:
 --
 --   $N number, $I whole number, $V vec3, $Q quat, $B boolean, $T string, $X something with a field x,
 --   $M anything, $F a function of one number, $G the name of a group
 --
--- A template is used only where what it names is there: p, frame, params.
+-- A template is used only if the names in it exist there: p, frame, params.
 local templates = {}
 
--- What each scene begins with. `sound` keeps most numbers finite and small, so that most kernels raise no error.
+-- The start of each scene. `sound` keeps most numbers finite and small, so that most kernels raise no error.
 templates.head = [[
 local function sound(x) if x ~= x or x > 1e5 or x < -1e5 then return 0.5 end return x end
 local function sound3(a) return vec3(sound(a.x), sound(a.y), sound(a.z)) end
@@ -24,7 +24,7 @@ local word, which = "a", "f"
 local shared = { x = 2.5, y = -1, list = { 7, 8, 9 }, inner = { x = -0.75, v = vec3(1, 2, 3), f = mixed }, word = "b" }
 ]]
 
--- Expressions without others in them, by kind. Those in `pointwise` are beyond programs of lanes.
+-- Expressions without subexpressions, by kind. Lane programs do not support those in `pointwise`.
 local atoms = {
   N = { "0", "1", "2", "0.5", "3", "(-1)", "(-0.3)", "1e-3", "7.25", "limit", "tiny", "zero", "minus_zero", "large",
         "tint.x", "shared.x", "shared.inner.x", "p.f", "p.g", "p.f", "p.P.x", "p.v.y", "p.Cd.z", "p.axis.y",
@@ -93,7 +93,7 @@ local composed = {
   },
 }
 
--- Expressions that are possible everywhere.
+-- Expressions that are valid everywhere.
 templates.plain = { N = "0.5", I = "2", V = "tint", Q = "spin", B = "on", T = "word", X = "shared", M = "nil",
                     F = "sound", G = "\"a\"" }
 
@@ -116,7 +116,7 @@ templates.risky = {
   "if p.id == $I then error(shared) end",
 }
 
--- Statements that store what depends on the value %s of a variable.
+-- Statements that store a value depending on %s, a variable.
 templates.observations = {
   N = "p.f = sound(p.f * 0.5 + %s)", I = "p.g = sound(p.g - %s * 0.25)", V = "p.Cd = sound3(p.Cd + %s)",
   Q = "p.turn = sound4(%s * p.turn)", B = "if %s then p.g = p.g + 1 end", T = "if %s == \"a\" then p.g = 3 end",
@@ -146,7 +146,7 @@ templates.atoms, templates.composed = by_kind(atoms), by_kind(composed)
 local all_stores = { [true] = stores, [false] = joined(stores, stores.pointwise) }
 function templates.stores(only_lanes) return all_stores[only_lanes] end
 
--- Special and other values of all types, for the points of a scene.
+-- Special and ordinary values of all types, for the points of a scene.
 templates.points = [[
 local list = { P = {}, v = {}, Cd = {}, f = {}, orient = {}, instance = {}, name = {} }
 local values = { 0, -0, 1, -1, 0.5, -2.25, 3, 1e-45, -1e-40, 0.1, 7, 1e5, -3e38, 3.4e38, 16777217, 1.5, -0.75, 2 }
@@ -171,7 +171,7 @@ templates.graph = [[
     end)
   :group { name = "a", where = function(p) return p.id % 3 == 0 end }]]
 
--- The first lines of kernels, by their place in the chain.
+-- The first lines of kernels, by their position in the chain.
 templates.openings = {
   points = "  :points { name = \"k%d\", reads = names, writes = names, kernel = function(p, frame)",
   vararg = "  :points { name = \"k%d\", reads = names, writes = names, kernel = function(...) local p, frame = ...",

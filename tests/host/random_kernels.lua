@@ -1,10 +1,10 @@
--- Makes scenes of random kernels. A seed and a number give the same scene everywhere.
+-- Makes scenes of random kernels. A seed and a number give the same scene on every machine.
 --
 --   local random_kernels = require "tests.host.random_kernels"     from the folder of the project
 --   random_kernels.start(seed, number)
 --   local made = random_kernels.scene()      its statements as a tree, { kernels = ... }
---   random_kernels.text(made)                the scene; it expects `rapid` to be there
---   random_kernels.modules(made)             the nodes in Lua that it uses: their texts by name
+--   random_kernels.text(made)                the scene; it expects that `rapid` exists
+--   random_kernels.modules(made)             the Lua nodes that it uses: their source by name
 --
 -- Expressions and statements are expanded from templates (kernel_templates.lua).
 local lehmer = require "tests.lehmer"
@@ -20,12 +20,12 @@ local kinds = {}
 for kind in pairs(templates.plain) do kinds[#kinds + 1] = kind end
 table.sort(kinds)
 
--- A scope has the names of variables by kind, and whether
---   p, frame, params     these are there
+-- A scope contains the names of variables by kind, and these flags:
+--   p, frame, params     these names exist
 --   is_step, is_birth    the frame is the step of an action, or has no detail values
---   is_pure              the point may not be changed
+--   is_pure              the point must not be changed
 --   computes_names       the node declares the attributes that are named by an expression
---   only_lanes           what no program of lanes can do is left out
+--   only_lanes           constructs that lane programs do not support are excluded
 local function inner(scope)
   local result = { calls = {} }
   for name, value in pairs(scope) do result[name] = value end
@@ -137,7 +137,7 @@ local function observation_of(kind, name, scope)
   return (templates.observations[kind]:gsub("%%s", name))
 end
 
--- Stores what depends on one of the last variables of a kind.
+-- Stores a value that depends on one of the last variables of a kind.
 local function observe(scope)
   local kind = pick(local_kinds)
   local names = scope[kind]
@@ -203,7 +203,7 @@ local function loop(scope, depth)
   end
   if scope.only_lanes or chance(0.7) then return { ("for %s = %s do"):format(name, first), body, "end" } end
   if chance(0.3) then return { ("for _, %s in ipairs(shared.list) do"):format(name), body, "end" } end
-  -- A statement of the body may assign the variable that it sees.
+  -- A statement of the body may assign the loop variable.
   return { ("do local turns = 0 while turns < %d do turns = turns + 1 local %s = turns"):format(1 + below(3), name),
            body, "end end" }
 end
@@ -221,7 +221,7 @@ local function early_return(scope, depth)
   return { ("if %s then"):format(expression("B", scope, 2)), list, "end" }
 end
 
--- Makes a function within the kernel, which sees the locals around it.
+-- Makes a function within the kernel that uses the locals around it.
 local function nested(scope, depth)
   if depth == 0 or scope.only_lanes then return nil end
   local within = inner(scope)
@@ -279,7 +279,7 @@ end
 
 local places = { "points", "points", "points", "points", "vararg", "group", "action", "delete", "node" }
 
--- Returns a kernel: its place in the chain, and its body.
+-- Returns a kernel: its position in the chain, and its body.
 local function kernel(number, scope, given_place)
   local place = given_place or pick(places)
   local within = inner(scope)

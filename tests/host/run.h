@@ -1,4 +1,4 @@
-// A scene that is read anew, to be advanced frame by frame.
+// A newly loaded scene, to be advanced frame by frame.
 #pragma once
 
 #include <filesystem>

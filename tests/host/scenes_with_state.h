@@ -1,5 +1,5 @@
-// Scenes whose nodes keep something from frame to frame, by what they are about. Small, and together of nearly all node
-// types: test_snapshots.cpp tries the others with their defaults.
+// Scenes whose nodes keep state between frames, by subject. They are small, and together cover nearly all node types;
+// test_snapshots.cpp tries the remaining types with their defaults.
 #pragma once
 
 #include <string>

@@ -1,9 +1,9 @@
--- Makes a scene of random kernels (random_kernels.lua) smaller while it keeps its fault.
+-- Shrinks a scene of random kernels (random_kernels.lua) while it keeps its fault.
 --
---   shrink(made, is_faulty)     changes made; is_faulty() judges it as it is now
+--   shrink(made, is_faulty)     changes made; is_faulty() tests it in its current form
 --
--- Kernels, functions and statements are removed one by one, and branches are replaced by their statements, until no
--- single step keeps the fault.
+-- Removes kernels, functions and statements one by one, and replaces branches by their statements, until no single step
+-- keeps the fault.
 
 -- Returns all blocks of a tree.
 local function blocks_of(part, found)

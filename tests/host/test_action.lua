@@ -1,4 +1,4 @@
--- :action: a kernel inside Solve, at every sub-step.
+-- :action: a kernel inside Solve, at every substep.
 local scene = require "testing.scene"
 
 -- A unit mass on the circle a = -P.
@@ -21,7 +21,7 @@ return rapid.create { fps = 10, start = 3, points = two } :attribute { calls = 0
     p.calls, p.time, p.spent, p.last = p.calls + 1, p.time + step.time, p.spent + step.dt, step.index
   end) :solve { substeps = 4 }]], { frames = {3, 5} })[5]
     assert.equal(8, points[1].calls)
-    assert.near(8 * 0.1, points[1].time, 1e-6) -- the middles of 0 to 0.2 s
+    assert.near(8 * 0.1, points[1].time, 1e-6) -- the midpoints of the substeps from 0 to 0.2 s
     assert.near(0.2, points[1].spent, 1e-6)
     assert.equal(3, points[1].last)
   end)

@@ -1,4 +1,4 @@
--- Messages and warnings that say what would be right.
+-- Messages and warnings that suggest a correction.
 local scene = require "testing.scene"
 
 local points = "rapid.points.from { P = {{0, 1, 0}} }"
@@ -159,7 +159,7 @@ describe("a warning", function()
       warnings(dropped:format ""))
     expect('node "k": leads to no output', warnings [[local c = rapid.create { points = POINTS } :gravity {} :solve {}
       c:points("k", function(p) p.v = p.P end) return c]])
-    -- What is left out on purpose.
+    -- Correct uses, for which no warning is given.
     for _, text in ipairs {
       "local c = rapid.create { points = POINTS } :gravity {} local other = c:wind {} :solve {} return c:solve {}",
       "local other = rapid.create { points = POINTS } :wind {} return rapid.create { points = POINTS } :solve {}",
@@ -206,7 +206,7 @@ describe("a warning", function()
       chain:format("", "birth = function(p) p.P = p.P * 2 end", "", ""),
       "return rapid.create { points = POINTS } :solve {} :points('k', function(p) p.P = p.P * 2 end)",
     } do assert.equal("", warnings(text)) end
-    -- What follows the advice has the same places, and velocities.
+    -- The scene that follows the advice has the same positions and velocities.
     local function frame_of(text) return scene.run(chain:format("", "", text, ""), { frames = {1, 9} })[9] end
     local moved = frame_of "local place = vec3(frame.time * p.id, 1, 0) p.P = place"
     local driven = frame_of "local place = vec3(frame.time * p.id, 1, 0) p.v = (place - p.P) / frame.dt"

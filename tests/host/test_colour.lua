@@ -1,4 +1,4 @@
--- Points without a colour, beside points that have one.
+-- Points without a colour, in one set with points that have one.
 local command = require "testing.command"
 
 describe("Cd", function()

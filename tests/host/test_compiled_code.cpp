@@ -24,7 +24,7 @@ void* allocate(void* data, void* block, std::size_t, std::size_t new_size)
     return std::realloc(block, new_size);
 }
 
-// The requests of a loop that makes 10,000 strings and tables.
+// Counts the allocations of a loop that creates 10,000 strings and tables.
 Requests run(const char* mode)
 {
     Requests requests;

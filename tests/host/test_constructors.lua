@@ -12,7 +12,7 @@ local function each(points, f)
   for i = 1, #points do f(points[i].P) end
 end
 
--- The place where a point that falls from (x, 10, z) comes to rest on a shape.
+-- Returns the height at which a point that falls from (x, 10, z) comes to rest on a shape.
 local function height(shape, x, z, before)
   local text = [[
 %s return rapid.create { points = rapid.points.from { P = {{%g, 10, %g}} } } :gravity {}
@@ -29,7 +29,7 @@ describe("rapid.mesh", function()
   it(".sphere has its points on a sphere", function()
     local points = born "rapid.mesh.sphere { radius = 2, divisions = 48, center = {1, 2, 3} }"
     assert.equal(2000, #points)
-    -- A chord over 1/48 of the circle sags by r (1 - cos(pi/48)); twice that where both directions add up.
+    -- A chord over 1/48 of the circle sags by r (1 - cos(pi/48)). The sag doubles if it occurs in both directions.
     local sag = 2 * 2 * (1 - math.cos(math.pi / 48))
     each(points, function(P) assert.near(2 - sag / 2, (P - vec3(1, 2, 3)):length(), sag / 2 + 1e-5) end)
   end)
@@ -151,7 +151,7 @@ describe("rapid.shape", function()
   end)
 
   it("bears points on it, evenly by area, and in it, evenly by volume", function()
-    -- The mean of f within five standard errors of its mean over the whole shape; sigma is f's deviation there.
+    -- Checks that the mean of f is within five standard errors of its exact mean; sigma is the standard deviation of f.
     local function mean_is(expected, sigma, points, f)
       local sum = 0
       each(points, function(P) sum = sum + f(P) end)
@@ -174,7 +174,7 @@ describe("rapid.shape", function()
     mean_is(1, 2 / math.sqrt(5), points, function(P) return P.x end)
 
     points = born(box)
-    -- Faces of 2 x 4, 1 x 4 and 1 x 2, of 28 m² in all.
+    -- Faces of 2 x 4, 1 x 4 and 1 x 2, 28 m² in total.
     for axis, part in pairs { x = 16 / 28, y = 8 / 28, z = 4 / 28 } do
       local half = ({ x = 0.5, y = 1, z = 2 })[axis]
       mean_is(part, math.sqrt(part * (1 - part)), points, function(P)

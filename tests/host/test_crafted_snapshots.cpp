@@ -1,9 +1,8 @@
-// Snapshots that are made to do harm: those of runs with values that no run would leave, and a checksum that is right.
-// The run behind one goes on, or ends with an error; none ends the process by a signal, or takes more than ten seconds
-// of the processor.
+// Malicious snapshots: real ones with values that no run would store, and a valid checksum. A run resumed from one
+// continues or ends with an error. None crashes the process, or takes more than ten seconds of processor time.
 //
-//   RAPID_CRAFTED=10000 build/test/bin/test_host "[crafted]"        as many in all (300)
-//   RAPID_CRAFTED_FIRST=2000 build/test/bin/test_host "[crafted]"   from this one on (0), as far as RAPID_CRAFTED
+//   RAPID_CRAFTED=10000 build/test/bin/test_host "[crafted]"        the total number of snapshots (300)
+//   RAPID_CRAFTED_FIRST=2000 build/test/bin/test_host "[crafted]"   the first of them (0); RAPID_CRAFTED is the end
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -41,7 +40,7 @@ std::vector<std::pair<std::string, fs::path>> scenes(const fs::path& folder)
     return files;
 }
 
-// What the process that goes on behind them tells.
+// The report of the process that resumes from the snapshots.
 struct Report {
     int next, gone_on, refused;
 };
@@ -74,7 +73,7 @@ void go_on_behind(const SavedState& state, const fs::path& scene)
 
 }  // namespace
 
-// In a process of its own: see below. RAPID_TEST_SNAPSHOT: the folder.
+// Runs in a separate process: see below. RAPID_TEST_SNAPSHOT: the folder.
 TEST_CASE("goes on behind crafted snapshots", "[.]")
 {
     const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");

@@ -123,7 +123,7 @@ return rapid.create { fps = 24 } :emit { source = two, count = 2, velocity = {0,
   end)
 
   it("kills, adds and sorts in any order", function()
-    -- Heats 1, 2, 3, 4: the last is killed, then all are turned round, then the one with heat 2.
+    -- Heats 1, 2, 3, 4: the last point is killed, then the order is reversed, then the point with heat 2 is killed.
     local points = run([[
 if frame.number == 2 then
   points:kill(4) points:add { heat = 9 } points[1]:join "g"
@@ -272,7 +272,7 @@ return rapid.create { points = two } :attribute { n = 0 } :count { radius = %s }
 end)
 
 describe("points.events", function()
-  -- A ball falls from 1 m, hits the floor once a bounce, and one of 0.3 s of life dies on the way.
+  -- A ball falls from 1 m and hits the floor once per bounce; another, with a life of 0.3 s, dies on the way.
   local function text(before, after)
     return ([[
 return rapid.create { fps = 24, points = rapid.points.from {

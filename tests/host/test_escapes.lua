@@ -1,19 +1,20 @@
--- Attempts to escape the sandbox: each ends in an error that names the file and the line, and has no effect.
+-- Attempts to escape the sandbox. Each ends in an error with file and line, and has no effect.
 --
--- An attempt is a piece of graph code that raises no error if it works. It is made wherever graph code runs.
+-- An attempt is a piece of graph code that raises no error if it works. It is tried in every place that runs graph
+-- code.
 local places = require "tests.script_places"
 local scene = require "testing.scene"
 
 local bytecode = ("%q"):format(string.dump(function() return 1 end)):gsub("\n", "n")
 
--- In files beside the graph.
+-- Files next to the graph.
 local files = {
   module = "\n%s",
   node = "return require 'rapid'.node { name = 'guest', doc = 'A guest.', points = function(p)\n%s\nend }",
 }
 
--- The message of a scene that must fail, without its place, and the place. LuaJIT has no room left to tell the line
--- where a body has filled the stack.
+-- Returns the message of a scene that must fail, without its position, and the position. If a body has filled the
+-- stack, LuaJIT has no room left to report the line.
 local function refused(text)
   local message = scene.error(text, { frames = {1, 2} })
   local place = message:match "^[%w_]+%.lua:%d+" or message:match "^scene%.lua: stack overflow: a function calls"
@@ -25,7 +26,7 @@ local function nothing(name) return ("attempt to index global '%s' (a nil value)
 local function no_call(name) return ("attempt to call global '%s' (a nil value)"):format(name) end
 local function no_field(name) return ("attempt to call field '%s' (a nil value)"):format(name) end
 
--- Names that do not exist in any place.
+-- Names that exist in no place.
 local absent = {
   ["files by io.open"] = { "io.open('escaped', 'w')", nothing "io" },
   ["files by io.lines"] = { "for line in io.lines '/etc/passwd' do print(line) end", nothing "io" },
@@ -55,7 +56,7 @@ local absent = {
   ["chance by math.random"] = { "math.random()", no_field "random" },
 }
 
--- Names that exist and refuse.
+-- Names that exist but refuse the use.
 local firm = {
   ["the metatable of strings"] = { "getmetatable('').__index.rep = print", "attempt to index a nil value" },
   ["the methods of strings"] = { "local s = 'x' s.rep = print", "attempt to index local 's' (a string value)" },
@@ -84,7 +85,7 @@ local firm = {
     "(('x'):rep(300000)):match(('x?'):rep(300000) .. ('x'):rep(300000))", "pattern too complex" },
 }
 
--- What only the body of a graph, or of a module, may do at all.
+-- Uses that are legal only in the body of a graph or a module.
 local loading = {
   ["a library as a module"] = { "require 'ffi'", 'no module "ffi"' },
   ["inner modules of the compiler"] = { "require 'jit.util'", 'no module "jit.util"' },
@@ -125,7 +126,7 @@ describe("a way out", function()
       count = count + 1
       for where, text in pairs(places) do
         local message, place = refused(text:format(code))
-        -- What there is instead comes after.
+        -- The existing names follow.
         assert.equal(expected, message:sub(1, #expected), where .. ": " .. name)
         assert.equal("scene.lua:2", place, where .. ": " .. name)
       end
@@ -139,7 +140,7 @@ describe("a way out", function()
     each(firm, function(name, code, expected)
       count = count + 1
       for where, text in pairs(places) do
-        -- What a kernel assigns to what all points share is refused before it runs.
+        -- A kernel's assignment to shared values is refused before it runs.
         local before = (where ~= "body" and where ~= "parameter") and "that all points share" or expected
         local message, place = refused(text:format(code))
         assert.truthy(message:find(expected, 1, true) or message:find(before, 1, true), where .. ": " .. name .. ": " ..
@@ -216,14 +217,14 @@ describe("a way out", function()
   end)
 end)
 
--- Things that a function has been given, and their methods, kept after their object is gone. Whoever keeps
--- them does so in a coroutine, out of sight of the bytecode's reader.
+-- Objects that a function has received, and their methods, stored beyond their lifetime. They are stored in a
+-- coroutine, where the bytecode analysis does not find them.
 describe("a value kept for later", function()
   local keep = [[
 local keeper = coroutine.wrap(function(kept) while true do kept = coroutine.yield(kept) or kept end end)
 local held = { keeper } ballast = {} for i = 1, 20000 do ballast[i] = i end
 ]]
-  -- Uses in frame 3, outside, what a node before has kept in frame 2.
+  -- Uses, in frame 3, a value that an earlier node stored in frame 2.
   local function message_of(chain, use)
     local message = scene.error((keep .. [[
 return rapid.create { points = two } :attribute { heat = 0 } %s
@@ -333,9 +334,9 @@ describe("a bomb", function()
     for where, text in pairs(places) do
       for _, code in ipairs { "local t = {} for i = 1, 1e9 do t[i] = { i } end", "print(#('x'):rep(1e9))" } do
         local result = scene.command("run", text:format(code), "-f 1-3 --script-memory 32M --quiet")
-        -- Functions of the frame are asked for the first time before it.
+        -- Functions of the frame are called for the first time before that.
         assert.equal((where == "body" or where == "parameter") and 2 or 1, result.status, where)
-        -- Where a body has filled the memory, the line is not known.
+        -- If a body has filled the memory, the line is unknown.
         local place = where == "body" and "^scene.lua:[%d: ]+" or "^scene.lua:%d+: "
         assert.truthy(result.stderr:find(place .. ".*the script needs more than 32 MiB of Lua memory; " ..
           "%-%-script%-memory sets the limit"), where .. ": " .. result.stderr)

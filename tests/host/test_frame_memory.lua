@@ -1,16 +1,16 @@
--- What a run of many frames keeps: nothing that grows with their number.
+-- The memory of a run does not grow with its number of frames.
 local amount = require "tests.amount"
 local json = require "dkjson"
 local scene = require "testing.scene"
 
--- The peak of a run's memory in MiB, after so many frames.
+-- Returns a run's peak memory in MiB after this many frames.
 local function peak(text, frames, arguments)
   local result = scene.command("run", text, ("-f 1-%d --threads 2 %s"):format(frames, arguments or ""))
   assert.equal("", result.stderr)
   return tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak"), result.stdout
 end
 
--- A ball that is another level set in each frame, of about 400 kB.
+-- A ball that is a new level set of about 400 kB in each frame.
 local ball = [[return rapid.create { points = two } :collide { shape = function(frame)
   return rapid.levelset.sphere { radius = 0.5 + 0.001 * (frame.number % 97), voxel = 0.05 }
 end } :gravity {} :solve {}]]
@@ -52,7 +52,7 @@ describe("the memory of a run", function()
     end
   end)
 
-  -- The peak varies by a few MiB with the moments of collections; 300 surfaces are hundreds.
+  -- The peak varies by a few MiB with the timing of collections; 300 surfaces take hundreds.
   it_if_thorough("holds no surface of earlier frames where pictures show it", function()
     local small = "--size 32x18 -o picture.####.png"
     local few, many = peak(ball, 150, small), peak(ball, 450, small)

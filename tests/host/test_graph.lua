@@ -173,7 +173,7 @@ return rapid.create {} :gravity { group = "hot" } :solve {}]])
   end)
 
   it("takes its per-point parameters from an attribute", function()
-    -- Both fall from 0.1 m and bounce: with bounce 0 one stays, with bounce 1 the other is back at its top.
+    -- Both fall from 0.1 m and bounce: with bounce 0 one stays, with bounce 1 the other is back at its apex.
     local result = scene.run([[
 local points = rapid.points.from { P = {{0, 0.1, 0}, {1, 0.1, 0}}, springy = {0, 1} }
 return rapid.create { points = points, fps = 100 } :gravity { g = {0, -20, 0} }
@@ -196,7 +196,7 @@ describe("a parameter that is a function of the frame", function()
     local result = scene.run([[
 return rapid.create { points = two, fps = 10 }
   :gravity { g = function(frame) return vec3(frame.number, frame.time, frame.dt) end } :solve {}]], { frames = {1, 4} })
-    -- v = sum over the frames 2 to 4 of g dt, in the middle of each
+    -- v = sum over the frames 2 to 4 of g dt, with g at the midpoint of each
     assert.near({0.1 * (1.5 + 2.5 + 3.5), 0.1 * (0.05 + 0.15 + 0.25), 3 * 0.01}, result[4][1].v, 1e-6)
   end)
 

@@ -1,15 +1,15 @@
--- Kernels that keep something from point to point and hide it from the reader of their bytecode.
+-- Kernels that keep state from point to point and hide it from the bytecode analysis.
 local scene = require "testing.scene"
 
 local of_a_point = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or do " ..
   "it once for the whole set in :detail"
 
--- S: a table that all points share; push, keeper: a function and a coroutine that are; wrap: a further table of both.
+-- S: a table shared by all points; push, keeper: a shared function and a shared coroutine; wrap: a table of S and push.
 local before = "local S = { n = 0, list = {} } local function push(t, x) t[#t + 1] = x end " ..
   "local keeper = coroutine.wrap(function(k) while true do k = coroutine.yield(k) or k end end) " ..
   "local wrap = { S, push, push = push } "
 
--- Found in the bytecode.
+-- Found by the bytecode analysis.
 local seen = {
   ["setmetatable(S, {})"] = "changes a table that all points share by setmetatable",
   ["setmetatable(S.list, nil)"] = "changes a table that all points share by setmetatable",
@@ -25,7 +25,7 @@ local seen = {
     "makes a table that all points share the __newindex of another",
 }
 
--- Found when it runs.
+-- Found at run time.
 local found = {
   ["local held = { S } held[1].n = held[1].n + 1"] = "n",
   ["local held = { S } rawequal(held, S) local t = held[1] t.more = 1"] = "more",
@@ -48,7 +48,7 @@ local found = {
 describe("a kernel with hidden state", function()
   it("is refused before the first frame where its bytecode shows it", function()
     for body, expected in pairs(seen) do
-      -- In line 1 where it is the helper that writes.
+      -- The position is in line 1 if the helper does the assignment.
       local message = scene.kernel_error(body, nil, before):gsub("^scene%.lua:[12]: ", "")
       assert.equal(('node "kernel": the kernel %s%s'):format(expected, of_a_point), message, body)
     end

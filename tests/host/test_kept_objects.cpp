@@ -1,4 +1,4 @@
-// What a run of many frames keeps, by count: the peak of a process's memory tells as much only within a few MiB.
+// The number of objects that a run of many frames keeps. A process's peak memory shows this only within a few MiB.
 #include <malloc.h>
 #include <tbb/global_control.h>
 
@@ -13,7 +13,7 @@
 namespace rapid {
 namespace {
 
-// A graph on one thread, frame by frame.
+// Runs a graph on one thread, frame by frame.
 class KeptRun {
 public:
     explicit KeptRun(const std::string& text)
@@ -25,7 +25,7 @@ public:
 
     Evaluator& evaluator() { return evaluator_; }
 
-    // What the first function among the nodes' arguments returns.
+    // Returns the result of the first function among the nodes' arguments.
     ObjectPtr shape_at(double frame) const
     {
         for (const NodePtr& node : session_.graph().nodes)
@@ -57,8 +57,8 @@ std::size_t bytes_in_use()
     return now.uordblks + now.hblkhd;
 }
 
-// The most level sets that are alive at once while the function of a scene is asked for `frames` of them, and what one
-// of them takes.
+// Requests `frames` level sets from the function of a scene; records the maximum number alive at once, and the size of
+// one.
 struct Alive {
     std::size_t most = 0;
     double bytes = 0;
@@ -78,7 +78,7 @@ struct Alive {
     }
 };
 
-// The most bytes that are in use after any of the frames up to `last`, counted after the first of them.
+// Returns the maximum of the bytes in use after each frame up to `last`.
 std::size_t most_bytes(Evaluator& evaluator, std::int64_t last)
 {
     std::size_t most = 0;
@@ -93,10 +93,9 @@ std::size_t most_bytes(Evaluator& evaluator, std::int64_t last)
 
 TEST_CASE("of level sets that are another one in each frame a few are alive, not one a frame", "[kept][long]")
 {
-    constexpr double uncollected = 16 << 20;  // bytes, which the collector lets be
+    constexpr double uncollected = 16 << 20;  // bytes below which the collector does not run
     for (const double voxel : {0.2, 0.02}) {
-        // Two of the cache, one that the caller holds, and what has not been collected: of what is heavier than
-        // `uncollected` as much as again.
+        // Two in the cache, one held by the caller, and uncollected ones of at most twice `uncollected`.
         const Alive few(ball(voxel), 40), many(ball(voxel), 200);
         CAPTURE(voxel, few.bytes, few.most, many.most);
         CHECK(few.bytes > 1e6);
@@ -133,7 +132,7 @@ TEST_CASE("sessions that are stopped before their libraries are loaded leave not
     stopped_session();
     const std::size_t before = bytes_in_use();
     for (int i = 0; i < 20; ++i) stopped_session();
-    CHECK(bytes_in_use() < before + 20'000);  // a state of Lua has 200,000
+    CHECK(bytes_in_use() < before + 20'000);  // a Lua state has 200,000
 }
 
 }  // namespace rapid

@@ -116,7 +116,7 @@ describe("p.dt", function()
 return rapid.create { fps = 10 } :emit { source = rapid.points.from { P = {{0, 0, 0}} }, count = 4, birth = "even" }
   :attribute { first = -1, last = -1 }
   :points("k", function(p) if p.first < 0 then p.first = p.dt end p.last = p.dt end) :solve {}]], { frames = {2, 3} })
-    -- With count, birth = "even" bears number k at (k+1)/count of the frame.
+    -- With count and birth = "even", point k is born at (k+1)/count of the frame.
     for k = 0, 3 do
       assert.near(0.1 * (1 - (k + 1) / 4), result[2]:by_id(k).first, 1e-7)
       assert.near(0.1, result[3]:by_id(k).last, 1e-7)
@@ -274,7 +274,7 @@ describe("a kernel that writes what can't be kept", function()
       ["p.hitnum = 1.5"] = 'attribute "hitnum" takes a whole number, not 1.5',
       ["p.hitnum = 3e9"] = 'attribute "hitnum" takes a whole number, not 3000000000',
     } do
-      -- 0 / 0 may be -nan: the sign is nobody's business.
+      -- The sign of 0 / 0 is not defined.
       local message = scene.kernel_error(body, "heat = {1, 2}"):gsub("%-nan", "nan"):gsub("; P = .*%)$", ")")
       assert.equal(place .. expected .. at, message)
     end

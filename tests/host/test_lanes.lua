@@ -1,5 +1,5 @@
--- Kernels as programs of lanes: the same bits as one point at a time, of every construct that they know, and where a
--- tile goes back to the kernel itself. test_random_kernels.lua has random ones.
+-- Lane programs: the same bits as one point at a time, for every construct that they support, and fallback of a tile to
+-- the kernel itself. test_random_kernels.lua has random kernels.
 local scene = require "testing.scene"
 
 -- Points with values of both signs, zeros and large ones, of all types.
@@ -30,7 +30,7 @@ local function values_of(points)
   return lines
 end
 
--- The points of both ways, and the kernels that are no programs.
+-- Returns the points of both modes, and the list of kernels that are not lane programs.
 local function both(text, frames)
   local lanes = scene.run(text, { frames = frames or {1, 4}, watch_lanes = true, threads = 1 })
   local single = scene.run(text, { frames = frames or {1, 4}, watch_traces = true, threads = 1 })
@@ -165,7 +165,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     end
   end)
 
-  -- What even points leave in x, then what odd ones do; a number made of x, and its values for both.
+  -- The value that even points store in x, and odd ones; an expression of x, and its results for both.
   for _, case in ipairs {
     { "vec3(1, 2, 3)", "quat(5, 6, 7, 1)", "x.x", 1, 5 },
     { "p.turn", "p.axis", "x.y", 0, 1 },
@@ -209,7 +209,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     assert.same({}, none)
     assert.same(single, lanes)
     assert.equal(11, frames[4][600].heat)
-    -- In the next kernel of a pass, and where one branch alone assigns.
+    -- Also in the next kernel of a pass, and if only one branch assigns.
     same("p.instance = p.P.x * -0.0",
       ":points(\"next\", function(p) p.heat = 1 / p.instance > 0 and 1 or -1 end)")
     same("if p.P.x > 0 then p.instance = p.P.x * -0.0 end  p.heat = math.atan2(p.instance, -1)")

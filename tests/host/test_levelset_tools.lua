@@ -1,9 +1,9 @@
--- Level-set tools, as graphs call them. Their results are tested in tests/shapes/level_set/test_level_set_tools.cpp.
+-- Level-set tools, called from graphs. tests/shapes/level_set/test_level_set_tools.cpp checks their results.
 local scene = require "testing.scene"
 
 local ball = "rapid.levelset.sphere { radius = 1, voxel = 0.05 }"
 
--- The distance of (x, 0, 0) from a shape.
+-- Returns the distance of (x, 0, 0) from a shape.
 local function distance(shape, x)
   local result = scene.run(([[
 local shape = %s
@@ -24,9 +24,9 @@ describe("a level set", function()
     assert.near(0.05, distance(ball .. ":intersect(" .. other .. ")", 1.05), 1e-2)
     assert.near(0.05, distance(ball .. ":subtract(" .. other .. ")", -1.05), 1e-3)
     assert.near(-0.05, distance(ball .. ":offset(0.1)", 1.05), 1e-3)
-    -- Twice a variance of 8/3 voxel² along each axis: the distance grows by that over the radius.
+    -- Twice a variance of 8/3 voxel² along each axis: the distance grows by this divided by the radius.
     assert.near(0.05 + 2 * 8 / 3 * 0.05 ^ 2, distance(ball .. ":smooth { iterations = 2 }", 1.05), 1e-3)
-    -- The mesh that it is resampled from is 0.4 voxel² / r inside the ball; a cell interpolates to voxel² / 4r.
+    -- The mesh from which it is resampled is 0.4 voxel² / r inside the ball; a cell interpolates to voxel² / 4r.
     assert.near(0.05, distance(ball .. ":resample(0.04)", 1.05), 0.4 * 0.05 ^ 2 + 0.04 ^ 2 / 4)
     assert.near(0.05, distance(ball .. ":transform(rapid.rotate({0, 1, 0}, 20) * rapid.scale(2))", 2.05), 1e-3)
   end)

@@ -1,4 +1,4 @@
-// Functions of the frame that return an object: with equal arguments it is not built again.
+// Functions of the frame that return an object do not rebuild it for equal arguments.
 #include "bindings/host/maker_cache.h"
 
 #include <cstdlib>
@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A graph file in a folder of its own.
+// A graph file in its own folder.
 class GraphFile {
 public:
     explicit GraphFile(const std::string& text) : path_(folder_.write("scene.lua", text)) {}
@@ -24,7 +24,7 @@ private:
     fs::path path_;
 };
 
-// What the first function among the nodes' arguments returns at a frame.
+// Returns the result of the first function among the nodes' arguments at a frame.
 ObjectPtr shape_at(const Session& session, double frame)
 {
     for (const NodePtr& node : session.graph().nodes)

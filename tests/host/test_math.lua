@@ -1,7 +1,7 @@
--- rapid.math in kernels: closed forms, the noises of the C++ runtime to the bit, refused arguments.
+-- rapid.math in kernels: closed forms, noises bit-identical to the C++ runtime, refused arguments.
 local scene = require "testing.scene"
 
--- x, as a kernel computes it and keeps it: a double's bits in three floats.
+-- Returns x as a kernel computes it: the bits of a double are stored in three floats.
 local function value(expression)
   local points = scene.kernel(("local x = %s p.a = x p.b = x - p.a p.c = x - p.a - p.b"):format(expression),
     "a = {0, 0}, b = {0, 0}, c = {0, 0}")
@@ -37,7 +37,7 @@ describe("rapid.math", function()
   end)
 
   it("has the noises of the runtime, to the bit", function()
-    -- As tests/points/test_noise.cpp has them.
+    -- The same values as in tests/points/test_noise.cpp.
     assert.equal(-0.4088346060220297, value "rapid.math.noise(vec3(0.25, 1.5, -2.75))")
     assert.equal(-0.13869028957850577, value "rapid.math.noise(vec3(100.1, -200.2, 300.3), 0.7, 3, 42)")
     for axis, expected in pairs { x = 0.81774388108413443, y = 1.0055254942500953, z = -0.2152752971438139 } do

@@ -1,13 +1,13 @@
--- --script-memory, at whatever moment it is reached: in the interpreter, and in code that LuaJIT has compiled, which it
--- may have linked to other code since it began.
+-- --script-memory, reached at any moment: in the interpreter, and in code that LuaJIT has compiled and may have linked
+-- to other code since.
 --
---   RAPID_LIMITS=100 build/test/bin/rapid test tests/host/test_memory_limit.lua   as many of each place and program (1)
+--   RAPID_LIMITS=100 build/test/bin/rapid test tests/host/test_memory_limit.lua   runs per place and program (1)
 local amount = require "tests.amount"
 local lehmer = require "tests.lehmer".new(5)
 local places = require "tests.script_places"
 local scene = require "testing.scene"
 
--- Each takes memory without end.
+-- Programs that allocate without end.
 local programs = {
   tables = "local t = {} for i = 1, 1e9 do t[i] = { i } end",
   numbers = "local t = {} for i = 1, 1e9 do t[i] = i end",
@@ -34,7 +34,7 @@ describe("--script-memory", function()
             ("-f 1-2 --quiet --script-memory %d"):format(limit))
           local case = ("%s in %s with %d: %s"):format(name, where, limit, result.stderr)
           assert.truthy(result.status == 1 or result.status == 2, case)
-          -- Where a body has filled the memory, the line is not known.
+          -- If a body has filled the memory, the line is unknown.
           assert.truthy(result.stderr:find(where == "body" and "^scene.lua:" or "^scene.lua:%d+: "), case)
           local message = ("the script needs more than %d MiB of Lua memory; --script-memory sets the limit")
             :format(math.floor(limit / 2 ^ 20))

@@ -12,7 +12,7 @@ local function error_of(text)
   return scene.error("local m = " .. text .. " return rapid.create {} :emit { source = m, rate = 1 } :solve {}")
 end
 
--- Within the speck's size and single precision.
+-- The tolerance covers the speck's size and single precision.
 local function close(wanted, found)
   assert.near(0, (found - wanted):length(), 4e-6)
 end
@@ -45,7 +45,8 @@ describe("a motion", function()
       return rapid.translate(frame.time * 24, 0, 0) * rapid.rotate({0, 0, 1}, 30 * frame.number)
         * rapid.translate(0, 2, 0)
     end)]])
-    -- Halfway the spline is at (9 (p1 + p2) - (p0 + p3)) / 16 of the places around: on a circle a little outside or in.
+    -- Halfway the spline is at (9 (p1 + p2) - (p0 + p3)) / 16 of the positions around it: on a circle this is slightly
+    -- off the arc.
     local angle, half = math.rad(30 * 9.5), math.rad(15)
     local radius = 2 * (9 * math.cos(half) - math.cos(3 * half)) / 8
     close(vec3(8.5 - radius * math.sin(angle), radius * math.cos(angle), 0), result[10]:by_id(33).P)

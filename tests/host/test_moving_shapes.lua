@@ -1,4 +1,4 @@
--- Shapes that move or deform, and meshes, in kernels: as they are in the step.
+-- Moving and deforming shapes, and meshes, in kernels: kernels see them at the time of the step.
 local scene = require "testing.scene"
 
 local function write_squares(name, frames, y)
@@ -33,7 +33,7 @@ return rapid.create { fps = 24, points = two } :attribute { far = 0, way = {0, 0
   end)
 
   it("in an action, at the time of each sub-step", function()
-    -- What is heated gets the place of the plane at its time: y = 2 t² on average over the sub-steps.
+    -- A heated point stores the position of the plane at its time: y = 2 t² on average over the substeps.
     local points = scene.run([[
 local lid = rapid.shape.plane { normal = {0, 1, 0} }:transform(function(frame)
   return rapid.translate(0, 2 * frame.time * frame.time, 0)
@@ -41,7 +41,7 @@ end)
 return rapid.create { fps = 24, points = two } :attribute { sum = 0, n = 0 }
   :action("ask", function(p) p.sum = p.sum + p.P.y - lid:distance(p.P); p.n = p.n + 1 end)
   :solve { substeps = 8 }]], { frames = {13, 13} })[13]
-    -- The middles of 96 sub-steps over 0.5 s: 2/3 T² less 2/12 of a sub-step squared.
+    -- The midpoints of 96 substeps over 0.5 s: 2/3 T² minus 2/12 of a substep squared.
     assert.equal(96, points[1].n)
     local T, h = 0.5, 1 / 24 / 8
     assert.near(2 * (T * T / 3 - h * h / 12), points[1].sum / 96, 1e-4)
@@ -96,7 +96,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, s
         { frames = {11, 11}, threads = threads })[11]
     end
     local one = points(1)
-    -- The keys rest at their ends: the middle of the way is at frame 10.5.
+    -- The motion starts and ends at rest, so the middle of the path is at frame 10.5.
     local p = one[1]
     assert.is_true(#one > 20000)
     local x = (p.P - p.P * 0).x

@@ -1,9 +1,9 @@
 -- Numbers have one meaning: operators, `math` and `bit` give the same bits in lanes, compiled and interpreted, in all
--- code of a scene, and however it is run.
+-- code of a scene, and in every kind of run.
 --
--- Three kernels compute each expression: a program of lanes, if there is one; one that makes a table, which LuaJIT
--- compiles; and one that makes a function, which it interprets. MATH_VALUES is the number of random pairs; 1,024
--- special ones come before them.
+-- Three kernels compute each expression: a lane program, if there is one; one that creates a table, which LuaJIT
+-- compiles; and one that creates a function, which it interprets. MATH_VALUES is the number of random pairs, which
+-- follow 1,024 special ones.
 local amount = require "tests.amount"
 local command = require "testing.command"
 local scene = require "testing.scene"
@@ -37,7 +37,7 @@ local function operands(p)
   if p.id < 1024 then return special(p.id % 32), special(math.floor(p.id / 32)) end
   return scaled(p.x1 + p.x2, p.xe), scaled(p.y1 + p.y2, p.ye)
 end
--- A number as floats: what kind it is and its exponent, and the digits.
+-- Splits a number into floats: its class and exponent, and its digits.
 local function parts_of(x)
   if x ~= x then return 5000, 0 end
   if x == 1 / 0 then return 5001, 0 end
@@ -93,7 +93,7 @@ local function fill(text)
   }))
 end
 
--- before: text in front of the graph. Which expressions are no programs of lanes, by number.
+-- before: text before the graph. Returns the indices of the expressions that are not lane programs.
 local function check(expressions, before)
   local text = { before or "", fill(head) }
   for k, expression in ipairs(expressions) do
@@ -267,7 +267,7 @@ local rapid = require "rapid"
 return rapid.create { seed = 5, points = rapid.points.grid { size = {9999, 0, 0}, spacing = 1 } }
   :attribute { first = 0, second = 0, third = 0 }
 ]] }
-    -- The last digits of a double are those that two floats leave.
+    -- The last digits of a double are those that remain after two floats.
     for k, expression in ipairs(functions) do
       text[#text + 1] = ([[
   :points("lanes%d", function(p) local x, y = p:rand(1) * 2, p:rand(2) + 0.5
@@ -298,7 +298,7 @@ end)
 describe("functions of the whole set and the body of a scene", function()
   it("have the squares of constants, and of text given to load", function()
     local points = scene.run([[
-local x = 825.6962440394036 -- whose square the C library's pow rounds up
+local x = 825.6962440394036 -- the C library's pow rounds its square up
 local found = { 825.6962440394036 ^ 2, x ^ 2, load("return 825.6962440394036 ^ 2")(), math.pow(x, 2) }
 local v = 0
 for k = 1, #found do if found[k] ~= x * x then v = k end end

@@ -1,7 +1,7 @@
 -- rapid.param: values that the command line replaces.
 local scene = require "testing.scene"
 
--- What the parameter is in a scene, as text.
+-- Returns the parameter's value in a scene, as text.
 local function value(default, setting, before)
   local message = scene.error(("%s error(tostring(rapid.param('x', %s)), 0)"):format(before or "", default),
     { set = { x = setting } })

@@ -1,5 +1,4 @@
--- Neighbouring edits share a pass over the points: what comes out is what each by itself, one after the other, makes of
--- them, to the bit.
+-- Neighbouring edits share a pass over the points. The result is bit-identical to that of separate passes.
 local json = require "dkjson"
 local scene = require "testing.scene"
 local lehmer = require "tests.lehmer"
@@ -10,13 +9,13 @@ local head = "local ball = rapid.levelset.sphere { radius = 5, voxel = 1 } " ..
   "return rapid.create { points = rapid.points.grid { size = {26, 20, 20}, spacing = 1 } } " ..
   ":attribute { heat = 0, seen = 0 } "
 
--- Solve ends it, unless one of the nodes is one.
+-- Appends a Solve unless one of the nodes is one.
 local function scene_of(nodes)
   local chain = table.concat(nodes, " ")
   return head .. chain .. (chain:find ":solve" and "" or " :solve {}")
 end
 
--- A node that is no edit of points one by one stands between any two.
+-- Separates the edits by nodes that do not edit points one by one.
 local function apart(edits)
   local nodes = {}
   for k, edit in ipairs(edits) do nodes[k] = edit .. (" :detail('between%d', function() end)"):format(k) end
@@ -31,7 +30,7 @@ local function passes(text)
   return json.decode(result.stdout).passes
 end
 
--- The same points at each frame, on any number of threads, as of the edits one after the other.
+-- Checks that the points of each frame equal those of separate passes, on any number of threads.
 local function check_same(edits, frames)
   local expected = scene.run(apart(edits), { frames = frames or {1, 3}, threads = 1 })
   for _, threads in ipairs { 1, 2, 7 } do
@@ -41,7 +40,7 @@ local function check_same(edits, frames)
   return expected
 end
 
--- The same message.
+-- Checks that the message equals that of separate passes.
 local function check_error(edits, expected)
   local message = scene.error(apart(edits), { threads = 1 })
   assert.truthy(message:find(expected, 1, true), message)
@@ -73,7 +72,7 @@ describe("neighbouring edits of points", function()
       ":points('a', function(p) if p.id % 3 == 0 then p:kill() end end)",
       ":group { name = 'g', where = function(p) assert(p.id % 3 > 0) return p.id % 2 == 0 end }",
       ":delete { where = function(p) assert(p.id % 3 > 0) return p.P.x < -5 end }",
-      -- A level set refuses a place that is no number.
+      -- A level set refuses a position that is NaN.
       ":delete { where = function(p) return ball:distance(p.P / (p.P.x < -5 and 0 or 1)) < 0 end }",
       ":points { name = 'b', group = 'g', kernel = function(p) assert(p.P.x >= -5) p.heat = ball:distance(p.P) end }",
     }
@@ -106,7 +105,7 @@ describe("neighbouring edits of points", function()
       ":points('b', function(p) p.heat = named(p, 'index') end)",
       ":points('b', function(p) local t = setmetatable({}, { __index = p }) p.heat = t.index end)",
       ":delete { where = function(p) return p.index % 5 == 0 end }",
-      -- of what may be the point, or something that all share
+      -- an index of a value that may be the point or a shared table
       ":points('b', function(p) local q = p.id > 5 and p or { index = 3 } p.heat = q.index end)",
       ":points('b', function(p) local q = p.id > 5 and p or noted p.heat = q.index end)",
       ":points('b', function(p) local q = noted for _ = 1, 2 do p.heat = q.index q = p end end)",

@@ -1,4 +1,4 @@
-// The shapes of pictures: of those that are other ones in each frame, two frames' surfaces are kept.
+// The shapes of pictures: if a surface is a new one in each frame, those of two frames are kept.
 #include "bindings/host/picture_scene.h"
 
 #include <memory>
@@ -19,7 +19,8 @@ std::shared_ptr<const PictureScene> described(const std::string& scene, std::int
     return SceneOfPlan(plan).at(frame);
 }
 
-// The most surfaces that are alive at once while the pictures of so many frames are described, and how many there were.
+// Describes the pictures of this many frames. Returns the maximum number of surfaces alive at once, and the number
+// created.
 std::pair<std::size_t, std::size_t> surfaces(const std::string& shape, std::int64_t frames)
 {
     const test::TemporaryFolder folder;
@@ -95,11 +96,11 @@ TEST_CASE("a collider is a vessel in all frames if it encloses a source where th
     const std::int64_t frame = GENERATE(3, 4, 20);
     CAPTURE(frame);
     CHECK(is_vessel(source_at("0.1"), frame));
-    CHECK_FALSE(is_vessel(source_at("0.4"), frame));  // half in it
+    CHECK_FALSE(is_vessel(source_at("0.4"), frame));  // only half of it is inside
     CHECK_FALSE(is_vessel(source_at("5"), frame));
     CHECK(is_vessel(points_at("0.4"), frame));
     CHECK_FALSE(is_vessel(points_at("0.6"), frame));
-    // What points are born from, and collide with, is no vessel of them.
+    // A source of points, and a collider, are not vessels.
     CHECK_FALSE(
         is_vessel("rapid.create { start = 3 } :emit { rate = 9, source = rapid.levelset.box { size = {1, 1, 1}, "
                   "voxel = 0.05 } }",

@@ -1,4 +1,4 @@
-// The table of a point's names against those who spell them: the annotations, and the columns of a set.
+// Compares the table of a point's names with the annotations and the columns of a set.
 #include <fstream>
 #include <regex>
 #include <sstream>

@@ -1,12 +1,12 @@
--- pcall, xpcall, coroutines, table.sort and string.gsub as scripts have them: what ended the process in LuaJIT's own.
+-- pcall, xpcall, coroutines, table.sort and string.gsub in scripts: uses that would crash LuaJIT's own versions.
 local scene = require "testing.scene"
 
--- The value of an expression, as text, behind statements of graph code.
+-- Returns the value of an expression as text, after statements of graph code.
 local function text_of(before, expression)
   return (scene.error(("%s\nerror(tostring(%s), 0)"):format(before, expression)):gsub("^scene%.lua:%d+: ", ""))
 end
 
--- Runs graph code in a process of its own; returns its result.
+-- Runs graph code in a separate process; returns its result.
 local function run_alone(text, arguments)
   return scene.command("run", text .. "\nreturn rapid.create { points = two } :solve {}", "-f 1-3 --quiet " ..
     (arguments or ""))
@@ -107,7 +107,7 @@ describe("a weak table", function()
     end
   end)
 
-  -- What the collector takes is gone from the table before its finalizer runs: an object is whole, or nil.
+  -- A collected object leaves the table before its finalizer runs, so a lookup gives a whole object, or nil.
   it("that is made so later gives back what is alive, where a key is looked up", function()
     for _, mode in ipairs { "k", "v", "kv" } do
       local result = run_alone(([[

@@ -1,9 +1,9 @@
--- quat in kernels: turns against numbers worked out by hand, the attribute that keeps one, refused arguments.
+-- quat in kernels: rotations checked against hand-computed numbers, an attribute of this type, refused arguments.
 local scene = require "testing.scene"
 
 local half = math.sqrt(0.5)
 
--- What an expression of a kernel gives: a vec3, or a quat.
+-- Returns the result of an expression in a kernel: a vec3, or a quat.
 local function turned(expression) return scene.kernel("p.P = " .. expression)[1].P end
 local function turn(expression)
   return scene.kernel("p.q = " .. expression, "q = {{0, 0, 0, 1}, {0, 0, 0, 1}}")[1].q

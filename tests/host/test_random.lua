@@ -1,7 +1,7 @@
--- p:rand: numbers that depend on seed, node, id and use alone.
+-- p:rand: numbers that depend only on seed, node, id and use.
 local scene = require "testing.scene"
 
--- 8,000 points whose attribute `r` is the value of an expression of p and frame, at frame 2.
+-- Returns 8,000 points whose attribute `r` is the value of an expression of p and frame, at frame 2.
 local function drawn(expression, options, before)
   options = options or {}
   local text = [[
@@ -36,11 +36,11 @@ describe("p:rand", function()
     local numbers, points = drawn "p:rand(1)"
     assert.truthy(points:min "r" >= 0)
     assert.truthy(points:max "r" < 1)
-    -- Of n = 8,000 uniform numbers: five standard errors, sqrt(1/12/n) of the mean and sqrt(1/180/n) of the variance.
+    -- For n = 8,000 uniform numbers: five standard errors, sqrt(1/12/n) of the mean and sqrt(1/180/n) of the variance.
     local mean = mean_of(numbers, function(x) return x end)
     assert.near(0.5, mean, 5 * math.sqrt(1 / 12 / 8000))
     assert.near(1 / 12, mean_of(numbers, function(x) return (x - mean) ^ 2 end), 5 * math.sqrt(1 / 180 / 8000))
-    -- Ten bins, chi squared with 9 degrees of freedom: above 33.7 once in 10,000 times.
+    -- Ten bins, chi squared with 9 degrees of freedom: the probability of a value above 33.7 is 1 in 10,000.
     local bins, chi = {}, 0
     for id = 0, 7999 do
       local bin = math.floor(numbers[id] * 10)
@@ -51,7 +51,7 @@ describe("p:rand", function()
   end)
 
   it("has more digits than a float keeps", function()
-    -- The rest below 2^-32 of each number: were it 0, numbers would have 32 bits.
+    -- The remainder of each number below 2^-32. If it were 0, numbers would have 32 bits.
     local _, points = drawn "(p:rand(1) * 2^32) % 1"
     assert.near(0.5, points:mean "r", 5 * math.sqrt(1 / 12 / 8000))
   end)
@@ -74,7 +74,7 @@ describe("p:rand", function()
 
   it("is another for another use, seed, node or point", function()
     local numbers = drawn "p:rand(1)"
-    -- Five standard errors of a correlation of nothing, 1/sqrt(n).
+    -- Five standard errors of the correlation of independent numbers, 1/sqrt(n).
     local bound = 5 / math.sqrt(8000)
     for _, other in ipairs {
       drawn "p:rand(2)", drawn "p:rand(1.5)", drawn "p:rand(-1)", drawn "p:rand(0)", drawn("p:rand(1)", { seed = 8 }),

@@ -1,9 +1,9 @@
--- Random kernels (random_kernels.lua makes them) have the same bits, or the same error, in lanes on any number of
--- threads, traced and interpreted.
+-- Random kernels (from random_kernels.lua) have the same bits, or the same error, in lanes on any number of threads,
+-- traced and interpreted.
 --
 -- The suite runs a few. RANDOM_KERNELS=13000 RANDOM_KERNELS_SEED=7 rapid test tests/host/test_random_kernels.lua runs
--- more, and others. A scene that fails is shown with its seed and number. Statements that its fault does not need are
--- removed first.
+-- more, and others. A scene that fails is shown with its seed and number, without the statements that its fault does
+-- not need.
 local amount = require "tests.amount"
 local command = require "testing.command"
 local kernel_modes = require "tests.host.kernel_modes"
@@ -12,7 +12,7 @@ local shrink = require "tests.host.shrink"
 
 local kernels = amount.of("RANDOM_KERNELS", 130)
 local seed = tonumber(os.getenv "RANDOM_KERNELS_SEED") or 1
-local batch = 50 -- scenes for each process that interprets
+local batch = 50 -- scenes per interpreting process
 
 local function write_scene(folder, made)
   local function write(name, text)
@@ -73,7 +73,7 @@ describe("random kernels", function()
           local text = smallest(scene.folder, scene.made, fault)
           faults[#faults + 1] = ("scene %d of seed %d: %s"):format(scene.number, seed, text)
         end
-        collectgarbage() -- the collector does not count what a result holds outside of Lua
+        collectgarbage() -- the collector does not see the memory that a result holds outside of Lua
       end
     end
     assert.equal("", table.concat(faults, "\n\n"))

@@ -1,7 +1,7 @@
--- What graph code can't reach, in the body of a graph and in kernels, and what does not depend on chance.
+-- Names and operations that graph code cannot reach, in the body of a graph and in kernels, and determinism.
 local scene = require "testing.scene"
 
--- Runs a statement in the body, and in a kernel; returns the two messages, without place, nil where it went through.
+-- Runs a statement in the body and in a kernel; returns the two messages, without position, or nil if it succeeded.
 local function try(statement)
   local function run(text)
     local ok, message = pcall(scene.run, text, { frames = {2, 2} })
@@ -52,7 +52,7 @@ describe("graph code", function()
     local code = ("%q"):format(string.dump(function() return 1 end))
     assert.equal("bytecode is not loaded", (try(("assert(load(%s))"):format(code))))
     assert.equal("bytecode is not loaded", (try(("assert(loadstring(%s))"):format(code))))
-    -- Behind what a file may begin with.
+    -- After a prefix that is legal at the start of a file.
     assert.truthy(try(("assert(load('#!\\n' .. %s))"):format(code)):find "bytecode")
     assert.truthy(try(("assert(load('\\239\\187\\191' .. %s))"):format(code)):find "bytecode")
     assert.equal("load takes a text, not a function", (try "assert(load(function() return '' end))"))
@@ -63,7 +63,7 @@ describe("graph code", function()
   it("can't pass for code of Rapid by a name", function()
     assert.equal('scene.lua:2: node "kernel": the kernel assigns the upvalue "n"', (scene.kernel_error("n = n + 1", nil,
       "local n = 0"):match "^(.-);"))
-    -- A chunk named as Rapid's own are would not be looked at.
+    -- A chunk with the name of one of Rapid's own would not be analysed.
     local message = scene.error [[
 local make = load("local n = 0 return function(p) n = n + 1 end", "=[rapid runner]")
 return rapid.create { points = two } :points("k", make()) :solve {}]]
@@ -71,7 +71,7 @@ return rapid.create { points = two } :points("k", make()) :solve {}]]
   end)
 
   it("changes libraries for itself alone", function()
-    -- Rapid's own Lua writes text of programs with format, gsub and concat.
+    -- Rapid's own Lua writes program text with format, gsub and concat.
     local result = scene.run [[
 string.format = function() return "] error 'out' --" end
 string.gsub, string.find, string.sub = string.format, string.format, string.format
@@ -125,7 +125,7 @@ return rapid.create { points = two } :attribute { heat = 0 }
   it("can't use a point outside its kernel", function()
     local message = scene.error([[
 local later = coroutine.wrap(function(p) while true do coroutine.yield(p.P) end end)
-many = {} for i = 1, 20000 do many[i] = i end -- more than is compared
+many = {} for i = 1, 20000 do many[i] = i end -- more than the comparison covers
 return rapid.create { points = two }
   :points("k", function(p) local held = { later } p.P = held[1](p) end)
   :attribute { heat = function(frame) return frame.number < 3 and 0 or later().x end } :solve {}]], { threads = 1 })

@@ -1,5 +1,4 @@
--- What goes wrong while a script runs: said in one line, with file, line, node, point and frame, and never the end of
--- Rapid itself.
+-- Errors while a script runs: reported in one line with file, line, node, point and frame. They never end Rapid itself.
 local scene = require "testing.scene"
 
 local at = " (point id 0, frame 2)"
@@ -37,7 +36,7 @@ describe("an error in a kernel", function()
   it("inside a helper shows the helper's line", function()
     assert.equal('scene.lua:3: node "wind": attempt to perform arithmetic on a nil value' .. at, scene.error [[
 local function push(p)
-  -- a line of its own
+  -- a separate line
   return p.v * (nil + 1)
 end
 return rapid.create { points = two } :points("wind", function(p)
@@ -76,7 +75,7 @@ end) :solve {}]])
 local ok = pcall(function() local t = {} for i = 1, 1e9 do t[i] = i end end)
 if not ok then p.v = vec3(0, 24, 0) end]]
     local result = scene.command("run", text, "-f 1-3 --script-memory 32M --quiet")
-    -- Compiled code knows no line of its own: it is the node's.
+    -- Compiled code does not know its line, so the node's is given.
     assert.equal('scene.lua:1: node "kernel": the script needs more than 32 MiB of Lua memory; ' ..
       "--script-memory sets the limit" .. at .. "\n", result.stderr)
     assert.equal(1, result.status)
@@ -201,7 +200,7 @@ end)
 
 describe("a graph that is not the same each time it runs", function()
   it("is refused when a second state runs it", function()
-    -- What differs from state to state is out of reach of graph code; a file that changes between them is not.
+    -- Graph code cannot reach values that differ between states, but a file can change between them.
     scene.folder:write("twice.lua", "return 1")
     local result = scene.run([[
 local height = require "twice"

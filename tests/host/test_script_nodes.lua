@@ -1,4 +1,4 @@
--- rapid.node: nodes that Lua defines, found beside the graph and on RAPID_PATH, with the checks of native ones.
+-- rapid.node: nodes defined in Lua, found next to the graph and on RAPID_PATH, with the checks of native nodes.
 local scene = require "testing.scene"
 
 local push = [[
@@ -174,7 +174,7 @@ return rapid.node { name = "%s", doc = "Rises.", points = function(p) p.P = p.P 
     assert.equal("101", run "rise")
     scene.folder:write("rise.lua", rises:format("rise", 10))
     assert.equal("11", run "rise")
-    -- Rapid's own lift is another.
+    -- Rapid has its own node `lift`.
     scene.folder:write("shared/lift.lua", rises:format("lift", 100))
     assert.equal("101", run "lift")
     os.remove(scene.folder:file "shared/lift.lua")

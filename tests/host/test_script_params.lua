@@ -1,8 +1,8 @@
--- Parameters of nodes written in Lua: what each type takes, gives to the kernel and refuses; attributes that a node
--- makes, names that parameters hold.
+-- Parameters of Lua nodes: the values that each type accepts, passes to the kernel and refuses; attributes that a node
+-- creates, and names held by parameters.
 local scene = require "testing.scene"
 
--- Writes the node `mine` beside the scenes. params, kernel: text.
+-- Writes the node `mine` next to the scenes. params, kernel: text.
 local function define(params, kernel, more)
   scene.folder:write("mine.lua", ([[
 local rapid = require "rapid"

@@ -1,5 +1,5 @@
-// A run that goes on behind a snapshot, in a session or a process of its own, is the run that was not interrupted: the
-// same bits in frames, statistics, estimated errors and what is kept. For nodes of all types.
+// A run resumed from a snapshot, in another session or process, is bit-identical to the uninterrupted run: frames,
+// statistics, estimated errors and kept state, for nodes of all types.
 #include <cstdlib>
 #include <set>
 
@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::Run;
 
-// A node that counts frames, and says so or not.
+// A node that counts frames, and either declares this state or hides it.
 template <bool says_so>
 struct Counting {
     std::string group;
@@ -52,7 +52,7 @@ using CountingSecretly = Counting<false>;
 RAPID_NODE(CountingOpenly);
 RAPID_NODE(CountingSecretly);
 
-// What a frame is, without times and what each pass took: statistics as text, every estimated error, and the points.
+// A frame without times and the passes' work: statistics as text, every estimated error, and the points.
 struct Seen {
     std::string statistics;
     std::vector<double> errors, frame_errors, energy_drift;
@@ -71,7 +71,7 @@ struct Seen {
         statistics = json_line(figures, true);
         for (const auto& [name, points] : result.outputs) outputs[name] = state_of(points);
     }
-    // The first that differs; empty where nothing does.
+    // Returns the first difference, or an empty string.
     std::string difference(const Seen& other) const
     {
         for (const auto& [name, points] : outputs)
@@ -92,7 +92,8 @@ std::string difference(const Snapshot& a, const Snapshot& b)
     return "";
 }
 
-// Runs a scene, and again from snapshots at some of its frames. What differs, with the frame; empty where nothing does.
+// Runs a scene, then again from snapshots at some of its frames. Returns the first difference and its frame, or an
+// empty string.
 std::string difference_after_snapshots(const fs::path& file, std::int64_t frames,
                                        std::set<std::string>* types = nullptr)
 {
@@ -152,14 +153,14 @@ TEST_CASE("a run behind a snapshot is the run that was not interrupted, for node
     for (const NodeType* type : registry.types()) {
         const bool is_of_nodes = !type->defined_in.empty() && !type->find("kernel");
         if (is_of_nodes || types.count(type->name) == 1 || type->name.rfind("counting_", 0) == 0) continue;
-        CAPTURE(type->name);  // what it requires: add a scene of it to scenes_with_state.h
+        CAPTURE(type->name);  // on failure: the node requires arguments; add a scene of it to scenes_with_state.h
         const test::TemporaryFolder folder;
         CHECK(difference_after_snapshots(folder.write("scene.lua", scene_of_defaults(type->name)), 14, &types) == "");
         CHECK(types.count(type->name) == 1);
     }
 }
 
-// What follows from the state in a file after some frames goes into another. In a process of its own: see below.
+// Loads the state of a file, runs some frames, and writes the state to another. Runs in a separate process: see below.
 TEST_CASE("goes on behind the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
 {
     const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");

@@ -1,4 +1,4 @@
--- create{ subframes = n }: the whole graph, n times a frame.
+-- create{ subframes = n }: the whole graph runs n times per frame.
 local scene = require "testing.scene"
 local json = require "dkjson"
 
@@ -85,7 +85,7 @@ return rapid.create { fps = 10, seed = 3, subframes = %d }
         for i = 1, #whole do assert.near(whole:by_id(i - 1).born, parts:by_id(i - 1).born, 1e-7) end
       end
     end
-    -- Those of random times are in all parts of the frame.
+    -- Random birth times fall into all parts of the frame.
     local born = scene.run(text:format(4, "count = 400", "random"), { frames = {2, 2} })[2]
     local of_part = {0, 0, 0, 0}
     for i = 1, #born do
@@ -97,7 +97,7 @@ return rapid.create { fps = 10, seed = 3, subframes = %d }
 
   it("a deforming mesh bears on the same ways as in whole frames", function()
     local files = scene.folder
-    for f = 1, 6 do -- a triangle that rises ever faster, and turns
+    for f = 1, 6 do -- a triangle that rises with growing speed, and turns
       files:write(("leaf.%04d.obj"):format(f), ("v 0 %g 0\nv 1 %g %g\nv 0 %g 1\nf 1 2 3\n"):format(f ^ 2 / 10, f / 5,
         f / 9, f ^ 3 / 100))
     end

@@ -1,5 +1,5 @@
--- Attributes that are texts: made, drawn at birth, read and written by kernels and by :detail, asked by predicates, and
--- carried by all that carries points.
+-- String attributes: created, drawn at birth, read and written by kernels and by :detail, tested by predicates, and
+-- carried along by every operation.
 local command = require "testing.command"
 local json = require "dkjson"
 local scene = require "testing.scene"
@@ -76,7 +76,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, count = 9000,
       count[result[2][i].name] = (count[result[2][i].name] or 0) + 1
       assert.equal("bark", result[2][i].material)
     end
-    -- Of 9,000 draws a third each, and at most five standard deviations off: sqrt(9000 * 1/3 * 2/3) = 44.7.
+    -- A third of 9,000 draws each, within five standard deviations, sqrt(9000 * 1/3 * 2/3) = 44.7.
     for _, name in ipairs { "a", "b", "c" } do assert.near(3000, count[name], 224) end
   end)
 

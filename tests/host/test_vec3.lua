@@ -1,7 +1,7 @@
--- vec3 in graph code: arithmetic against numbers worked out by hand, and operations that are refused.
+-- vec3 in graph code: arithmetic checked against hand-computed numbers, and operations that are refused.
 local scene = require "testing.scene"
 
--- The value of an expression of graph code: a vec3, or a number.
+-- Returns the value of an expression of graph code: a vec3, or a number.
 local function value(expression, before)
   local text = "%s local value = %s local is_number = type(value) == 'number' " ..
     "return rapid.create { points = rapid.points.from { P = {is_number and {value, 0, 0} or value}, " ..
@@ -10,7 +10,7 @@ local function value(expression, before)
   return point.is_number == 1 and point.P.x or point.P
 end
 
--- The error of an expression, without its place.
+-- Returns the error of an expression, without its position.
 local function fault(expression)
   local message = scene.error("local value = " .. expression .. " return rapid.create {}")
   return assert(message:match "^scene%.lua:1: (.*)$", message)

@@ -1,5 +1,5 @@
--- Kernels that are wrong: what each is told, with the node, the file and the line, and where it ran until it was found,
--- the point and the frame.
+-- Wrong kernels: the message for each, with node, file and line. If the kernel ran until the fault, also the point and
+-- the frame.
 local scene = require "testing.scene"
 
 local shared_by_all = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or " ..
@@ -7,7 +7,7 @@ local shared_by_all = "; kernels run in parallel, in states of their own: keep i
 local read_only = "neither a component nor the frame can be assigned; make a new vec3: p.v = vec3(1, p.v.y, p.v.z)"
 local columns = "heat = {1, 2}, count = {1, 2}"
 
--- Found before the first frame: no point and no frame.
+-- Found before the first frame, so without point and frame.
 local before_the_first_frame = {
   ["p.id = 3"] = "the kernel assigns p.id, which is read only",
   ["p.dt = 3"] = "the kernel assigns p.dt, which is read only",

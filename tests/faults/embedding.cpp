@@ -29,7 +29,7 @@ bool is_right = true;
 bool has_failed = false;
 rapid_error* error = nullptr;  // of the last call
 
-// Notes what a call got; whether it is done.
+// Records a call's result. Returns true if it succeeded.
 bool done(const char* name, int status)
 {
     if (status != RAPID_OK && status != RAPID_OUT_OF_MEMORY && !has_failed) {
@@ -42,7 +42,7 @@ bool done(const char* name, int status)
     return status == RAPID_OK;
 }
 
-// Of a plane 0.1 m below the origin.
+// The distance to a plane 0.1 m below the origin.
 int floor_distance(void*, size_t n, const double* P, double* phi, double* gradient)
 {
     for (size_t i = 0; i < n; ++i) {
@@ -139,7 +139,7 @@ void run(rapid_offers* offers)
 
 int main(int count, char** arguments)
 {
-    // The request that is refused may fall into the second run, if the first makes fewer than the one that was counted.
+    // If the first run makes fewer allocations than were counted, the refused one may fall into the second run.
     const int most = count > 1 ? std::atoi(arguments[1]) : 3;
     bool failed_before = false;
     for (int run_number = 0; run_number < most; ++run_number) {

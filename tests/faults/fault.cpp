@@ -1,18 +1,19 @@
-// A library to preload (LD_PRELOAD) that makes one call of the system fail:
+// A library to preload (LD_PRELOAD) that makes one system call fail:
 //
-//   RAPID_FAULT=CALL:N:ERROR   the N-th call (from 1) of CALL ends with ERROR, and all later ones if ERROR ends in "+"
+//   RAPID_FAULT=CALL:N:ERROR   the Nth call (from 1) of CALL ends with ERROR, and all later ones if ERROR ends in "+"
 //
-// CALL: open, write, fsync, close, link, rename (of files that are written, and of their folders), read (of any regular
-// file), alloc (of memory, after main began, by whatever name: malloc, calloc, realloc, aligned) or state (of memory,
-// while LuaJIT makes a state). ERROR: an error's number, or "short": half the bytes, or one, are written or read.
+// CALL: open, write, fsync, close, link, rename (of output files and their folders), read (of any regular file), alloc
+// (an allocation after main began, through malloc, calloc, realloc or an aligned variant), or state (an allocation
+// while LuaJIT creates a state). ERROR: the number of an error, or "short": half of the bytes, or one, are written or
+// read.
 //
-//   RAPID_FAULT_LIST=FILE   a list of faults, a line each: for the k-th a copy of the process, which has loaded its
-//   libraries but
-//                       not begun, runs in a folder of its own, k, and says all in k/said; "k STATUS" is printed
+//   RAPID_FAULT_LIST=FILE   a list of faults, one per line. For the kth, a copy of the process, taken after its
+//   libraries
+//                           are loaded, runs in a separate folder k; its output is in k/said; "k STATUS" is printed
 //   RAPID_STRESS=collector   Lua collects garbage all the time
-//   RAPID_STRESS=guard       what reads or writes behind a block of memory, or one that was freed, ends the process
+//   RAPID_STRESS=guard       an access past the end of a memory block, or to a freed one, ends the process
 //                            (both: collector,guard)
-//   RAPID_FAULT_COUNT=FILE   the calls that there were of CALL, written when the process ends by itself
+//   RAPID_FAULT_COUNT=FILE   receives the number of calls of CALL when the process ends by itself
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <link.h>
@@ -54,8 +55,8 @@ std::atomic<bool> armed{false}, began{false};
 using Main = int (*)(int, char**, char**);
 Main program_main;
 
-// Libraries that take memory and do not check whether they got it can't report a fault: libgcc, which registers the
-// code that LuaJIT compiles (gcc 12), and Blosc. Where they are loaded:
+// Libraries that allocate without checking the result cannot report a fault: libgcc, which registers the code that
+// LuaJIT compiles (gcc 12), and Blosc. The address ranges of these libraries:
 struct Careless {
     const char* name;
     std::atomic<std::uintptr_t> begin, end;
@@ -92,7 +93,7 @@ void arm_with(const char* text)
     armed = true;
 }
 
-// At the first call after the libraries are there.
+// Set up at the first call after the libraries are loaded.
 struct Arm {
     Arm() { arm_with(std::getenv("RAPID_FAULT")); }
     ~Arm() { end(); }
@@ -108,7 +109,7 @@ struct Arm {
     }
 } arm;
 
-// The error of this call; 0: none.
+// Returns the error of this call, or 0.
 int error_of(const char* call)
 {
     if (!armed || std::strcmp(call, fault.call) != 0) return 0;
@@ -116,13 +117,13 @@ int error_of(const char* call)
     return now == fault.nth || (fault.lasting && now > fault.nth) ? fault.error : 0;
 }
 
-// How deep this thread is in opening a library: its constructors have nobody to tell that there is no memory.
+// How many libraries this thread is opening, nested. Their constructors cannot report that memory has run out.
 thread_local int loading __attribute__((tls_model("initial-exec"))) = 0;
 
-// While this thread is in lua_newstate(), which may be left by a jump where memory runs out.
+// True while this thread is in lua_newstate(), which a failed allocation may leave by a jump.
 thread_local bool makes_state __attribute__((tls_model("initial-exec"))) = false;
 
-// Whether this request of memory, by `caller`, is to fail.
+// Returns true if this allocation by `caller` must fail.
 bool fails(void* caller)
 {
     if (!armed || !began || loading > 0 || is_careless(caller)) return false;
@@ -149,14 +150,14 @@ F next(const char* name)
     return reinterpret_cast<F>(::dlsym(RTLD_NEXT, name));
 }
 
-// Returns in each copy; this process ends.
+// Returns in each copy; the original process exits.
 void copy_for_each(const char* list)
 {
     constexpr unsigned most_seconds = 300;
     std::ifstream file(list);
     std::vector<std::string> faults;
     for (std::string line; std::getline(file, line);) faults.push_back(line);
-    file.close();  // a copy that shared it would move the place in it
+    file.close();  // a copy that shared it would move the file position
     for (std::size_t k = 1; k <= faults.size(); ++k) {
         const std::string folder = std::to_string(k);
         const pid_t copy = ::fork();
@@ -272,7 +273,7 @@ int rename(const char* from, const char* to) noexcept
     return original(from, to);
 }
 
-// dlsym() may allocate, so the C library's own names for these are taken.
+// dlsym() may allocate, so the C library's internal names for these are used.
 void* __libc_malloc(std::size_t bytes) noexcept;
 void* __libc_calloc(std::size_t count, std::size_t bytes) noexcept;
 void* __libc_realloc(void* block, std::size_t bytes) noexcept;
@@ -305,7 +306,7 @@ void* calloc(std::size_t count, std::size_t bytes) noexcept
 void* realloc(void* block, std::size_t bytes) noexcept
 {
     if (fails(__builtin_return_address(0))) return errno = ENOMEM, nullptr;
-    // A block that was not guarded stays so: its size is not known.
+    // A block that was not guarded stays unguarded, because its size is unknown.
     const bool was_guarded = guard::is_guarded(block);
     if (block && !was_guarded) return __libc_realloc(block, bytes);
     void* moved = guard::take(malloc_alignment, bytes);
@@ -370,14 +371,14 @@ lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t
     return state;
 }
 
-// The process ends without its destructors.
+// Called when the process ends without its destructors.
 void _Exit(int status)
 {
     arm.end();
     ::_exit(status);
 }
 
-// Starts main(), from which on allocations are counted: before it nobody could report one that fails.
+// Starts main(). Allocations are counted from here on: an earlier failure could not be reported.
 int __libc_start_main(Main program, int count, char** arguments, void (*init)(), void (*fini)(), void (*loader)(),
                       void* stack)
 {

@@ -12,12 +12,12 @@ namespace guard {
 namespace {
 
 constexpr std::size_t page = 4096;
-constexpr std::size_t room = std::size_t{1} << 38;      // of addresses, none of which is used twice
-constexpr std::size_t largest = std::size_t{16} << 20;  // larger blocks are the C library's
+constexpr std::size_t room = std::size_t{1} << 38;      // of addresses; none is reused
+constexpr std::size_t largest = std::size_t{16} << 20;  // larger blocks come from the C library
 constexpr int most_alive = 25000;                       // each takes two of the kernel's 65,530 mappings
 constexpr unsigned char untouched = 0xa5;
 
-// Before a block's first page.
+// Stored in the page before a block's first page.
 struct Head {
     void* block;
     std::size_t bytes, pages;
@@ -48,7 +48,7 @@ std::uintptr_t begin_of_room()
     return found;
 }
 
-// The page of a block's head is the one before that of its first byte.
+// The head's page precedes the page of the block's first byte.
 Head& head_of(const void* block)
 {
     return *reinterpret_cast<Head*>((reinterpret_cast<std::uintptr_t>(block) / page - 1) * page);
@@ -89,7 +89,7 @@ std::size_t size_of(const void* block) { return head_of(block).bytes; }
 
 void give_back(void* block)
 {
-    const Head head = head_of(block);  // of a block that was freed before, this ends the process
+    const Head head = head_of(block);  // ends the process if the block was freed before
     if (head.block != block) end("guard: what is freed is no block\n");
     auto* const from = reinterpret_cast<unsigned char*>(&head_of(block));
     const unsigned char* const wall = from + head.pages * page;

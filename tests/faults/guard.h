@@ -1,18 +1,18 @@
-// Memory with a wall behind it: each block ends at a page that can't be touched, and can't be touched itself when it
-// was freed, so that what reads or writes beyond it ends the process at once. For whatever the process runs, Lua and
-// other libraries too, none of it built for that.
+// Guarded memory: each block ends at an inaccessible page, and becomes inaccessible itself when it is freed. An access
+// past its end or after its release therefore ends the process at once. Works for any code in the process, including
+// Lua and other libraries, without recompilation.
 #pragma once
 
 #include <cstddef>
 
 namespace guard {
 
-// Null where blocks are not guarded, there are too many, or there is no room.
+// Returns null if blocks are not guarded, or if the number of blocks or the address space is exhausted.
 void* take(std::size_t alignment, std::size_t bytes);
-// Whether the block is a guarded one; then its size, as it was asked for.
+// Returns true if the block is guarded. size_of() returns the requested size of a guarded block.
 bool is_guarded(const void* block);
 std::size_t size_of(const void* block);
-// A guarded block. Ends the process if what is between its end and the wall was written to.
+// Frees a guarded block. Ends the process if the bytes between its end and the guard page were written to.
 void give_back(void* block);
 
 }  // namespace guard

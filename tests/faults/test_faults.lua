@@ -1,8 +1,8 @@
--- Faults of the system in a small run: a disk that is full or breaks, short counts. Whatever fails, the run ends with a
--- documented status and says what was wrong, and every file that is there is whole.
+-- System faults in a small run: a disk that is full or fails, short counts. Whatever fails, the run ends with a
+-- documented status and a message, and every file that exists is complete.
 --
---   RAPID_FAULTS=10000 rapid test tests/faults/test_faults.lua      as many faults (100)
---   RAPID_FAULT_SEED=2 rapid test tests/faults/test_faults.lua      others (1)
+--   RAPID_FAULTS=10000 rapid test tests/faults/test_faults.lua      number of faults (100)
+--   RAPID_FAULT_SEED=2 rapid test tests/faults/test_faults.lua      seed (1)
 local command = require "testing.command"
 local amount = require "tests.amount"
 local lehmer = require "tests.lehmer"
@@ -24,14 +24,14 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
   :gravity {} :collide { shape = rapid.shape.plane {} } :solve {}
 ]]
 
--- What is in the library that is loaded later: OpenVDB, which writes nothing here.
+-- Uses the deferred library: OpenVDB, which writes nothing here.
 local baked = [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } }
   :gravity {} :collide { shape = rapid.levelset.sphere { radius = 0.5, voxel = 0.1 }:offset(0.01) } :solve {}
 ]]
 
--- Everything in Lua that a run calls: kernels, with states of their own, functions of the frame and of the points.
+-- Covers everything in Lua that a run calls: kernels with their own states, functions of the frame and of the points.
 local scripted = [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } }
@@ -45,7 +45,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
 
 local errors = { EIO = 5, ENOMEM = 12, EACCES = 13, ENOSPC = 28, EROFS = 30, EDQUOT = 122, short = "short" }
 
--- What may fail, how, and how many calls of it a run makes, about.
+-- The calls that may fail, the errors, and the approximate number of these calls in a run.
 local kinds = {
   { call = "write", errors = { "ENOSPC", "EIO", "EDQUOT", "short" }, calls = 30 },
   { call = "close", errors = { "EIO", "ENOSPC", "EDQUOT" }, calls = 30 },
@@ -59,7 +59,7 @@ local below = lehmer.new(tonumber(os.getenv "RAPID_FAULT_SEED" or 1)).below
 
 local library = require "tests.faults.library"
 
--- Runs of a scene, each in a copy of a process that has loaded what it needs.
+-- Runs of a scene, each in a copy of a process that has loaded its libraries.
 local function folder_of(text)
   local folder = command.folder()
   folder:write("scene.lua", text)
@@ -67,7 +67,8 @@ local function folder_of(text)
   return folder
 end
 
--- The files below the folder of a run, by name; a level set's has an identifier of its own before its 57th byte.
+-- Returns the files below the folder of a run, by name. The first 57 bytes of a level set include a random identifier
+-- and are skipped.
 local function files_of(folder, names, run)
   local files = {}
   for name in names:gmatch(("\n%d/([^\n]*)"):format(run)) do
@@ -90,7 +91,7 @@ local function complaint_of(status, said, files, whole)
   end
 end
 
--- The complaints about a run with each of the faults. libraries: to be loaded, besides those that every run has.
+-- Returns the complaints about a run with each of the faults. libraries: loaded in addition to those of every run.
 local function complaints(text, outputs, list, libraries)
   local found = {}
   for first = 1, #list, 100 do
@@ -118,7 +119,7 @@ local function complaints(text, outputs, list, libraries)
   return table.concat(found)
 end
 
--- How often memory is asked for while LuaJIT makes the first state of a run.
+-- Returns the number of allocations while LuaJIT creates the first state of a run.
 local function requests_of_a_state(text)
   local folder = command.folder()
   folder:write("scene.lua", text)

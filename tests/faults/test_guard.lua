@@ -1,4 +1,4 @@
--- That the walls of guarded memory (guard.h) are there: programs that run into them.
+-- Programs that violate guarded memory (guard.h) are ended.
 local command = require "testing.command"
 local library = require "tests.faults.library"
 

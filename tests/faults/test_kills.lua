@@ -1,6 +1,6 @@
--- Runs that are killed at any moment, alone and beside others: whole files stay, and no others.
+-- Runs that are killed at any moment, alone and while others run: only complete files remain.
 --
---   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      as many kills (20)
+--   RAPID_KILLS=1000 rapid test tests/faults/test_kills.lua      number of kills (20)
 local command = require "testing.command"
 local amount = require "tests.amount"
 
@@ -13,7 +13,7 @@ ball:write("out/ball.vdb")
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.05 } } :gravity {} :solve {}
 ]]
 
--- Every file of out/ is that of a whole run; what is hidden is counted.
+-- Compares every file of out/ with that of a complete run, and counts hidden files.
 local functions = [[
 run() { "$RAPID" run scene.lua --quiet -f 1-12 -o out/a.####.ply -o out/b.####.csv -o out/c.####.vdb; }
 compare() {
@@ -43,7 +43,7 @@ describe("a run that is killed", function()
   it("leaves whole files, and the next removes what else it left", function()
     local script = {}
     for i = 1, kills do
-      -- From the start of the process to about its end.
+      -- From the start of the process until about its end.
       script[i] = ("timeout -s KILL %.3f setpriv --pdeathsig KILL \"$RAPID\" run scene.lua --quiet -f 1-12 " ..
         "-o out/a.####.ply -o out/b.####.csv -o out/c.####.vdb\ncompare 'kill %d'\n"):format(
         0.02 + 0.6 * (i * 0.618034 % 1), i)

@@ -1,8 +1,8 @@
--- Runs with --cache that are killed at any moment and picked up again, on another number of threads: in the end each
--- scene has the files and the statistics of a run that was not interrupted.
+-- Runs with --cache that are killed at any moment and resumed on another number of threads. In the end each scene has
+-- the files and the statistics of an uninterrupted run.
 --
---   RAPID_RESUMES=20 rapid test tests/faults/test_resume.lua      as many kills of each scene (0.2: of each fifth)
---   RAPID_RESUME_SCENES=pile,drop                                 of these scenes alone
+--   RAPID_RESUMES=20 rapid test tests/faults/test_resume.lua      kills per scene (0.2: every fifth)
+--   RAPID_RESUME_SCENES=pile,drop                                 only these scenes
 local amount = require "tests.amount"
 local command = require "testing.command"
 local lehmer = require "tests.lehmer"
@@ -60,7 +60,7 @@ describe("a run that is killed and picked up", function()
     it("has the files and the statistics of one that was not: " .. scene[1], function()
       local folder = command.folder()
       local waits = {}
-      -- A part of a run's time; the first runs make most of the way.
+      -- A fraction of a run's time; the first runs make most of the progress.
       for k = 1, 20 * kills do waits[k] = ("%.3f"):format(random.between(0.05, 0.95)) end
       local result = command.shell(script, { cwd = folder.path, environment = {
         SCENE = scene[2], FRAMES = tostring(frames), KILLS = tostring(kills), WAITS = table.concat(waits, " ") } })

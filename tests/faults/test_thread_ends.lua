@@ -1,5 +1,5 @@
--- Memory for the destructor of a variable of a thread is taken by glibc, which ends the process where there is none: no
--- library of ours registers one (runtime/base/of_thread.h).
+-- glibc allocates memory for the destructor of a thread-local variable, and ends the process if it cannot. Our
+-- libraries therefore register none (runtime/base/of_thread.h).
 local command = require "testing.command"
 local library = require "tests.faults.library"
 
@@ -18,7 +18,7 @@ describe("a library of Rapid", function()
   end)
 
   it("has no variables of threads at all, where it is loaded later", function()
-    -- glibc takes the memory for these when a thread first comes there.
+    -- glibc allocates the memory for these when a thread first uses them.
     local folder = command.quoted(library:match "^(.*)/")
     local segments = command.shell("cd " .. folder .. " && readelf -lW librapid_deferred.so")
     assert.equal(0, segments.status, segments.stderr)

@@ -1,5 +1,5 @@
--- Hostile scripts at random, from a grammar: legal Lua that uses everything a script can reach, with values that
--- nothing expects. The text depends on the seed alone.
+-- Random hostile scripts from a grammar: legal Lua that uses everything a script can reach, with unexpected values. The
+-- text depends only on the seed.
 --
 --   local text = require "tests.hostile.scripts".make(seed)
 local lehmer = require "tests.lehmer"
@@ -7,7 +7,7 @@ local lehmer = require "tests.lehmer"
 local Script = {}
 Script.__index = Script
 
--- From 1 to n.
+-- Returns a number from 1 to n.
 function Script:random(n)
   return self.draw.below(n) + 1
 end
@@ -36,7 +36,7 @@ local functions = {
   "rapid.attr", "rapid.param", "rapid.create", "rapid.node", "keeper", "grow", "deep", "ball.distance", "class.new",
 }
 
--- How an expression is made, with `depth` left for those within it.
+-- Generators of expressions; `depth` limits the nesting.
 local expressions = {
   function(self) return self:one_of(numbers) end,
   function(self) return self:one_of(shared) end,
@@ -111,7 +111,7 @@ end
 
 function Script:block(count, depth)
   local lines = {}
-  -- Mostly protected, so that what comes behind an error runs, too.
+  -- Most are protected, so that the code after an error also runs.
   for place = 1, count do
     local line = self:random(8) == 1 and "  do %s end" or "  pcall(function(...) %s end)"
     lines[place] = line:gsub("%%s", (self:statement(depth):gsub("%%", "%%%%")))
@@ -148,7 +148,7 @@ local function make(seed)
   self.draw.start(seed, 0)
   local text = head .. self:block(self:random(3) - 1, 3) .. "\nreturn rapid.create { points = two } "
   for place = 1, self:random(3) do
-    -- The text of a block may hold per cents.
+    -- The text of a block may contain percent signs.
     local before, after = self:one_of(chains):match "^(.-)%%s(.*)$"
     text = text .. before:gsub("'k'", ("'k%d'"):format(place)) .. self:block(self:random(4), 3) .. after .. "\n  "
   end

@@ -4,7 +4,7 @@ local command = require "testing.command"
 
 local many = 200000
 
--- One text a number.
+-- Repeats a text for each number.
 local function repeated(text)
   local list = {}
   for i = 1, many do list[i] = text:format(i, i) end

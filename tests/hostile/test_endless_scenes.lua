@@ -8,9 +8,9 @@ local ball = "rapid.levelset.sphere { voxel = 0.2 }"
 local further = "^scene%.lua:%d: a further 64 MiB of nodes, level sets, meshes and points would take about 64 MiB, " ..
   "and %d+ MiB are free of 300 MiB; let the scene make fewer, or set %-%-memory\n$"
 
--- Scenes, in which TWO and BALL stand for the above, and the error of each.
+-- Scenes, in which TWO and BALL stand for the definitions above, and the error of each.
 local refused = {
-  -- The stack: a motion asks its factors, and a shape the one that it moves.
+  -- Stack: a motion evaluates its factors, and a shape the shape that it moves.
   { [[
 local s = rapid.shape.sphere {}
 for i = 1, 1e5 do s = s:transform(function(f) return rapid.translate(0, f.time, 0) end) end
@@ -28,13 +28,13 @@ return TWO :collide { shape = s } :solve {}]],
 local c = TWO
 for i = 1, 150000 do c = c:gravity {} end
 error "no more"]], "^scene%.lua:4: no more\n$" },
-  -- Time: each factor has twice as many.
+  -- Time: each factor doubles the number of evaluations.
   { [[
 local m = rapid.translate(0, 0, 0) * function(f) return rapid.translate(0, f.time, 0) end
 for i = 1, 60 do m = m * m end
 return TWO :collide { shape = rapid.shape.sphere {}, transform = m } :solve {}]],
     "^scene%.lua:3: rapid%.product: a product of 1024 motions" },
-  -- Memory, of which each takes little.
+  -- Memory: many small allocations.
   { [[
 rapid.node { name = "n0", doc = "one", expand = function(i) return i:gravity {} end }
 for k = 1, 40 do
@@ -44,7 +44,7 @@ end
 return TWO :n40 {} :solve {}]], further },
   { "local s = BALL for i = 1, 3000 do s = s:union(BALL) end return TWO :collide { shape = s } :solve {}", further },
   { "local s = BALL for i = 1, 3000 do s = s:transform(rapid.translate(0, 1e-9, 0)) end return TWO", further },
-  -- Memory, of which one takes more than there is.
+  -- Memory: one allocation larger than the limit.
   { "return TWO :collide { shape = rapid.levelset.sphere { voxel = 0.05 } :offset(20) } :solve {}",
     "^scene%.lua:2: :offset: a level set sphere of radius 1 m with voxel = 0%.05 m would take about %d%.%d GiB" },
   { [[
@@ -110,11 +110,11 @@ describe("pictures", function()
     assert.equal(2, result.status)
     assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 1%.0 GiB, and %d+ MiB are free of " ..
       "300 MiB; give a smaller %-%-size, or set %-%-memory\n$", result.stderr)
-    -- Two of which one would fit.
+    -- Two pictures, of which only one would fit.
     result = run(folder, scene, "-o a.####.png -o b.####.png --size 1600x1600")
     assert.match("^%-o b%.####%.png: pictures of 1600x1600 would take about 332 MiB", result.stderr)
     assert.equal(0, run(folder, scene, "-o a.####.png --size 1600x1600").status)
-    -- Nothing but points.
+    -- Points alone.
     result = run(folder, "return " .. two .. " :gravity {} :solve {}", "-o a.####.png --size 4000x4000")
     assert.match("pictures of 4000x4000 would take about 366 MiB", result.stderr)
   end)

@@ -23,7 +23,7 @@ describe("a library of Lua", function()
       assert.equal("", result.stderr)
       assert.equal(0, result.status)
     end
-    -- Nor where the environment asks for it.
+    -- Not even if the environment requests it.
     command.rapid("run scene.lua -f 1 --quiet", { cwd = folder.path,
       environment = { LUA_PATH = "./?.lua;;", LUA_CPATH = "./?.so;;", LUA_INIT = "@rapid.lua" } })
     assert.is_nil(folder:read "seen")
@@ -69,7 +69,7 @@ describe("a file that a scene writes", function()
     ["x.0001.vdb"] = point .. " :rasterize { file = '%sx.####.vdb' }",
     ["x.vdb"] = point .. ", rapid.levelset.sphere { voxel = 0.2 } :write '%sx.vdb'",
   }
-  -- A folder with a scene that writes to `place`, a folder.
+  -- Creates a folder with a scene that writes to the folder `place`.
   local function new_folder(text, place)
     local folder = command.folder()
     command.shell("mkdir work beside", { cwd = folder.path })

@@ -1,4 +1,4 @@
--- Files that are not regular, next to a scene or in its place: Rapid neither blocks on them nor reads them endlessly.
+-- Files that are not regular, next to a scene or instead of it: Rapid neither blocks on them nor reads them endlessly.
 local command = require "testing.command"
 
 local function folder_with(text)

@@ -1,4 +1,4 @@
--- Files of points with numbers that no scene can use: nodes handle them, or report the point.
+-- Point files with values that no scene can use: nodes handle them, or report the point.
 local command = require "testing.command"
 
 local nodes = { ":clump {}", ":contact {}", ":interact { radius = 0.5 }", ":distance { within = 0.5 }", ":gravity {}",

@@ -5,7 +5,7 @@ local command = require "testing.command"
 
 local longest_message = 10000
 
--- Runs a shell command; `complaint` says what is wrong with its end.
+-- Runs a shell command; `complaint` describes a wrong ending.
 local function ended(folder, line, environment)
   local result = command.shell(address_space(4194304) .. " ulimit -t 10; timeout -k 1 60 " .. line,
     { cwd = folder.path, environment = environment })
@@ -29,7 +29,7 @@ local function record(changes)
   return "{" .. table.concat(list, ", ") .. "}"
 end
 
--- Contents that are not a record of any kind.
+-- Contents that are no kind of record.
 local nonsense = {
   "", "{", "null", "[]", '"' .. ("x"):rep(1000000), ("x"):rep(1000000), ("["):rep(1000000), "\27[2J",
   '{"rapid_part": ' .. ("["):rep(200000) .. ("]"):rep(200000) .. "}",
@@ -90,7 +90,7 @@ describe("the record of a part", function()
 end)
 
 describe("FARM.json", function()
-  -- Programs in the place of Slurm's, which know of no job.
+  -- Replaces Slurm's programs by ones that know no job.
   local function folder_with(text)
     local folder = command.folder()
     command.shell('mkdir bin out out/FARM && for name in sbatch squeue scancel; do ' ..

@@ -1,7 +1,7 @@
--- Malicious or nonsensical scripts: whatever they do, a run ends by itself, with a status of its own.
+-- Malicious or nonsensical scripts. Every run ends by itself, with a documented status.
 --
--- HOSTILE_SCRIPTS is how many are tried, HOSTILE_STRESSED how many of them with Lua's collector at work all the time (a
--- fifth), HOSTILE_SEED the first one's seed.
+-- HOSTILE_SCRIPTS is the number of scripts, HOSTILE_STRESSED the number of those that run while Lua collects garbage
+-- all the time (a fifth), HOSTILE_SEED the seed of the first.
 local command = require "testing.command"
 local amount = require "tests.amount"
 local library = require "tests.faults.library"
@@ -12,7 +12,7 @@ local count = amount.of("HOSTILE_SCRIPTS", 10)
 local many_stressed = tonumber(os.getenv "HOSTILE_STRESSED" or math.ceil(count / 5))
 local first = tonumber(os.getenv "HOSTILE_SEED" or 1)
 
--- The time limit applies to each stretch of script, of which a run has a few dozen.
+-- The time limit applies to each call of a script, of which a run has a few dozen.
 local limits = { seconds = 20, arguments = "--script-timeout 0.5 --script-memory 48M" }
 
 -- Lua collects garbage all the time, and each block of memory is followed by a guard page and becomes one when freed.

@@ -44,7 +44,7 @@ folder:write("others.csv", "Px,Py,Pz,heat\27[2J,group:some\27[2J\n1,2,3,5,0\n")
 
 describe("what is printed", function()
   it("holds no command of a terminal, whatever names are", function()
-    -- By arguments: the status.
+    -- Command lines with their status.
     for arguments, status in pairs {
       ["run scene.lua -f 1-3 -o 'out/\27[2J.####.csv' --stats stats.json"] = 0, ["check scene.lua"] = 0,
       ["check scene.lua --races"] = 0, ["explain scene.lua"] = 0, ["explain scene.lua --json"] = 0,

@@ -1,6 +1,6 @@
 -- Scenes with mistakes: each is refused with its position, or runs.
 --
--- WRONG_SCENES is how many are tried, WRONG_SEED the first one's seed.
+-- WRONG_SCENES is the number of scenes, WRONG_SEED the seed of the first.
 local command = require "testing.command"
 local amount = require "tests.amount"
 local judged = require "tests.hostile.judged"
@@ -9,7 +9,7 @@ local wrong_scenes = require "tests.hostile.wrong_scenes"
 local count = amount.of("WRONG_SCENES", 20)
 local first = tonumber(os.getenv "WRONG_SEED" or 1)
 
--- The scene's file with the line or without, a node, or a file that can't be written.
+-- The position is the scene's file with or without a line, a node, or a file that cannot be written.
 local function is_placed(message)
   return message:find "scene%.lua:%d+: " or message:find "scene%.lua: " or message:find 'node "' or
     message:find ": can't be "
@@ -29,7 +29,7 @@ describe("a wrong scene", function()
       end
       if not loadstring(text) then assert.equal(2, result.status, what .. "is no program") end
     end
-    -- Some mistakes are legal: a name of the script's own, a number that is merely another one.
+    -- Some mistakes are legal: a name that the script defines, or another valid number.
     assert.truthy(refused > 0.7 * count, refused)
   end)
 

@@ -1,6 +1,7 @@
--- Scenes with one to three mistakes, by number: those of graphs, those of the nodes and random ones (tests/stability),
--- in which a name is misspelt, a value is of the wrong type, range or shape, a parameter is missing, a file is not
--- there, a node goes in a circle, or the program is none. A seed gives the same text everywhere.
+-- Scenes with one to three mistakes, by number. They are made from the scenes of graphs, those of the nodes, and random
+-- ones (tests/stability): a name is misspelt, a value has the wrong type, range or shape, a parameter is missing, a
+-- file does not exist, nodes form a cycle, or the program is not valid Lua. A seed gives the same text on every
+-- machine.
 --
 --   local text, mistakes = require "tests.hostile.wrong_scenes".make(seed)      mistakes: their kinds, as a text
 local command = require "testing.command"
@@ -157,7 +158,7 @@ local links = {
   ":collide { shape = rapid.levelset.sphere {}, radius = 1e9 }", ":collide { shape = rapid.mesh.box {} }",
 }
 
--- Returns the indices of the pieces for which `wanted` is true.
+-- Returns the indices of the pieces for which `wanted` returns true.
 local function places(pieces, wanted)
   local found = {}
   for i, piece in ipairs(pieces) do
@@ -170,13 +171,13 @@ local function of_kind(pieces, kind)
   return places(pieces, function(piece) return piece.kind == kind end)
 end
 
--- The piece that follows, blanks aside.
+-- Returns the next piece that is not blank.
 local function next_piece(pieces, i)
   repeat i = i + 1 until not pieces[i] or pieces[i].kind ~= "space"
   return pieces[i] and pieces[i].text, i
 end
 
--- The end of the value that begins after piece i: the next comma or bracket that closes.
+-- Returns the end of the value that begins after piece i: the next comma or closing bracket.
 local function end_of_value(pieces, i)
   local depth = 0
   while pieces[i + 1] do
@@ -204,7 +205,7 @@ local function insert(pieces, at, text)
   table.insert(pieces, at, { kind = "mistake", text = " " .. text .. " " })
 end
 
--- Each makes a mistake; one that finds no place for it makes none.
+-- Each function makes a mistake, or none if there is no suitable position.
 local mistakes = {}
 
 function mistakes.name(pieces)
@@ -284,7 +285,7 @@ function mistakes.statement(pieces)
   insert(pieces, before_return(pieces), "do " .. pick(statements) .. " end")
 end
 
--- Before a call of a node, `:name {`.
+-- Returns true before a call of a node, `:name {`.
 local function in_chain(pieces, text)
   local found = places(pieces, function(piece, i)
     local _, name = next_piece(pieces, i)

@@ -1,4 +1,4 @@
--- :align: where the axis of orient points.
+-- :align: the directions of the axes of orient.
 local scene = require "testing.scene"
 
 local function run(parameters, frames)
@@ -12,7 +12,7 @@ describe("align", function()
   it("points an axis along an attribute, by the shortest way", function()
     local points = run()
     assert.near({1, 0, 0}, points[1].orient:rotate(vec3(0, 1, 0)), 1e-6)
-    assert.near({0, 0, 1}, points[1].orient:rotate(vec3(0, 0, 1)), 1e-6) -- what it turns about stays
+    assert.near({0, 0, 1}, points[1].orient:rotate(vec3(0, 0, 1)), 1e-6) -- the axis of rotation is unchanged
     assert.near({0, -1, 0.001}, points[2].orient:rotate(vec3(0, 1, 0)), 1e-5)
     assert.equal(quat(0, 0, 0, 1), points[3].orient)
     assert.near({1, 0, 0}, run("axis = {0, 0, 3}")[1].orient:rotate(vec3(0, 0, 1)), 1e-6)

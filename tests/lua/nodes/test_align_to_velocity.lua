@@ -1,4 +1,4 @@
--- :align_to_velocity: where the axes of orient point.
+-- :align_to_velocity: the directions of the axes of orient.
 local scene = require "testing.scene"
 
 local directions = { {0, 0, 1}, {0, 0, -2}, {3, 0, 0}, {1, 2, -3}, {-1, -5, 0.1}, {0.01, 0, -1} }

@@ -9,9 +9,10 @@ local function exists(path)
   return file ~= nil
 end
 
--- What LuaJIT did not compile of the node. A loop within a kernel becomes a trace of its own, into which that of the
--- points leads; before that LuaJIT gives up attempts to have both in one. Functions of the whole set run once a frame.
--- A finaliser that the collector runs meanwhile ends the recording, which is begun again; an error would end the run.
+-- Returns the traces of the node that LuaJIT failed to compile. A loop within a kernel becomes a separate trace, which
+-- the trace of the points enters; before that LuaJIT abandons attempts to combine both. Functions of the whole set are
+-- ignored, because they run once a frame. A finaliser that the collector runs during a recording ends it, and it is
+-- repeated. An error would end the run.
 local function failed_traces(name, aborts)
   local text, failed = document.read("lua/nodes/" .. name .. ".lua"), {}
   if text:find "\n  detail = " or text:find ":detail {" then return failed end

@@ -1,4 +1,4 @@
--- :fade_by_age against the age that is written.
+-- :fade_by_age against the age in its output.
 local scene = require "testing.scene"
 
 describe("fade_by_age", function()

@@ -1,4 +1,4 @@
--- :follow_curve: on the curve at the end of each frame, whenever a point was born.
+-- :follow_curve: points are on the curve at the end of each frame, whatever their birth time.
 local scene = require "testing.scene"
 
 describe("follow_curve", function()
@@ -7,11 +7,11 @@ describe("follow_curve", function()
 return rapid.create { fps = 4, points = rapid.points.from { P = {{10, 0, 0}} } }
   :follow_curve { points = {{0, 0, 0}, {1, 2, 0}, {3, 2, 1}, {4, 0, 1}}, duration = 1.5 } :solve {}]],
       { frames = {1, 11} })
-    -- Two frames a span.
+    -- Two frames per span.
     for f, expected in pairs { [1] = {10, 0, 0}, [3] = {11, 2, 0}, [5] = {13, 2, 1}, [7] = {14, 0, 1} } do
       assert.near(expected, result[f][1].P, 3e-6)
     end
-    -- The middle of the inner span: (9 (b + c) - a - d) / 16.
+    -- The midpoint of the inner span: (9 (b + c) - a - d) / 16.
     assert.near({10 + (9 * 4 - 4) / 16, 36 / 16, 8 / 16}, result[4][1].P, 3e-6)
     -- The last tangent is the last span's: (1, -2, 0) in half a second.
     assert.near({2, -4, 0}, result[11][1].v, 1e-5)

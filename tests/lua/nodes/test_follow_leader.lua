@@ -10,7 +10,7 @@ return rapid.create { fps = 10, points = rapid.points.from { %s } }
 end
 
 describe("follow_leader", function()
-  -- Behind a leader that goes straight on: v' = (w - v) / response, w held over the frame, then P' = P + v dt.
+  -- The leader moves in a straight line: v' = (w - v) / response, w constant over the frame, then P' = P + v dt.
   it("brings points behind the leader as its formula says", function()
     local result = run("P = {{0, 0, 0}, {-4, 0, 0}}, v = {{1, 0, 0}, {0, 0, 0}}",
       "distance = 1, time = 0.8, response = 0.3, speed = 100", 40)

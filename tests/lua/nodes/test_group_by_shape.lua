@@ -1,4 +1,4 @@
--- :group_by_shape: who is in the group.
+-- :group_by_shape: the members of the group.
 local scene = require "testing.scene"
 
 local function ids(shape, more)

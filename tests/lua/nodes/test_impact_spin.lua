@@ -1,4 +1,4 @@
--- :impact_spin: after a hit a ball turns as it would roll.
+-- :impact_spin: after an impact a ball rotates as if it rolled.
 local scene = require "testing.scene"
 
 local function run(grip)
@@ -10,7 +10,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.3, 0}}, 
 end
 
 describe("impact_spin", function()
-  -- The floor is met after 0.1 s, in frame 4; rolling along (3, 1) turns about (1, -3), at v / r.
+  -- The floor is hit after 0.1 s, in frame 4. Rolling along (3, 1) is a rotation about (1, -3), at v / r.
   it("sets points rolling in the frame after they have hit", function()
     for _, grip in ipairs { 1, 0.25, 0 } do
       local result = run(grip)
@@ -18,7 +18,7 @@ describe("impact_spin", function()
       assert.near(vec3(0, 0, 5) * (1 - grip) + vec3(10, 0, -30) * grip, result[5][1].w, 1e-4)
       assert.near(result[5][1].w, result[6][1].w, 0)
     end
-    -- The place of contact of a ball that rolls stands still.
+    -- The contact point of a rolling ball is at rest.
     local p = run(1)[5][1]
     local slip = vec3(p.v.x, 0, p.v.z) + p.w:cross(vec3(0, -0.1, 0))
     assert.near({0, 0, 0}, slip, 1e-5)

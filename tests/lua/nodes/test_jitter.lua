@@ -1,4 +1,4 @@
--- :jitter against the statistics that it promises.
+-- :jitter against its documented statistics.
 local scene = require "testing.scene"
 
 local function spread(fps, frames)

@@ -1,4 +1,4 @@
--- :kill_slow: who goes, and when.
+-- :kill_slow: which points are killed, and when.
 local scene = require "testing.scene"
 
 local function ids(points)
@@ -19,7 +19,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2
   it("spares the young", function()
     local result = scene.run("return rapid.create { fps = 10, points = two } :kill_slow { age = 0.25 } :solve {}",
       { frames = {1, 5} })
-    -- At frame f the points come in with the age (f - 2) / 10.
+    -- At frame f the points enter the node with the age (f - 2) / 10.
     for f, count in pairs { [2] = 2, [4] = 2, [5] = 0 } do assert.equal(count, #result[f]) end
   end)
 end)

@@ -1,4 +1,4 @@
--- :look_ahead: obstacles are passed without contact, at the same speed, and paths that are clear stay as they are.
+-- :look_ahead: obstacles are passed without contact, at the same speed, and clear paths do not change.
 local scene = require "testing.scene"
 
 local function run(shape, options)
@@ -41,7 +41,7 @@ describe("look_ahead", function()
 return rapid.create { fps = 240, points = rapid.points.from { P = {{-1, 0.5, 0}}, v = {{2, 0, 0}} } }
   :look_ahead { shape = rapid.shape.sphere { radius = 0.6 }, clearance = 0.1, strength = 100 } :solve {}]],
       { frames = {2, 2} })[2][1]
-    -- The path is nearest at (0, 0.5, 0), in half a second: 0.2 m are missing. Steps in the ball are below 0.1 m.
+    -- The path is nearest at (0, 0.5, 0), after half a second: 0.2 m are missing. Steps in the ball are below 0.1 m.
     local off = 0.1 / 2
     assert.is_true(p.v.y * 240 > 4 * (0.2 - off ^ 2) / (0.5 + off / 2) ^ 2)
     assert.is_true(p.v.y * 240 < 4 * 0.2 / (0.5 - off / 2) ^ 2)

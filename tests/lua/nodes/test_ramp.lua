@@ -1,4 +1,4 @@
--- :ramp against numbers worked out by hand.
+-- :ramp against hand-computed numbers.
 local scene = require "testing.scene"
 
 local function points(columns, arguments)
@@ -30,7 +30,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2
       local age = (f - 1) / 24
       assert.near(10 * age, result[f]:by_id(0).heat, 1e-5)
       assert.near(10 * age / 4, result[f]:by_id(1).heat, 1e-5)
-      assert.equal(0, result[f]:by_id(2).heat) -- it lives for ever
+      assert.equal(0, result[f]:by_id(2).heat) -- its life is infinite
     end
   end)
 

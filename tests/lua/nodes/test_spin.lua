@@ -1,4 +1,4 @@
--- :spin against the angle that it turns by.
+-- :spin against its angle of rotation.
 local scene = require "testing.scene"
 
 describe("spin", function()
@@ -18,7 +18,7 @@ return rapid.create { fps = 10, points = rapid.points.grid { size = {2, 1, 1}, s
   :spin { rate = 100, variation = 0.5 } :solve {}]], { frames = {1, 11} })
     local sum, count = 0, #result[2]
     for i = 1, count do
-      -- orient is a turn about y: the angle is twice atan2(y, w).
+      -- orient is a rotation about y, so the angle is twice atan2(y, w).
       local first = math.deg(2 * math.atan2(result[2][i].orient.y, result[2][i].orient.w)) * 10
       local later = math.deg(2 * math.atan2(result[11][i].orient.y, result[11][i].orient.w))
       assert.is_true(first >= 50 - 1e-3 and first <= 150 + 1e-3)

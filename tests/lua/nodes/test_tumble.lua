@@ -1,4 +1,4 @@
--- :tumble against the angle that it turns by.
+-- :tumble against its angle of rotation.
 local scene = require "testing.scene"
 
 describe("tumble", function()

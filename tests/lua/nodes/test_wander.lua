@@ -16,7 +16,7 @@ return rapid.create { fps = 5, points = rapid.points.from { P = {{0.3, 1.2, -0.7
   end)
 
   it("keeps a cloud together: its volume does not change", function()
-    -- Six corners of an octahedron about each centre; the flow has no divergence, so its volume stays.
+    -- Six corners of an octahedron about each centre. The flow is free of divergence, so its volume is constant.
     local result = scene.run([[
 local P, h = {}, 0.002
 for k = 0, 9 do

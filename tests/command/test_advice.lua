@@ -8,7 +8,7 @@ local one = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 0, 2}} }
 ]]
 local omega = 1.9 * 24
 
--- An orbit of the angle omega a second, by an action; exactly solved no more.
+-- An orbit with omega rad/s, driven by an action, so that it is not solved in closed form.
 local sun = head .. [[
 return rapid.create { fps = 24, points = one }
   :action("sun", function(p) p.force = p.force - 45.6 ^ 2 * p.P end) :solve { %s }
@@ -20,7 +20,7 @@ local function rapid(arguments, text)
   return command.rapid(arguments, { cwd = folder.path }), folder
 end
 
--- The lines about stiff nodes.
+-- Returns the lines about stiff nodes.
 local function advice(arguments, text)
   local result = rapid(arguments, text)
   assert.equal(0, result.status, result.stderr)
@@ -45,7 +45,7 @@ return rapid.create { fps = 24, points = one } :attribute { mass = 2 }
         .. "estimated error (%S+) m; (%d+) sub%-steps would give (%S+) m$")
       assert.equal("1.9", step, lines[1])
       assert.equal("8", substeps)
-      -- The errors of the first frame that are true, by the closed form; told with one digit.
+      -- The true errors of the first frame, from the closed form; the summary reports one digit.
       for n, told in pairs { [1] = tonumber(error), [8] = tonumber(less) } do
         local folder = command.folder()
         folder:write("scene.lua", sun:format("substeps = " .. n))
@@ -103,7 +103,7 @@ return rapid.create { points = one } :points("fails", function(_, f) if f.number
     assert.equal("", result.stderr)
   end)
 
-  -- Points about a torus, drawn to its surface: at first, and the worst error after two seconds.
+  -- Points around a torus, attracted to its surface: the stiffness at first, and the worst error after two seconds.
   local function drawn(core)
     return rapid("run scene.lua -f 1-48", head .. ([[
 return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.5 } }
@@ -120,7 +120,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, s
     assert.falsy(with.stdout:find("stiff", 1, true), with.stdout)
     local function median(result) return tonumber(result.stdout:match "half of the points below (%S+) m") end
     assert.truthy(median(bare) > 1, bare.stdout)
-    -- 1.5 (what is told by what is) (omega dt)²/24 of 12 radians, about 2 m: a quarter of a radian in a sub-step.
+    -- 1.5 (ratio of reported to true) (omega dt)²/24 of 12 radians, about 2 m: a quarter of a radian per substep.
     assert.truthy(median(with) < 0.1, with.stdout)
   end)
 

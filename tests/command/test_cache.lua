@@ -1,4 +1,4 @@
--- rapid run --cache: a run that goes on where it was, to the same bytes; and what refuses to.
+-- rapid run --cache: a run that resumes with the same bytes, and what prevents a resume.
 local command = require "testing.command"
 local amount = require "tests.amount"
 local await = require "tests.await"
@@ -45,7 +45,7 @@ local function write_plugin(folder, name)
   folder:shell("cc -shared -fPIC -o " .. name .. " plugin.c")
 end
 
--- The frames that a run tells it has computed.
+-- Returns the frames that a run reports as computed.
 local function computed(said)
   local list = {}
   for number in said:gmatch "\nframe (%d+)  " do list[#list + 1] = tonumber(number) end
@@ -72,7 +72,7 @@ describe("rapid run --cache", function()
     folder:shell "rm a.csv a/a.0003.bgeo"
     folder:done("-f 1-30 " .. arguments)
     folder:shell "diff -r whole a && cmp whole.csv a.csv && rm a.csv"
-    assert.same(range(21, 30), computed(folder:done("-f 1-30 " .. arguments))) -- for the events of the last
+    assert.same(range(21, 30), computed(folder:done("-f 1-30 " .. arguments))) -- for the events of the last frame
     folder:shell "cmp whole.csv a.csv"
   end)
 
@@ -96,7 +96,7 @@ run --quiet 2>&1 && cmp whole.csv a.csv
     assert.matches("warning: cache/snapshot.0039.rapid: its events in cache/events: it is damaged; it is left out",
       said, 1, true)
     assert.truthy(not said:find("snapshot.0003", 1, true))
-    -- Once more from what has been mended.
+    -- Once more from the repaired cache.
     folder:shell "rm a.csv"
     assert.equal("", folder:done("-f 1-40 --set rate=4000 --cache cache --cache-every 3 --events a.csv --quiet"))
     folder:shell "cmp whole.csv a.csv"
@@ -158,7 +158,7 @@ run --quiet 2>&1 && cmp whole.csv a.csv
   end)
 
   it("draws pictures and films as a run that was not interrupted", function()
-    -- Its first points are born in the sixth frame.
+    -- The first points are born in the sixth frame.
     local folder = new_folder((rain:gsub(":emit {", ":emit { impulse = { [6] = 30 }, "):gsub("rate = rate,", "")))
     local outputs = "--size 64x36 -o DIR/p.####.png -o DIR/n.####.png:P -o DIR/film.gif"
     folder:done("-f 1-18 " .. outputs:gsub("DIR", "whole"))
@@ -222,11 +222,11 @@ return rapid.create { seed = 3 }
   end)
 
   it("goes on whatever options are given that do not change frames, and refuses all others", function()
-    -- By option: how it is given in the second run. Refused are those that say what differs.
+    -- Options of the second run. An entry with `differs` is refused with that text.
     local options = {
       ["--set"] = { "--set rate=500", differs = "emit1.rate" },
       ["--seed"] = { "--seed 4", differs = "seed of create1" },
-      ["--keep-all"] = { "--keep-all", differs = "attributes of create1" },  -- snapshots lack some
+      ["--keep-all"] = { "--keep-all", differs = "attributes of create1" },  -- snapshots lack some attributes
       ["--script-timeout"] = { "--script-timeout 100" },
       ["--script-memory"] = { "--script-memory 512M" },
       ["--memory"] = { "--memory 2G" }, ["--frames"] = { "--frames 5-6" },
@@ -240,7 +240,7 @@ return rapid.create { seed = 3 }
       ["--untrusted"] = { "--untrusted" }, ["--allow-read"] = { "--untrusted --allow-read ." },
       ["--threads"] = { "--threads 3" }, ["--plugin"] = { "--plugin p.so", differs = "the plugin p.so" },
       ["--verbose"] = { "--verbose" },
-      -- Not given together with --cache, or not for a run.
+      -- Options that exclude --cache, or are not those of a run.
       ["--watch"] = false, ["--farm"] = false, ["--farm-options"] = false, ["--dry-run"] = false, ["--parts"] = false,
       ["--help"] = false,
     }
@@ -380,7 +380,7 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
     assert.equal("", stderr_of "local own, n = {}, 0 own[1] = frame.number for _, x in ipairs(own) do n = n + x end")
   end)
 
-  -- Runs again after some damage; returns the warnings. Nine frames are there, with snapshots of 3, 6 and 9.
+  -- Runs again after some damage and returns the warnings. There are nine frames, with snapshots of 3, 6 and 9.
   local damaged = new_folder()
   damaged:done "-f 1-12 -o whole/a.####.bgeo"
   damaged:done "-f 1-9 -o a/a.####.bgeo --cache cache --cache-every 3"
@@ -411,7 +411,7 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
       '"$RAPID" run scene.lua -f 1-9 --set rate=20 --cache other >/dev/null && cp other/snapshot.0009.rapid ' ..
       snapshot)
     check("", 10, "echo text >cache/snapshot.abc.rapid")
-    -- Nothing of the journal is used that is not whole.
+    -- Damaged entries of the journal are not used.
     check("warning: cache/journal: it is damaged; the cache begins anew\n", 1, "echo text >cache/journal")
     check("warning: cache/journal: an entry is damaged; frames without a record are computed again\n", 7,
       "truncate -s -1 cache/journal")
@@ -445,7 +445,7 @@ flock -n 9
 "$RAPID" run scene.lua -f 1-2 --cache cache 2>&1 || echo "status $?"
 ]]
     assert.equal("--cache cache: another run has it; wait for its end, or give another folder\nstatus 2\n", said)
-    -- One that ends is waited for.
+    -- A run waits for another that is ending.
     assert.truthy(folder:shell(await .. [[
 flock cache/.lock sleep 0.5 &
 await $! test -e cache/.lock || exit 1
@@ -500,7 +500,7 @@ ls cache | grep snapshot
 ]])
     assert.equal("status 143\ninterrupted; the frame took longer than the --grace, and is dropped\n" ..
       "snapshot.0002.rapid\n", said)
-    -- With a second signal, at once. (What the first run said would be found before this one begins.)
+    -- A second signal ends it at once. (The first run's output would be found before this one begins.)
     said = folder:shell(await .. [[
 "$RAPID" run scene.lua -f 1-8 --cache other --grace 1000 >again 2>&1 &
 one=$!
@@ -524,7 +524,7 @@ tail -n 1 again
     assert.equal("warning: frame 6: cache/snapshot.0005.rapid: can't be written: it is not a regular file; " ..
       "the run goes on without this snapshot\n", (result.stderr:gsub("frame %d+", "frame 6")))
     folder:shell "diff -r whole a"
-    -- A full disk; a name space of its own may mount one.
+    -- Tests a full disk; a private namespace may mount one.
     if command.shell("unshare -rm true").status ~= 0 then return end
     local said = folder:shell [[
 mkdir full

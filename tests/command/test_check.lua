@@ -1,4 +1,4 @@
--- rapid check: errors that can be found without a frame. They are those of `run` (test_run_failures.lua).
+-- rapid check: errors that can be found without computing a frame. test_run_failures.lua has the same errors for `run`.
 local command = require "testing.command"
 
 local function check(text, arguments)
@@ -65,7 +65,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
       assert.not_equal(0, result.status, wrong)
       assert.truthy(result.stderr:find(("^scene.lua:%d: node"):format(3 + k)), result.stderr)
     end
-    -- It may want more points than there are here.
+    -- The scene may require more points than this trial has.
     assert.equal(0, with(5, "points[5000].P = vec3(0, 0, 0)").status)
   end)
 
@@ -94,7 +94,7 @@ return rapid.create {} :%s }
       assert.match('^scene.lua:5: node "k"', result.stderr)
       assert.equal("", check(chain:format(births(source), "p.v = p.P * frame.time")).stderr)
     end
-    -- The frames of a trial are those in which points are.
+    -- A trial uses the frames that contain points.
     assert.equal(0, check(chain:format(
       births "rapid.mesh.sphere {}, rate = function(frame) return frame.number > 10 and 100 or 0 end",
       "p.v = p.P * ({ [17] = 2 })[frame.number]")).status)

@@ -1,8 +1,8 @@
-// Caches of others: those of `--cache`, with values that no run would leave and checksums that are right. A run that is
-// to go on from one does, or ends with an error; not by a signal, and not after more than ten seconds of the processor.
+// Malicious caches: those of `--cache` with values that no run would store, and valid checksums. A run that resumes
+// from one succeeds or ends with an error. It does not crash, or take more than ten seconds of processor time.
 //
-//   RAPID_CRAFTED=10000 build/test/bin/test_command "[crafted]"        as many (40)
-//   RAPID_CRAFTED_FIRST=2000 build/test/bin/test_command "[crafted]"   from this one on (0), as far as RAPID_CRAFTED
+//   RAPID_CRAFTED=10000 build/test/bin/test_command "[crafted]"        the total number of caches (40)
+//   RAPID_CRAFTED_FIRST=2000 build/test/bin/test_command "[crafted]"   the first of them (0); RAPID_CRAFTED is the end
 #include <sys/wait.h>
 
 #include <cstdlib>
@@ -28,11 +28,11 @@ constexpr const char* scene = R"(local rapid = require "rapid"
       :attribute { pscale = 0.05 } :gravity {} :contact { friction = 0.3 }
       :collide { shape = rapid.shape.plane {} } :solve {})";
 
-// The status of a shell: above 128 of what a signal has ended.
+// Returns a shell's status: above 128 if a signal ended the command.
 int run(const fs::path& folder)
 {
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "rapid";
-#ifdef RAPID_ADDRESS_SANITIZER  // which maps terabytes
+#ifdef RAPID_ADDRESS_SANITIZER  // it maps terabytes
     const std::string most_memory = "unlimited";
 #else
     const std::string most_memory = "4194304";
@@ -45,7 +45,7 @@ int run(const fs::path& folder)
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-// One entry of the journal becomes another, behind its first, which says of which run it is.
+// Changes one entry of the journal after the first, which identifies the run.
 std::string forged_journal(const std::string& whole, std::uint64_t seed)
 {
     std::string text = whole.substr(0, 8);
@@ -68,7 +68,7 @@ std::string forged_journal(const std::string& whole, std::uint64_t seed)
     return text;
 }
 
-// A snapshot of nothing, with this header.
+// Returns an empty snapshot with this header.
 std::string snapshot_with(const std::string& header)
 {
     const std::uint64_t length = header.size();

@@ -1,4 +1,4 @@
--- rapid run --events: births, contacts and deaths as points, at their places and moments.
+-- rapid run --events: births, contacts and deaths as points with their positions and times.
 local scene = require "testing.scene"
 local csv_rows = require "tests.csv_rows"
 

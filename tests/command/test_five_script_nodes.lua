@@ -1,4 +1,4 @@
--- A scene of five kinds of script, run from the command line: the same files, whatever the number of threads.
+-- A scene with five kinds of scripts, run from the command line, writes the same files with any number of threads.
 local command = require "testing.command"
 
 local folder = command.folder()

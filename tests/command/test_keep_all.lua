@@ -1,5 +1,5 @@
--- Omissions change no bit of the outputs: each run is compared with one that omits nothing, and with one in which
--- another file asks for more.
+-- Pruning changes no bit of the outputs: each run is compared with one that prunes nothing, and with one in which
+-- another file requests more.
 local amount = require "tests.amount"
 local command = require "testing.command"
 local csv_rows = require "tests.csv_rows"
@@ -58,8 +58,8 @@ describe("what is left out", function()
     end)
   end
 
-  -- What comes by a merge has its own values, or the defaults, whatever the points have that it comes to: an attribute
-  -- of the point at y = 5, and its value.
+  -- Points that are merged into others have their own values, or the defaults, whatever the others have. Lists an
+  -- attribute of the point at y = 5, and its value.
   local sheet = ":attribute { pscale = 0.03, mass = 4 } "
   local read = ':points("read", function(p) p.v = vec3(p.heat, 0, 0) end) '
   local both = {

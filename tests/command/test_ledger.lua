@@ -2,7 +2,7 @@
 local command = require "testing.command"
 local json = require "dkjson"
 
--- What the frames from `first` to 25 have changed the energy by, by name; and the summary.
+-- Returns the change of energy by cause over the frames from `first` to 25, and the summary.
 local function ledger(text, first)
   local folder = command.folder()
   folder:write("scene.lua", 'local rapid = require "rapid"\nreturn rapid.create { fps = 24, points = ' .. text)
@@ -17,7 +17,7 @@ local function ledger(text, first)
   return sums, result.stdout
 end
 
--- Of one second; all that is not named is 0.
+-- Checks the sums over one second; all that are not named are 0.
 local function check(expected, sums, tolerance)
   for name, value in pairs(sums) do assert.near(expected[name] or 0, value, tolerance, name) end
   for name in pairs(expected) do assert.truthy(sums[name], name) end

@@ -1,4 +1,4 @@
--- What readers of points leave out is told, by the file: in the warnings of a run, and by rapid info.
+-- Data that readers of points skip is reported per file, in the warnings of a run and by rapid info.
 local scene = require "testing.scene"
 
 local function warnings(file)
@@ -15,7 +15,7 @@ end
 
 describe("what a reader leaves out", function()
   it("is told of .bgeo: primitives", function()
-    -- A point at 0, with an attribute of strings, and spheres (7), of which only their number can be told.
+    -- A point at 0 with a string attribute, and spheres (7), of which only the number can be reported.
     scene.folder:write("one.bgeo", "BgeoV" .. big(5, 4) .. big(1, 4) .. big(3, 4) .. big(0, 4):rep(2) .. big(1, 4) ..
       big(0, 4):rep(3) .. big(4, 2) .. "kind" .. big(1, 2) .. big(4, 4) .. big(1, 4) .. big(4, 2) .. "rock" ..
       big(0, 4):rep(3) .. "\63\128\0\0" .. big(0, 4) .. big(7, 4) .. "\0\255")

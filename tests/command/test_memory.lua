@@ -1,11 +1,11 @@
--- --memory: what would need more is refused before it is begun, with numbers and the parameter that would mend it.
+-- --memory: work that would need more is refused before it begins, with numbers and the parameter that would help.
 local command = require "testing.command"
 local json = require "dkjson"
 local scene = require "testing.scene"
 
 local grid = "rapid.points.grid { size = {40, 40, 40}, spacing = 1 }"
 
--- By the node and the message, what scenes need that is too much.
+-- Scenes that need too much, by node and message.
 local needs = {
   ["return rapid.create {} :emit { source = rapid.mesh.box {}, count = 1e9 } :solve {}"] =
     '^scene%.lua:1: node "emit1": 1000000000 births in a frame, behind 0 points, would take about 119%.2 GiB, and ' ..
@@ -101,7 +101,7 @@ end) :solve {}]], "--id 0 -f 1-9 --memory 200M --script-memory 4G")
   end)
 end)
 
--- A file says how much it holds; one of holes, or one that is compressed, is small on the disk.
+-- A file declares its size; one with holes, or a compressed one, is small on disk.
 describe("a file that is larger than the memory that a run may take", function()
   local function read(file)
     return scene.command("run", "return rapid.create { points = rapid.points.read '" .. file .. "' } :solve {}",
@@ -160,7 +160,8 @@ describe("a neighbourhood of all points", function()
     assert.match('^scene%.lua:1: node "interact1": radius = 1e%+09 m: about 6%.4e%+04 neighbours of each of 64000 ' ..
       "points, 1%.6e%+13 looks in a frame of 1000 steps, of which at most 1e%+12 are taken; give it a smaller " ..
       "radius\n$", result.stderr)
-    -- With a few neighbours it passes, where all would be too many in these steps: pairs are counted, not points.
+    -- With few neighbours it passes, although all pairs would be too many in these steps: pairs are counted, not
+    -- points.
     local near = text:format(1.1):gsub(":contact { radius = 0.1 }", ""):gsub("1000 }", "%%d }")
     assert.match("looks in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
       "-f 1-2 --quiet").stderr)
@@ -196,7 +197,7 @@ end }]])
       local message = scene.command("check", text).stderr
       assert.truthy(#message > 20 and #message < 5000, #message)
       assert.match("%[%.%.%. %d+ bytes %.%.%.%]", message)
-      assert.falsy(message:find "[\192-\255][ \"]", "half of a character") -- of UTF-8
+      assert.falsy(message:find "[\192-\255][ \"]", "half of a character") -- part of a UTF-8 character
     end
   end)
 end)

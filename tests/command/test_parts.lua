@@ -1,4 +1,4 @@
--- rapid run --part, --sample, rapid merge, and what `rapid explain` says of them.
+-- rapid run --part, --sample, rapid merge, and how `rapid explain` reports them.
 local command = require "testing.command"
 local amount = require "tests.amount"
 local csv_rows = require "tests.csv_rows"
@@ -108,7 +108,7 @@ describe("rapid run --part", function()
     end
     local whole, parts = lines "ev.csv", lines("ev_part1of2.csv", "ev_part2of2.csv")
     assert.is_true(#whole > 100)
-    assert.equal(#whole + 1, #parts) -- a header each
+    assert.equal(#whole + 1, #parts) -- one header each
   end)
 
   it("refuses a part that is none", function()
@@ -126,7 +126,7 @@ end)
 describe("parts with a cache", function()
   it("are the whole run when they were interrupted, and complete where all frames were there", function()
     done "run drops.lua -f 1-12 -o 'cw.####.csv' --quiet"
-    for k = 1, 2 do -- a folder each
+    for k = 1, 2 do -- one folder each
       done(("run drops.lua --part %d/2 -f 1-5 -o 'cc.####.csv' --cache caches/%d --cache-every 2 --quiet"):format(k, k))
       done(("run drops.lua --part %d/2 -f 1-12 -o 'cc.####.csv' --cache caches/%d --quiet"):format(k, k))
     end
@@ -197,7 +197,7 @@ return rapid.create { fps = 24, seed = 5 }
   end)
 end)
 
--- What couples, by a scene's chain: each is refused by run and explained by explain.
+-- Couplings, by a scene's chain: run refuses each, and explain names it.
 local emitter = ":emit { source = rapid.shape.sphere {}, rate = 50, attributes = { pscale = 0.1 } }"
 local coupled = {
   ["contact1"] = { emitter .. ":contact {}", "solved for all points together" },
@@ -299,7 +299,7 @@ describe("every scene in graphs", function()
       end
       possible = possible + 1
       command.shell("rm -f g.* gp_* gm.*", { cwd = folder.path })
-      -- The scene may warn.
+      -- The scene may print warnings.
       assert.equal(0, rapid("run " .. scene .. " -f 1-11x5 -o 'g.####.bgeo' --quiet").status)
       for _, count in ipairs(amount.thorough and { 2, 3, 16 } or { 3 }) do
         for k = 1, count do
@@ -321,7 +321,7 @@ describe("every scene in graphs", function()
   end)
 end)
 
--- PARTS_SCENES and PARTS_SEED make more of them, and others.
+-- PARTS_SCENES and PARTS_SEED select their number and the seed.
 describe("random scenes without couplings", function()
   local pick = lehmer.new(tonumber(os.getenv "PARTS_SEED") or 11).pick
 

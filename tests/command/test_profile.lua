@@ -6,7 +6,7 @@ return rapid.create { fps = 24, subframes = 2, points = two } :gravity {}
   :points("spin", function(p) p.v = vec3(1, p.v.y, 0) end)
   :solve {}]]
 
--- Members of the events of one name, in order.
+-- Returns the members of the events with one name, in order.
 local function events_of(json, name)
   local events = {}
   for line in json:gmatch "[^\n]+" do
@@ -29,7 +29,7 @@ describe("--profile", function()
     assert.equal('{"displayTimeUnit": "ms", "traceEvents": [', json:match "^[^\n]+")
     assert.equal("]}\n", json:sub(-3))
     local passes, solves = events_of(json, "spin"), events_of(json, "solve1")
-    assert.equal(7, #passes) -- the first frame has no interval, and so no sub-frames
+    assert.equal(7, #passes) -- the first frame has no interval, and so no subframes
     assert.equal(7, #solves)
     for number = 1, 4 do
       local frame = events_of(json, "frame " .. number)

@@ -1,8 +1,8 @@
--- rapid check --races: state that a kernel keeps from point to point, and that neither its bytecode shows nor the
--- comparison of what all points share, which stops at 10,000 values.
+-- rapid check --races: finds state that a kernel stores between points and that neither the bytecode analysis nor the
+-- comparison of shared values, which stops at 10,000 values, can find.
 local scene = require "testing.scene"
 
--- A table in a table of the kernel's own is not followed.
+-- A table inside another table of the kernel is not followed.
 local hidden = "local held = { box } local kept = held[1] "
 
 local function check(chain, before, arguments)
@@ -25,7 +25,7 @@ describe("rapid check --races", function()
     assert.equal('scene.lua:4: node "count": frame 2: n of point id 0 is 1 in the order of the points, and 2 in ' ..
       "reverse order" .. remedy, result.stderr)
     assert.equal(1, result.status)
-    assert.equal(0, check(chain, nil, "").status) -- its bytecode says nothing
+    assert.equal(0, check(chain, nil, "").status) -- the bytecode analysis does not find it
   end)
 
   it("finds what depends on the points that a state has seen, in whatever order", function()

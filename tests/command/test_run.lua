@@ -67,7 +67,8 @@ describe("rapid run", function()
   end)
 
   it("warns once of what is doubtful in many frames, and adds it up in the summary", function()
-    -- A ball of no radius that bounces in a slit of a micrometre, 4 million times a frame, until it rests; kicked anew.
+    -- A ball without radius bounces in a slit of a micrometre, 4 million times a frame, until it rests; then it is
+    -- kicked again.
     local folder = new_folder [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100, 0, 0}} } }
@@ -304,7 +305,7 @@ return rapid.create { points = rapid.points.from { P = {{x, up and 1 or 0, 0}} }
     assert.truthy(result.stderr:find('no parameter "hieght"; did you mean "height"?', 1, true), result.stderr)
   end)
 
-  -- Drops fall from 1 m and burst where they land; each piece bursts again where it dies, 0.2 s later.
+  -- Drops fall from 1 m and burst on impact; each piece bursts again when it dies, 0.2 s later.
   local bursts = [[
 local drops = rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }
   :gravity {} :collide { shape = rapid.shape.plane {}, record = true } :solve {}
@@ -386,7 +387,7 @@ describe("--stats", function()
         assert.equal("number", type(frame[name]), name)
       end
       if i == 1 then
-        assert.falsy(frame.error) -- nothing has moved
+        assert.falsy(frame.error) -- nothing has moved yet
       else
         assert.same({ position_p50 = 0, position_p95 = 0, position_max = 0 }, frame.error)
       end
@@ -438,7 +439,7 @@ if rapid.param("ball", true) then scene = scene:collide { shape = rapid.shape.sp
 return scene:solve {}
 ]]
 
-  -- Width and height, as a PNG's header has them.
+  -- Reads width and height from a PNG header.
   local function size_of(png)
     local wide, wide_low = png:byte(19, 20)
     local high, high_low = png:byte(23, 24)

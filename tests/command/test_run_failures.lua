@@ -123,7 +123,7 @@ return rapid.create { points = points } :points("spins", function(p) while true 
       :run "-f 1-4 --script-memory 32M"
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find("memory", 1, true), result.stderr)
-    -- Less than a state takes before it runs a script.
+    -- Less memory than a state takes before it runs a script.
     for most, bytes in pairs { ["1"] = 1, ["300K"] = 307200 } do
       result = new_folder(points .. "return rapid.create {} :solve {}"):run("-f 1-2 --script-memory " .. most)
       assert.equal(2, result.status)
@@ -133,7 +133,7 @@ return rapid.create { points = points } :points("spins", function(p) while true 
   end)
 end)
 
--- Stopped for longer than a script may take, in the midst of one.
+-- The process is stopped during a script, for longer than a script may take.
 describe("a run that is stopped (SIGSTOP)", function()
   it("goes on, and its scripts have all their time", function()
     local folder = new_folder([[
@@ -169,7 +169,7 @@ return rapid.create {}
 
   it("ends the run with 1, names the file and the reason, and leaves the frames before it", function()
     local folder = new_folder(growing)
-    -- Files of at most 32 KiB: a frame has 100 points more than the one before.
+    -- Files of at most 32 KiB: each frame has 100 points more than the previous one.
     local result = command.shell('ulimit -f 64; "$RAPID" run scene.lua -f 1-40 -o a.####.csv --stats stats.json',
       { cwd = folder.path })
     assert.equal(1, result.status, result.stderr)
@@ -190,7 +190,7 @@ return rapid.create {}
     local in_file = folder:run "-f 1-4 -o scene.lua/a.####.csv"
     assert.equal(1, in_file.status)
     assert.truthy(in_file.stderr:find("^scene.lua/a.0001.csv: "), in_file.stderr)
-    -- No one writes here, not even root.
+    -- Not even root can write here.
     local forbidden = folder:run "-f 1-4 -o /sys/rapid/a.####.csv"
     assert.equal(1, forbidden.status)
     assert.truthy(forbidden.stderr:find("^/sys/rapid/a.0001.csv: .*not permitted") or
@@ -211,7 +211,7 @@ local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.05 } } :gravity {} :solve {}
 ]]
 
-  -- The signal comes when frame 3 is there; the rest of a million frames is not.
+  -- The signal arrives when frame 3 exists and the rest of a million frames does not.
   local function interrupt(folder, signal)
     return command.shell(([[
 env --default-signal=INT,QUIT,HUP "$RAPID" run scene.lua -f 1-1000000 -o out/a.####.csv --stats stats.json &
@@ -244,7 +244,8 @@ wait $run
 end)
 
 describe("Ctrl-C", function()
-  -- Milliseconds from the signal to the end of a command that has just begun its endless work, and its status.
+  -- Returns the milliseconds from the signal to the end of a command that has just begun its endless work, and its
+  -- status.
   local function end_of(text, arguments)
     local folder = new_folder(text)
     local result = command.shell(([[
@@ -262,7 +263,7 @@ echo $status $((($(date +%%s%%N) - begun) / 1000000))
     return tonumber(status), tonumber(milliseconds)
   end
 
-  -- 30 ms on an idle machine; the bound is for one that is not.
+  -- 30 ms on an idle machine; the bound allows for a busy one.
   it("ends a scene that is still being read: a chain without end, a level set", function()
     for text, arguments in pairs {
       ["local n = rapid.create {} for i = 1, 1e6 do n = n:points('k' .. i, function(p) p.v = p.v end) end return n"] =

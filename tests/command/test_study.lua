@@ -4,8 +4,8 @@ local json = require "dkjson"
 
 local folder = command.folder()
 
--- Points at rest, pushed by an action in the middle of each sub-step: v grows by dt^power each time, so that after t
--- seconds a point is off by dt^(power - 1) t²/2.
+-- Points at rest, pushed by an action at the midpoint of each substep: v grows by dt^power each time, so after t
+-- seconds the position error is dt^(power - 1) t²/2.
 local header = 'local rapid = require "rapid"\n'
 local function study(name, fields)
   folder:write(name, header .. [[
@@ -71,7 +71,7 @@ describe("rapid study", function()
     assert.equal(1, found.repeat_runs)
     local svg = folder:read "written/study.svg"
     local lines, markers = select(2, svg:gsub('<path class="line"', "")), select(2, svg:gsub("<title>error", ""))
-    assert.equal(2 * 2, lines) -- each in the plot and in the legend
+    assert.equal(2 * 2, lines) -- one each in the plot and in the legend
     assert.equal(6, markers)
     assert.truthy(svg:find("prefers-color-scheme: dark", 1, true))
     assert.truthy(svg:find("order 1.00", 1, true))

@@ -1,4 +1,4 @@
-// What a sandboxed process can't do, each tried in a process of its own.
+// Operations that the sandbox forbids, each tried in a separate process.
 #include "bindings/command_line/system_call_filter.h"
 
 #include <fcntl.h>
@@ -40,8 +40,8 @@ constexpr int not_loaded = 254;
 
 constexpr unsigned hangs_after = 60;  // s
 
-// The errno of a call that returns -1, in a process with the filter; 0 where it succeeds. Minus the signal that ended
-// the process if one did.
+// Returns the errno of a call that returns -1 in a process with the filter; 0 if it succeeds; minus the signal if one
+// ended the process.
 int error_in_sandbox(Processes processes, const std::function<long()>& call,
                      Connections connections = Connections::None)
 {
@@ -59,7 +59,7 @@ int error_in_sandbox(Processes processes, const std::function<long()>& call,
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
-// A file of this process, which it could change in every way.
+// A file owned by this process, which it could otherwise change in any way.
 class OwnFile {
 public:
     OwnFile() : path_(std::filesystem::temp_directory_path() / ("rapid_sandbox_" + std::to_string(getpid())))
@@ -83,7 +83,7 @@ private:
 
 TEST_CASE("in the sandbox no other process is reached", "[untrusted]")
 {
-    const pid_t other = getpid();  // of the child that tries: its parent
+    const pid_t other = getpid();  // for the child that tries: its parent
     const std::map<std::string, std::function<long()>> calls = {
         {"kill", [=] { return kill(other, 0); }},
         {"kill of all", [] { return kill(-1, 0); }},
@@ -191,7 +191,7 @@ TEST_CASE("in the sandbox there is no memory outside of the limits", "[untrusted
             mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
     };
     CHECK(error_in_sandbox(Processes::None, map_shared) == EPERM);
-    // Counts as a stack, of which the limits hold when it grows alone.
+    // The mapping counts as a stack, whose limits apply when it grows by itself.
     const auto map_downwards = [] {
         return reinterpret_cast<long>(
             mmap(nullptr, 1 << 20, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0));
@@ -204,7 +204,8 @@ TEST_CASE("in the sandbox there is no memory outside of the limits", "[untrusted
     CHECK(error_in_sandbox(Processes::None, [] { return msgget(IPC_PRIVATE, IPC_CREAT | 0600); }) == EPERM);
 }
 
-// Each would be an error without the filter, too, but another one: no page of the machine is lost where it fails.
+// Each call would also fail without the filter, but with another error. If the filter fails, no page of the machine is
+// lost.
 TEST_CASE("in the sandbox no limit is set, no page is taken from the machine, and no thread is elsewhere",
           "[untrusted]")
 {

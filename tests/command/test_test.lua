@@ -149,7 +149,7 @@ it("comes after", function() end)]],
       "4 passed, 2 failed, 0 skipped\n", result.stdout)
   end)
 
-  -- The first test ends when the one of the last file has run: so neither waits if these run at the same time.
+  -- The first test ends only after the one of the last file has run, so neither waits if they run in parallel.
   local meeting = {
     ["t/test_a.lua"] = [[
 local command = require "testing.command"
@@ -247,7 +247,7 @@ end)]] }
 end)
 
 describe("a test", function()
-  -- Runs the body of a test beside the scene.
+  -- Runs the body of a test next to the scene.
   local function test(body)
     local folder = new_folder { ["scene.lua"] = scene, ["t.lua"] = 'it("holds", function()\n' .. body .. "\nend)\n" }
     return folder:test "t.lua"

@@ -7,7 +7,7 @@ local function trace(text, arguments)
   return scene.command("trace", text, "--json " .. arguments)
 end
 
--- The lines of a life, as text.
+-- Returns the lines of a life, as text.
 local function told(text, arguments, status)
   local result = scene.command("trace", text, arguments)
   assert.equal(status or 0, result.status, result.stderr)
@@ -34,7 +34,7 @@ describe("trace", function()
       if line:find "meets floor" then contacts[#contacts + 1] = numbers_in(line) end
     end
     assert.is_true(#contacts >= 1)
-    assert.near(fall, contacts[1][2], 1e-5) -- frame, time, place, normal, speed, impulse
+    assert.near(fall, contacts[1][2], 1e-5) -- frame, time, position, normal, speed, impulse
     assert.near(2 * fall, contacts[1][3], 1e-5)
     assert.near(g * fall, contacts[1][9], 1e-4)
     assert.near(3 * 1.5 * g * fall, contacts[1][10], 1e-3)

@@ -1,4 +1,4 @@
--- --untrusted: the sandbox of the system around a run, and around other commands.
+-- --untrusted: the operating system's sandbox around a run and around other commands.
 local command = require "testing.command"
 local json = require "dkjson"
 
@@ -8,7 +8,7 @@ local function graph(body)
   return "local rapid = require 'rapid'\nlocal two = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} }\n" .. body
 end
 
--- A folder with a graph, and beside it another one that the graph has no business in.
+-- Creates a folder with a graph, and another folder that the graph must not access.
 local function new_folder(body)
   local root = command.folder()
   command.shell("mkdir inside outside out", { cwd = root.path })
@@ -151,7 +151,7 @@ kill -9 $pid]], { cwd = folder.path }).stdout
     assert.equal(0, found.status)
   end)
 
-  -- OpenVDB and Assimp read both in the reader process.
+  -- Both are read in the reader process, by OpenVDB and Assimp.
   it("reads .vdb and meshes as a run without it does, to the bit", function()
     local folder = new_folder([[
 rapid.levelset.sphere { voxel = 0.1 } :write "out/ball.vdb"
@@ -273,7 +273,7 @@ describe("--untrusted of other commands", function()
     local refused = study "--untrusted"
     assert.not_equal(0, refused.status)
     assert.match("outside/mesh.obj", refused.stdout .. refused.stderr)
-    -- Its processes read foreign formats in copies of their own.
+    -- Its processes read foreign formats in separate copies.
     folder:write("inside/scene.lua", graph(read:gsub("../outside/mesh", "mesh")
       :gsub("gravity {}", "gravity {} :attract { strength = 1 }")))
     local inside = study "--untrusted"

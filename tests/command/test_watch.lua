@@ -10,14 +10,15 @@ local node = [[
 return require "rapid".node { name = "mine", doc = "A test.", points = function(p) p.v = vec3(0, 0, 0) end }
 ]]
 
--- Runs a watch, and beside it steps: shell commands, each after the log holds its text that often. Ends it by a signal.
+-- Runs a watch together with steps: shell commands, each run after the log contains its text the given number of times.
+-- Ends the watch by a signal.
 local function watch(steps, options)
   options = options or {}
   local folder = command.folder()
   folder:write("scene.lua", scene)
   folder:write("height.lua", "return 1")
   folder:write("mine.lua", node)
-  -- The log is there before it is looked at: of a missing one there is no number.
+  -- Waits for the log, because grep prints no number for a missing file.
   local script = [[
 : >log
 await() {  # TEXT TIMES: in the log, within 20 s

@@ -26,7 +26,7 @@ local function report(path)
   return json.decode((folder:read(path or "wedge.json")))
 end
 
--- Width and height of a .png.
+-- Returns the width and height of a .png.
 local function size_of(picture)
   local bytes = { picture:byte(17, 24) }
   return bytes[3] * 256 + bytes[4], bytes[7] * 256 + bytes[8]
@@ -113,7 +113,7 @@ describe("rapid wedge", function()
       ["--vary rte=1,2"] = 'no parameter "rte"; did you mean "rate"?',
       ["--vary solv.substeps=1,2"] = 'the graph has no node "solv"; did you mean "solve"?',
       ["--vary solve.substep=1,2"] = "substeps",
-      ["--vary rate=1,x"] = false, -- found in its row
+      ["--vary rate=1,x"] = false, -- found in the row
       ["--vary rate"] = "it must be NAME=VALUE,VALUE,...",
       ["--vary rate=1,,2"] = "a value is missing",
       ["--vary rate=1,2 --vary rate=3"] = "rate is varied twice",
@@ -201,7 +201,7 @@ describe("--set", function()
     assert.equal(low .. high, times(240) .. times(480))
     local second = report "again/wedge.json"
     for k, row in ipairs(second.rows) do
-      assert.truthy(row.seconds >= first.rows[k].seconds) -- those of the run that did it
+      assert.truthy(row.seconds >= first.rows[k].seconds) -- those of the run that computed the row
       row.seconds, first.rows[k].seconds, row.peak_bytes, first.rows[k].peak_bytes = nil, nil, nil, nil
     end
     assert.same(first, second)

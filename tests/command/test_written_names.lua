@@ -1,4 +1,4 @@
--- The names that a run writes: where two of its files had one, one would be lost; and what it reads is the user's.
+-- Names of output files: two outputs with one name are refused, because one would be lost, and so are names of inputs.
 local command = require "testing.command"
 
 local head = 'local rapid = require "rapid"\n'
@@ -7,7 +7,7 @@ local scene = head .. "return " .. chain .. "\n"
 local writes = head .. "return " .. chain .. ' :write { file = "x.####.csv" }\n'
 local body = head .. "return rapid.create { points = rapid.points.read 'a.0002.csv' } :solve {}\n"
 
--- Arguments; what is said; and the scene where it is another one.
+-- Arguments, the message, and the scene if it is a different one.
 local refused = {
   { "--stats scene.lua", "--stats scene.lua: the run reads scene.lua; write to another name" },
   { "--profile ./scene.lua", "--profile ./scene.lua: the run reads scene.lua; write to another name" },
@@ -26,7 +26,7 @@ local refused = {
   { "-o ./x.####.csv", '-o ./x.####.csv: node "write1" writes x.0001.csv, ', writes },
   { "--events x.0003.csv", 'scene.lua:2: node "write1": file = "x.####.csv": --events writes x.0003.csv, ', writes },
 }
--- Of frames that are not written, of other folders, with other numbers.
+-- Names of frames that are not written, of other folders, with other numbers.
 local taken = {
   { "-f 3-5 -o a.####.csv", body }, { "-o c/a.####.csv", body }, { "-o a.###.csv", body },
   { "--events x.0004.csv -o x.####.csv" }, { "--events x.00001.csv -o x.####.csv" },

@@ -1,4 +1,4 @@
-"""C, C++ and Python offer the same things under the same names, and the table in docs/host.md has them."""
+"""C, C++ and Python offer the same functions under the same names, and the table in docs/host.md lists them."""
 import pathlib
 import sys
 import unittest

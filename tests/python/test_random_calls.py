@@ -1,7 +1,7 @@
-"""Random sequences of calls of the Python module, right, wrong and hostile, against a model of what is open and at which
-frame it is. tests/scene/call_model.h does the same in C and C++.
+"""Random sequences of valid, wrong and hostile calls of the Python module, compared with a model of the open objects
+and their frames. tests/scene/call_model.h does the same in C and C++.
 
-    HOST_CALLS=24000 HOST_CALLS_SEED=7 tests/python/run build/test
+HOST_CALLS=24000 HOST_CALLS_SEED=7 tests/python/run build/test
 """
 import ctypes
 import math
@@ -21,7 +21,7 @@ return rapid.create { points = rapid.points.from { P = {{0, height, 0}, {1, heig
 CALLS = int(os.environ.get("HOST_CALLS", 240 * int(os.environ.get("RAPID_TEST_SCALE", 1))))
 SEED = int(os.environ.get("HOST_CALLS_SEED", 0))
 
-# What wrong and hostile calls raise: the library's errors, and those of Python for arguments that no call takes.
+# Errors of wrong and hostile calls: the library's, and Python's own for arguments that no call accepts.
 REFUSALS = (rapid.Error, TypeError, ValueError, KeyError, AttributeError, OverflowError, ctypes.ArgumentError)
 
 
@@ -46,7 +46,7 @@ class Sequence:
         kind()
 
     def expect(self, kind, function, *arguments):
-        """Calls a function, which raises an Error of this kind, or none if it is None."""
+        """Calls a function. It must raise an Error of this kind, or none if kind is None."""
         try:
             result = function(*arguments)
         except rapid.Error as error:
@@ -65,7 +65,7 @@ class Sequence:
 
     def close(self):
         one = self.scene()
-        one["scene"].release()  # a second time, too
+        one["scene"].release()  # a second time is allowed
         one["open"] = False
 
     def begin(self, one):
@@ -127,7 +127,7 @@ class Sequence:
     def release(self):
         if self.frames:
             frame, *_ = self.frames[self.random.randrange(len(self.frames))]
-            frame.release()  # arrays stay, and a second time is allowed
+            frame.release()  # arrays stay valid, and a second time is allowed
 
     def attack(self):
         one = self.scene()
@@ -136,7 +136,7 @@ class Sequence:
         with self.test.assertRaises(REFUSALS, msg=f"{self.said}") as caught:
             function()
         self.test.assertTrue(str(caught.exception), self.said)
-        if getattr(caught.exception, "kind", "") == "cancelled":  # a picture, for which shapes are computed
+        if getattr(caught.exception, "kind", "") == "cancelled":  # a picture, which computes shapes
             for other in self.scenes:
                 if other["scene"] is self.frames[-1][0]._scene:
                     self.test.assertTrue(other["cancelled"], self.said)
@@ -151,7 +151,7 @@ class Sequence:
 
 
 class Hostile:
-    """What claims to be an object of the module."""
+    """Objects that imitate those of the module."""
 
     def __getattr__(self, name):
         return self
@@ -161,7 +161,7 @@ class Hostile:
 
 
 def hostile_calls(scene, frames, snapshots):
-    """(name, function) of calls that are refused and change nothing."""
+    """Returns (name, function) of calls that are refused and change nothing."""
     texts = ["", "none", "P.x", "\x1b[2J", "\udcff", "a\0b", None, 3, b"P", "n" * 100000]
     numbers = [2**64 + 2, -2**80, 1.5, math.nan, "2", None, [2]]
     paths = ["", "x", "x.none", "/dev/full/x.csv", "/dev/zero", "/", "a\0b"]
@@ -177,7 +177,7 @@ def hostile_calls(scene, frames, snapshots):
     for thing in (None, 3, rapid.from_numpy, Hostile(), rapid.Shape(None), rapid.Shape(lambda P, gradient: 0, lower=(1,)),
                   rapid.Mesh([[0, 0, 0]], [[0, 1, 2]]), rapid.Mesh([[0, 0, 0]], [[-1, 0, 0]])):
         if isinstance(thing, rapid.Shape) and thing._distance is None:
-            continue  # a callback that can't be called is an error of the frame
+            continue  # a callback that is not callable is an error of the frame
         all_calls.append((f"offer {thing}", lambda t=thing: scene.offer("thing", t)))
     for text in (None, 3, "", "return", "return 3", "error {}", "return (((", "\x1bLJ", "\udcff", "return ('x'):rep(1e15)"):
         all_calls.append((f"open {text!r}", lambda t=text: rapid.Scene("hostile.lua", text=t) if t is not None
@@ -185,7 +185,7 @@ def hostile_calls(scene, frames, snapshots):
     for options in ({"seed": -1}, {"seed": 2**64}, {"seed": "x"}, {"threads": -1}, {"threads": 2**40},
                     {"script_seconds": math.nan}, {"script_memory": -1}, {"memory": 2**70}, {"paths": 3}, {"set": 3},
                     {"nodes": [3]}, {"objects": {"x": 3}}, {"objects": 3}, {"unknown": 3}, {"log": 3}):
-        if options.keys() != {"log"}:  # called when there is something to say
+        if options.keys() != {"log"}:  # called only if there is something to log
             all_calls.append((f"options {options}", lambda o=options: fall(**o)))
     for array in ([1, 2, 3], numpy.zeros((2, 2)), "P", None, numpy.zeros((2, 3), complex), numpy.array([[object()] * 3])):
         all_calls.append(("from_numpy", lambda a=array: rapid.from_numpy(a)))

@@ -1,6 +1,6 @@
-"""The Python module: arrays that share memory, errors, callbacks. What scenes do is tested in tests/host/test_scene.cpp.
+"""The Python module: arrays that share memory, errors, callbacks. tests/scene/test_scene.cpp tests scenes.
 
-    RAPID_LIBRARY=build/test/lib/librapid_host.so python3 tests/python/test_rapid.py
+RAPID_LIBRARY=build/test/lib/librapid_host.so python3 tests/python/test_rapid.py
 """
 import gc
 import math
@@ -16,7 +16,7 @@ import threading
 import time
 import unittest
 
-sys.dont_write_bytecode = True  # in the folder of the sources
+sys.dont_write_bytecode = True  # otherwise in the folder of the sources
 root = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(root / "bindings/python"))
 
@@ -636,7 +636,8 @@ return rapid.create { points = rapid.points.grid { size = {1, 0, 1}, spacing = 0
 
 
 def main(module="__main__"):
-    """Runs the tests of a module, or those that the arguments name, and prints their counts as tests/run reads them."""
+    """Runs the tests of a module, or those named by the arguments, and prints their counts in the form that tests/run
+    reads."""
     outcome = unittest.main(module, exit=False, verbosity=0).result
     failed = len(outcome.failures) + len(outcome.errors)
     print(f"{max(0, outcome.testsRun - failed - len(outcome.skipped))} passed, {failed} failed, {len(outcome.skipped)} skipped")

@@ -1,8 +1,8 @@
-"""How many random cases a test tries; tests/amount.lua has the same for tests in Lua."""
+"""The number of random cases of a test; tests/amount.lua is the same for Lua."""
 import os
 
 
 def of(name, quick):
-    """The value of the environment variable `name`, or `quick` times RAPID_TEST_SCALE."""
+    """Returns the environment variable `name`, or `quick` times RAPID_TEST_SCALE."""
     given = os.environ.get(name)
     return int(given) if given else quick * int(os.environ.get("RAPID_TEST_SCALE", "1"))

@@ -1,4 +1,4 @@
-"""What the tests of the viewer share: the command, a browser, a view, and the tests themselves."""
+"""Shared by the tests of the viewer: the command, a browser, a view, and the list of tests."""
 import csv
 import json
 import os
@@ -11,7 +11,7 @@ from browser import Browser, View
 TESTS = []
 
 
-# A row of beads that fall on a floor, one of which a node lifts out of the row; and a rain on it.
+# A row of beads that fall on a floor, one of which a node lifts out of the row, with rain falling on it.
 SCENE = """local rapid = require "rapid"
 local height = rapid.param("height", 2, "of the row, in metres")
 local count = rapid.param("count", 40, "beads")
@@ -49,7 +49,7 @@ class Bench:
         self.view = None
 
     def open(self, text=SCENE, *arguments, name="scene.lua"):
-        """Opens the page of a new view, and waits for the end of its run."""
+        """Opens the page of a new view, and waits until its run is complete."""
         self.end()
         (self.path / name).write_text(text, encoding="utf-8")
         self.view = View(self.rapid, name, *(arguments or ("-f", "1-30")), cwd=self.path)
@@ -62,7 +62,7 @@ class Bench:
         return browser
 
     def rows(self, frame, text=SCENE, *arguments):
-        """The points of a frame as `rapid run` writes them."""
+        """Returns the points of a frame as `rapid run` writes them."""
         (self.path / "same.lua").write_text(text, encoding="utf-8")
         subprocess.run([self.rapid, "run", "same.lua", "-f", str(frame), "--quiet", "-o", "same.####.csv", *arguments],
                        cwd=self.path, check=True)
@@ -92,7 +92,7 @@ def set_parameter(browser, name, value):
 
 
 def choose(browser, name, value):
-    """The choices of files come with the next status after the first of them is read."""
+    """Chooses a value. The options that come from files appear with the status after the first file is read."""
     browser.wait("[...document.getElementById(%s).options].some((o) => o.value === %s)"
                  % (json.dumps(name), json.dumps(value)))
     browser.run("const s = document.getElementById(arguments[0]); s.value = arguments[1];"
@@ -105,7 +105,7 @@ def wait_for_run(browser, run):
 
 
 def statistics(bench, text, frames, *arguments):
-    """As `rapid run` writes them, by frame."""
+    """Returns the statistics of `rapid run`, by frame."""
     (bench.path / "same.lua").write_text(text, encoding="utf-8")
     subprocess.run([bench.rapid, "run", "same.lua", "-f", frames, "--quiet", "--stats", "same.json", *arguments],
                    cwd=bench.path, check=True)

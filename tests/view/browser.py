@@ -1,4 +1,4 @@
-"""A browser (Debian's chromium, without a screen) by WebDriver, and a `rapid view` for it to look at."""
+"""A headless browser (Debian's chromium) controlled by WebDriver, and a `rapid view` that it shows."""
 import base64
 import json
 import os
@@ -19,12 +19,12 @@ def free_port():
         return probe.getsockname()[1]
 
 
-# Seconds after which nothing is waited for any more: far beyond what the busiest machine takes.
+# Seconds after which every wait fails: far longer than even a busy machine needs.
 PATIENCE = 240
 
 
 def wait_for(what, seconds=PATIENCE, every=0.02):
-    """The first true value of what(); an error after so many seconds."""
+    """Returns the first true value of what(). Fails after this many seconds."""
     end = time.monotonic() + seconds
     while True:
         value = what()
@@ -36,10 +36,10 @@ def wait_for(what, seconds=PATIENCE, every=0.02):
 
 
 class Browser:
-    """One chromium; its pages have WebGL by software."""
+    """A chromium process whose pages have WebGL in software."""
 
     def __init__(self, width=1280, height=800):
-        # Whoever ends the tests ends them by close(): a browser outlives its driver.
+        # The browser outlives its driver, so a signal must also end the tests through close().
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
         self.port = free_port()
         words = ["setpriv", "--pdeathsig", "TERM", "chromedriver", f"--port={self.port}"]
@@ -75,7 +75,7 @@ class Browser:
         self.call("POST", "/url", {"url": address})
 
     def size(self, width, height):
-        """Of the page itself, without the browser's frame."""
+        """Sets the size of the page itself, without the browser's frame."""
         def is_so():
             inner = self.run("return [innerWidth, innerHeight]")
             if inner == [width, height]:
@@ -95,7 +95,7 @@ class Browser:
         return wait_for(lambda: self.run(f"return {expression}"), seconds)
 
     def promise(self, expression):
-        """The value of a promise; an error where it is refused."""
+        """Returns the value of a promise. Fails if the promise is rejected."""
         kept = self.call("POST", "/execute/async", {
             "script": f"const done = arguments[arguments.length - 1]; Promise.resolve({expression})"
                       ".then((value) => done([value]), (error) => done(String(error)));", "args": []})
@@ -103,7 +103,7 @@ class Browser:
         return kept[0]
 
     def draw_nothing(self):
-        """From the next page on WebGL gets its buffers, and draws nothing."""
+        """Lets WebGL fill its buffers but draw nothing, from the next page on."""
         self.before_pages("WebGLRenderingContext.prototype.drawArrays = WebGL2RenderingContext.prototype.drawArrays = "
                           "WebGLRenderingContext.prototype.drawElements = "
                           "WebGL2RenderingContext.prototype.drawElements = () => {}")
@@ -115,7 +115,7 @@ class Browser:
         self.call("POST", f"/element/{self.element(selector)}/click", {})
 
     def type(self, text):
-        """Keys, as typed into whatever has the focus."""
+        """Types keys into the element that has the focus."""
         actions = [{"type": kind, "value": key} for key in text for kind in ("keyDown", "keyUp")]
         self.call("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": actions}]})
 
@@ -143,14 +143,15 @@ class Browser:
             {"type": "scroll", "x": round(x), "y": round(y), "deltaX": 0, "deltaY": by}]}]})
 
     def before_pages(self, source):
-        """Runs a script before those of each page from now on, until the function that it returns is called."""
+        """Runs a script before those of each page from now on, until the returned function is called."""
         made = self.call("POST", "/goog/cdp/execute", {"cmd": "Page.addScriptToEvaluateOnNewDocument",
                                                        "params": {"source": source}})
         return lambda: self.call("POST", "/goog/cdp/execute", {"cmd": "Page.removeScriptToEvaluateOnNewDocument",
                                                                "params": made})
 
     def screenshot(self, file):
-        """The driver gives up after ten seconds; a page that draws by software may take more for the first one."""
+        """Saves a screenshot. Tries again, because the driver gives up after ten seconds and the first one of a page
+        that draws in software may take longer."""
         for attempt in range(5):
             try:
                 data = self.call("GET", "/screenshot")
@@ -169,7 +170,7 @@ class Browser:
         self.driver.terminate()
         self.driver.wait()
         try:
-            os.killpg(self.driver.pid, signal.SIGKILL)  # a browser that did not hear
+            os.killpg(self.driver.pid, signal.SIGKILL)  # a browser that does not react
         except ProcessLookupError:
             pass
 
@@ -178,8 +179,8 @@ class View:
     """A `rapid view`, and its address."""
 
     def __init__(self, rapid, *arguments, cwd=None, prefix=(), environment=None):
-        """prefix: words before the command; environment: variables besides those of this process."""
-        # A shell's background jobs ignore it, and so would a view that is to end by it.
+        """prefix: words before the command; environment: variables in addition to those of this process."""
+        # A shell's background jobs ignore SIGINT, and so would a view, which it must end.
         signal.signal(signal.SIGINT, signal.default_int_handler)
         words = ["setpriv", "--pdeathsig", "KILL", *prefix, rapid, "view", *arguments, "--no-open"]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd,
@@ -191,7 +192,7 @@ class View:
         self.port, self.token = int(match[1]), match[2]
 
     def memory(self):
-        """Resident bytes."""
+        """Returns the resident memory in bytes."""
         with open(f"/proc/{self.process.pid}/statm", encoding="ascii") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 

@@ -1,4 +1,4 @@
-"""A page without a browser: the viewer's WebSocket, by hand."""
+"""A page without a browser: a client of the viewer's WebSocket."""
 import json
 import socket
 import time
@@ -7,14 +7,14 @@ from browser import PATIENCE
 
 
 def upgrade(view, token=None):
-    """The headers of a request for the socket."""
+    """Returns the headers of a request that opens the socket."""
     return {"Origin": f"http://127.0.0.1:{view.port}", "Connection": "Upgrade", "Upgrade": "websocket",
             "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
             "Sec-WebSocket-Protocol": f"rapid, rapid.token.{token or view.token}"}
 
 
 def open_socket(view):
-    """The socket behind the answer to the upgrade."""
+    """Opens the socket, and reads the answer to the upgrade."""
     raw = socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE)
     headers = {"Host": f"127.0.0.1:{view.port}", **upgrade(view)}
     raw.sendall(("GET /socket HTTP/1.1\r\n" + "".join(f"{name}: {value}\r\n" for name, value in headers.items()) +
@@ -37,20 +37,20 @@ def frame_of(text, opcode=1):
 
 
 class Client:
-    """One request at a time."""
+    """A client that sends one request at a time."""
 
     def __init__(self, view):
         self.raw = open_socket(view)
         self.file = self.raw.makefile("rb")
 
     def ask(self, what, **given):
-        """The answer: an object, or the bytes of a frame."""
+        """Sends a request and returns the answer: an object, or the bytes of a frame."""
         self.raw.sendall(frame_of(json.dumps({"re": 1, "do": what, **given})))
         opcode, data = self.receive()
         return json.loads(data) if opcode == 0x81 else data
 
     def receive(self):
-        """The next frame: its first byte, and its data."""
+        """Returns the next frame: its first byte, and its data."""
         head = self.file.read(2)
         assert len(head) == 2, "the connection is closed"
         opcode, size = head
@@ -59,7 +59,8 @@ class Client:
         return opcode, self.file.read(size)
 
     def until_done(self, run=1, pulls=False):
-        """The status of a run that is done. pulls: its newest frames, shapes and figures, as the page does."""
+        """Waits until a run is done and returns its status. pulls: also requests its newest frames, shapes and figures,
+        as the page does."""
         version, end = 0, time.monotonic() + PATIENCE
         while True:
             status = self.ask("status", since=version, graph=1)

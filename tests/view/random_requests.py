@@ -1,7 +1,7 @@
 """Random requests to a viewer: valid ones, mutations of these, and bytes that no client sends."""
 import json
 
-# A scene whose parameters any value may be given to: each run is short, or an error.
+# A scene whose parameters accept any value: each run is short, or an error.
 SCENE = """local rapid = require "rapid"
 local height = rapid.param("height", 2, "of the row, in metres")
 local heavy = rapid.param("heavy", false, "whether gravity acts")
@@ -72,7 +72,7 @@ def valid(random, number):
 
 
 def mutated(random, number):
-    """A valid request, one to three of whose fields are hostile, missing or unknown."""
+    """Returns a valid request in which one to three fields are hostile, missing or unknown."""
     request = valid(random, number)
     for _ in range(random.randint(1, 3)):
         name = random.choice([*request, "unknown"])
@@ -91,7 +91,7 @@ def text_of(request):
 
 
 def malformed(random, number):
-    """A text that is no request: cut off, with other bytes in it, nested without end, not an object."""
+    """Returns a text that is not a request: truncated, damaged, nested without end, or not an object."""
     text = text_of(valid(random, number))
     kind = random.randrange(5)
     if kind == 0:
@@ -108,12 +108,12 @@ def malformed(random, number):
 
 
 def frame_of_bytes(random):
-    """A frame of the WebSocket that breaks its rules, or is none of a text."""
+    """Returns a WebSocket frame that breaks the protocol, or does not contain text."""
     kind = random.randrange(6)
     if kind == 0:
         return bytes(random.randrange(256) for _ in range(random.randint(1, 200)))
     first = random.choice([0x01, 0x80, 0x82, 0x83, 0x8b, 0x88, 0x89, 0x8a, 0xc1, 0x91])
-    if kind == 1:  # a length that nothing follows
+    if kind == 1:  # a length without data
         return bytes([first, 0xff]) + random.choice([1 << 63, 1 << 40, (1 << 64) - 1, 200]).to_bytes(8, "big")
     if kind == 2:  # without a mask
         return bytes([first, 5]) + b"hello"
@@ -122,7 +122,7 @@ def frame_of_bytes(random):
 
 
 def http_request(random, port, token):
-    """Bytes for the server's port that open no socket with a token."""
+    """Returns bytes for the server's port that do not open a socket with a token."""
     host = random.choice([f"127.0.0.1:{port}"] * 4 + ["localhost", "evil.example", "[::1]", "", ":", "x" * 3000])
     method = random.choice(["GET"] * 5 + ["POST", "HEAD", "OPTIONS", "", "G\u00e9T", "PRI"])
     target = random.choice(["/", "/page.js", "/three.module.js", "/socket", "/../../etc/passwd", "/%2e%2e/x", "//", "",

@@ -1,4 +1,4 @@
-"""What the server refuses, hostile names, the sandbox."""
+"""Requests that the server refuses, hostile names, the sandbox."""
 import http.client
 import http.server
 import json
@@ -36,7 +36,7 @@ def confinement(view):
 
 
 def is_established(view, raw):
-    """Whether the view's end of a connection is open, told without reading what it has sent."""
+    """Returns true if the view's end of a connection is open, without reading received data."""
     here, there = f":{view.port:04X}", f":{raw.getsockname()[1]:04X}"
     with open("/proc/net/tcp", encoding="ascii") as file:
         rows = [line.split() for line in file][1:]
@@ -44,7 +44,7 @@ def is_established(view, raw):
 
 
 def is_closed(raw):
-    """Whether the other end has closed, once what it has sent is read."""
+    """Reads the received data, and returns true if the other end has closed."""
     try:
         while raw.recv(1 << 20):
             pass
@@ -88,7 +88,7 @@ def hostile_names_are_text(bench):
     heads = browser.run("return [...document.querySelectorAll('#sheet th')].map((t) => t.textContent)")
     assert set(names) <= set(heads), heads
     choose(browser, "colour", names[7])
-    # The legend of the speed is there before.
+    # The legend of the speed appears first.
     wait_for(lambda: names[7] in browser.run("return document.getElementById('legend').textContent"))
     browser.run("rapidView.choosePoint(3)")
     browser.wait("document.querySelectorAll('#attributes tr').length > 70")
@@ -100,7 +100,7 @@ def hostile_names_are_text(bench):
 def refuses_strangers(bench):
     bench.ready()
     view = bench.view
-    # The page's own files are for anybody, but not for pages of others; and they have no token.
+    # The page's own files are public, but not embeddable in other sites, and contain no token.
     for target in ("/", f"/?token={view.token}", "/page.js", "/three.module.js"):
         status, text, answer = request(view, target)
         assert status == 200 and view.token.encode() not in text + bytes(answer.headers), target
@@ -149,13 +149,13 @@ def an_untrusted_scene_is_shown_in_the_sandbox(bench):
     row = bench.rows(9)[3]
     point = browser.promise("rapidView.ask('point', {frame: 9, id: 3})")
     assert abs(point["values"]["P"][1] - row["Py"]) < 1e-7
-    # The graph is laid out by the page; films would need another program.
+    # The page itself lays out the graph; films would need another program.
     assert browser.run("return document.querySelectorAll('#graph .node').length") == 11
     browser.type("o")
     assert browser.run("return document.getElementById('out-film').offsetParent === null")
     refused = browser.promise("rapidView.ask('film', {extension: '.gif', first: 1, last: 2}).catch((e) => e.message)")
     assert "--untrusted" in refused, refused
-    # It goes on with changes, and reads nothing outside of its folder.
+    # The view still accepts changes, and reads nothing outside of its folder.
     run = browser.run("return rapidView.state.status.run")
     with tempfile.TemporaryDirectory() as elsewhere:
         stolen = pathlib.Path(elsewhere, "secret.obj")
@@ -197,7 +197,7 @@ def a_server_on_another_port_gets_no_token(bench):
         thread.join()
         server.server_close()
     assert got and bench.view.token not in "".join(got), got
-    # The tab has kept it for the view.
+    # The browser tab has stored the token for the view.
     browser.open(f"http://127.0.0.1:{bench.view.port}/")
     browser.wait("window.rapidView?.state.status?.state === 'done'")
 
@@ -227,7 +227,7 @@ def oversized_messages_end_their_connection_alone(bench):
             connection.send(b"x" * size)
             assert connection.getresponse().status in (400, 403, 413, 431)
         except (ConnectionError, http.client.HTTPException):
-            pass  # it is closed without an answer
+            pass  # closed without an answer
         finally:
             connection.close()
     assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
@@ -246,7 +246,7 @@ return rapid.create { points = rapid.points.from { P = P } } :gravity {} :solve 
         for frame in (2, 5, 3):
             go(browser, frame)
         assert browser.promise("rapidView.ask('point', {frame: 5, id: 3}).then((p) => p.values.id)") == 3
-        wait_for(lambda: not is_established(bench.view, raw))  # one that was read from earlier would stay open
+        wait_for(lambda: not is_established(bench.view, raw))  # a connection that was read earlier would stay open
         wait_for(lambda: bench.view.memory() - before < 256 << 20)
         assert is_closed(raw), "it waits for ever"
     wait_for(lambda: bench.view.memory() - before < 64 << 20)
@@ -283,7 +283,7 @@ def closed_pages_leave_nothing_behind(bench):
     bench.ready()
     before = bench.view.descriptors()
     for k in range(400):
-        with open_socket(bench.view) as raw:  # waits for what does not come
+        with open_socket(bench.view) as raw:  # waits for data that never arrives
             raw.sendall(frame_of(json.dumps({"re": k, "do": "status", "since": 1 << 60})))
         if k % 20 == 19:
             wait_for(lambda: bench.view.descriptors() < before + 20)
@@ -299,7 +299,7 @@ def idle_connections_leave_descriptors_to_the_simulation(bench):
     idle = [socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE) for _ in range(200)]
     try:
         for raw in idle[:100]:
-            raw.sendall(b"GET / HTTP/1.1\r\n")  # and no end
+            raw.sendall(b"GET / HTTP/1.1\r\n")  # and no end of the headers
     except ConnectionError:
         pass
     run = client.ask("set", values={"height": 3})["run"]
@@ -308,11 +308,11 @@ def idle_connections_leave_descriptors_to_the_simulation(bench):
     assert request(view, "/page.js")[0] == 200
     with open_socket(view):  # another page
         pass
-    # The last ones are closed, too, when they have had their time.
+    # The last ones are also closed after their time limit.
     assert all(is_closed(raw) for raw in idle)
     for raw in idle:
         raw.close()
-    # Pages with a token are limited, too.
+    # Pages with a token are limited too.
     sockets = [open_socket(view) for _ in range(7)]
     wait_for(lambda: request(view, "/socket", upgrade(view))[0] == 503)
     assert view.descriptors() <= 40
@@ -328,7 +328,7 @@ def idle_connections_leave_descriptors_to_the_simulation(bench):
 def a_page_that_asks_for_more_than_is_answered_waits(bench):
     browser = bench.ready()
     before = bench.view.memory()
-    long = frame_of(json.dumps({"re": 1, "do": "nothing", "x": [1] * 340000}))  # which takes longer to read than to send
+    long = frame_of(json.dumps({"re": 1, "do": "nothing", "x": [1] * 340000}))  # takes longer to read than to send
     with open_socket(bench.view) as raw:
         end = time.monotonic() + 5
         while time.monotonic() < end:
@@ -362,7 +362,7 @@ def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
         (folder / "xdg-open").chmod(0o755)
         told.unlink(missing_ok=True)
         environment = {**os.environ, "DISPLAY": ":0", "PATH": path + ":/usr/bin:/bin"}
-        if folder == bench.path:  # the scene's
+        if folder == bench.path:  # the scene's folder
             environment["PATH"] = ":."
         view = subprocess.Popen([bench.rapid, "view", "scene.lua", "-f", "1"], cwd=bench.path, env=environment, text=True,
                                 stdout=subprocess.PIPE)
@@ -379,7 +379,7 @@ def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
             assert another != token
             browser.open(address)
             browser.wait("window.rapidView?.state.status?.state === 'done'")
-            # The token of the address is used; the page has got the lasting one, and is loaded again.
+            # The token of the address is used; the page has got the permanent one, and is reloaded.
             assert socket_status(int(port), another) == 403
             browser.open(f"http://127.0.0.1:{port}/")
             browser.wait("window.rapidView?.state.status?.state === 'done'")

@@ -1,4 +1,4 @@
-// The numbers that the viewer's page gets, against the points that they stand for, and which points it gets of many.
+// Compares the numbers that the viewer's page receives with the points, and checks which points it gets of a large set.
 #include "bindings/view/frame_message.h"
 
 #include <fmt/format.h>
@@ -78,7 +78,7 @@ private:
 
 double length(const Triple& v) { return std::hypot(v[0], v[1], v[2]); }
 
-// As a file of others has them.
+// Ids in the order of a foreign file.
 SceneFrame points_with_ids(const std::vector<std::int64_t>& ids)
 {
     const test::TemporaryFolder folder;
@@ -89,7 +89,7 @@ SceneFrame points_with_ids(const std::vector<std::int64_t>& ids)
 
 }  // namespace
 
-// Loops take 48 coordinates at once: 16 points, and what remains.
+// Loops take 48 coordinates at once: 16 points, then the remainder.
 TEST_CASE("a page gets positions, velocities and speeds within half a step, however many points there are")
 {
     const std::size_t count = GENERATE(1, 15, 16, 17, 32, 101);
@@ -125,7 +125,7 @@ TEST_CASE("a page gets positions, velocities and speeds within half a step, howe
     REQUIRE(P.size() == 3 * shown.size());
     REQUIRE(v.size() == 3 * shown.size());
     REQUIRE(speed.size() == shown.size());
-    constexpr double half = 0.51;  // of a step, and the rounding of single precision
+    constexpr double half = 0.51;  // of a step, plus the rounding of single precision
     for (std::size_t k = 0; k < shown.size(); ++k) {
         CAPTURE(k);
         for (int axis = 0; axis < 3; ++axis) {

@@ -1,4 +1,4 @@
-"""Graphs and runs of sizes that are used, for long."""
+"""Graphs and runs of realistic sizes, for a long time."""
 from bench import go, test
 from client import Client
 
@@ -15,7 +15,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} }, fps = 24 }
     for k in range(20):
         browser.run(f"rapidView.go({1 + k * 499})")
     browser.wait("document.body.dataset.frame === '9482'")
-    # The curves go to the last frame, whichever is shown.
+    # The curves extend to the last frame, whichever is shown.
     browser.wait("""(() => { const c = [...document.querySelectorAll('#figures canvas')].find((c) => c.offsetParent);
       const data = c.getContext('2d').getImageData(c.width - 3, 0, 2, c.height).data;
       return data.some((value, k) => k % 4 === 3 && value > 0); })()""")

@@ -1,4 +1,4 @@
-"""What the picture shows: points, colours, shapes, trails, the camera."""
+"""The contents of the picture: points, colours, shapes, trails, the camera."""
 import json
 import math
 import subprocess
@@ -7,7 +7,7 @@ from bench import choose, go, statistics, test
 from browser import wait_for
 
 
-# Pixels of the picture that are neither the background nor grey.
+# Counts the pixels of the picture that are neither background nor grey.
 COLOURED = """(() => {
   const canvas = document.getElementById('canvas'), copy = document.createElement('canvas');
   copy.width = canvas.width; copy.height = canvas.height;
@@ -22,7 +22,8 @@ COLOURED = """(() => {
 
 
 def column(browser, frame, name, **wish):
-    """The values of an attribute, as the picture has them: from 0 for the least to 1; None where there is none."""
+    """Returns the values of an attribute as the picture uses them: from 0 for the least to 1; None for a missing
+    value."""
     given = json.dumps({"frame": frame, "colour": name, **wish})
     values, gaps = browser.promise(f"rapidView.ask('frame', {given}).then((m) =>"
                                    " [[...m.arrays.value], m.unknown.value])")
@@ -31,7 +32,7 @@ def column(browser, frame, name, **wish):
     return [None if value == 0 else (value - 1) / 65534 for value in values]
 
 
-# Points that an attractor draws in, the nearer the faster; a tolerance gives each the sub-steps that it needs.
+# Points that an attractor pulls in, the nearer the faster; a tolerance gives each the substeps that it needs.
 ORBITS = """local rapid = require "rapid"
 local P = {}
 for i = 1, 60 do P[i] = {0.3 + i * 0.05, 0, 0} end
@@ -91,7 +92,7 @@ def colours_by_the_estimated_error(bench):
     browser.wait("rapidView.picture.message.colour === 'error' && !document.getElementById('legend').hidden")
     go(browser, 12)
     low, high = browser.run("return rapidView.picture.message.ranges.value")
-    # The largest is the one that the statistics tell.
+    # The largest is the one in the statistics.
     wanted = statistics(bench, text, "1-12")[12]["error"]
     assert abs(high - wanted["position_max"]) <= 1e-6 * wanted["position_max"], (high, wanted)
     values = column(browser, 12, "error")
@@ -225,7 +226,7 @@ def keys_are_listed_and_themes_change(bench):
     listed = browser.run("return document.getElementById('keys').innerText")
     for word in ("Space", "orbit", "Esc"):
         assert word in listed
-    # Every control has a tip.
+    # Every control has a tooltip.
     untold = browser.run("""return [...document.querySelectorAll(
       'button:not(dialog button), select, input, [role=separator], [tabindex="0"]:not(#canvas), canvas:not(#canvas, #legend *)')]
       .filter((c) => !c.title && !c.querySelector('title')).map((c) => c.outerHTML)""")
@@ -298,7 +299,7 @@ def points_are_dots_where_dots_are_chosen(bench):
     browser.click("#ground")
     wait_for(lambda: browser.run(f"return {COLOURED}") > 9 * 40)
     choose(browser, "style", "dots")
-    # Of two pixels' width each, which touch three where they lie between.
+    # Each is two pixels wide, and touches three if it lies between them.
     wait_for(lambda: 0 < browser.run(f"return {COLOURED}") <= 9 * 40)
 
 
@@ -359,7 +360,7 @@ def panels_are_moved_and_kept(bench):
 
 @test
 def colours_are_those_of_the_points_within_what_a_screen_shows(bench):
-    # As pictures encode linear light: sRGB up to 0.8, compressed above.
+    # Pictures encode linear light as sRGB up to 0.8, and compress it above.
     points = "{ P = {{0, 0, 0}, {1, 0, 0}}, Cd = %s }"
     for Cd, expected in (("{{-0.5, 0.25, 7}, {1, 0, 0.5}}", [0, 137, 255, 247, 0, 188]),
                          ("{{0.2, 0.4, 3}, {0.2, 0.4, 3}}", [124, 170, 255] * 2)):

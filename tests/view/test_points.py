@@ -9,7 +9,7 @@ from bench import choose, go, test
 
 
 def bits(number):
-    """Of a value of 32 bits."""
+    """Returns the 32-bit pattern of a single-precision number."""
     return struct.pack("f", float(number))
 
 
@@ -31,7 +31,7 @@ def a_click_on_a_point_tells_its_values_as_run_writes_them(bench):
         shown = browser.run("""return Object.fromEntries([...document.querySelectorAll('#attributes tr')].map((row) =>
           [row.dataset.attribute, row.querySelector('td').textContent]))""")
         for text, name in zip([*shown["P"].split(), shown["heat"], shown["pscale"]], ("Px", "Py", "Pz", "heat", "pscale")):
-            assert bits(text) == bits(row[name]), (shown, row)  # the same value, in as few digits as tell it
+            assert bits(text) == bits(row[name]), (shown, row)  # the same value, in as few digits as identify it
         assert shown["pscale"] == "0.04"
 
 
@@ -46,7 +46,7 @@ def tells_the_life_of_a_point(bench):
     browser.run("document.getElementById('trace').click()")
     browser.wait("document.querySelector('#life .contact')")
     contact = browser.run("return document.querySelector('#life .contact').innerText")
-    # Under gravity and the drag of still air, 1/s, until the bead of 0.04 m touches: y = 2 - g (t - 1 + exp(-t)).
+    # Gravity and the drag of still air, 1/s, until the bead of 0.04 m touches: y = 2 - g (t - 1 + exp(-t)).
     low, high = 0.0, 2.0
     for _ in range(60):
         middle = (low + high) / 2
@@ -163,7 +163,7 @@ def the_spreadsheet_shows_a_group_and_is_walked_by_keys(bench):
         browser.type(step)
         browser.wait(f"rapidView.state.point === {warm[place]}")
         browser.wait(f"document.querySelector('#sheet .chosen')?.dataset.id === '{warm[place]}'")
-    # The point in the middle of the picture, once the mark has left the one that was chosen before.
+    # The point in the middle of the picture, once the mark has left the previously selected one.
     row = bench.rows(12)[warm[0]]
     place = json.dumps([row[name] for name in ("Px", "Py", "Pz")])
     browser.wait(f"rapidView.picture.marked?.every((x, k) => Math.abs(x - {place}[k]) < 1e-6)")

@@ -1,4 +1,4 @@
-"""The picture as pictures have it: the same colours, the same camera, the same bytes."""
+"""The rendered picture equals that of rapid run: the same colours, camera and bytes."""
 import base64
 import json
 import subprocess
@@ -51,7 +51,8 @@ DIFFERENCE = """(async () => {
 
 
 def difference(bench, frame, element, *arguments, boxes=None):
-    """Of what the page shows of a frame from the .png of rapid run, of the size of the page's canvas."""
+    """Returns the difference between the page's view of a frame and the .png of rapid run, at the size of the
+    canvas."""
     width, height = bench.browser.run("const c = document.getElementById('canvas'); return [c.width, c.height]")
     subprocess.run([bench.rapid, "run", "scene.lua", "-f", str(frame), "--quiet", "-o", "same.####.png",
                     f"--size={width}x{height}", *arguments], cwd=bench.path, check=True)
@@ -75,12 +76,12 @@ def in_pictures_the_page_shows_the_png_of_run(bench):
     boxes = browser.run("""return ['canvas', 'rendered'].map((id) =>
       JSON.stringify(document.getElementById(id).getBoundingClientRect()))""")
     assert boxes[0] == boxes[1]
-    # From another place: it is gone at once, and comes again.
+    # From another viewpoint: the picture disappears at once, and is rendered again.
     assert browser.run("rapidView.picture.look(0.3, 0.2); return document.getElementById('rendered').hidden")
     wait_for_rendered(browser, 12)
     camera = browser.run("return rapidView.picture.cameraText()")
     assert difference(bench, 12, "rendered", f"--camera={camera}") == 0
-    # What a picture does not have is shown by the page.
+    # The page shows what a rendered picture lacks.
     choose(browser, "group", "bright")
     wait_for(lambda: browser.run("return document.body.dataset.shown < rapidView.picture.message.total"))
     assert browser.run("return document.getElementById('rendered').hidden")
@@ -99,7 +100,7 @@ def spheres_have_the_colours_of_pictures(bench):
         return [Math.round((0.5 + v.x / 2) * c.width), Math.round((0.5 - v.y / 2) * c.height)]; });""")
     boxes = [[x - 12, y - 12, 25, 25] for x, y in centres]
     most = difference(bench, 1, "canvas", f"--camera={camera}", boxes=boxes)
-    # One for the dither, one for the rounding to bytes on either side of the light.
+    # One for the dither, and one for each of two roundings to bytes.
     assert most <= 3, most
 
 
@@ -118,7 +119,7 @@ def the_page_looks_through_the_camera_of_the_scene(bench):
     browser.run("rapidView.picture.look(0.3, 0.2)")
     own = browser.run(f"return {seen}")
     go(browser, 1)
-    browser.wait("rapidView.picture.sceneCamera[0] === 0.5")  # that of the frame is known
+    browser.wait("rapidView.picture.sceneCamera[0] === 0.5")  # the frame's camera is known
     assert browser.run(f"return {seen}") == own
     browser.type("0")
     wait_for(lambda: is_at([0.5, 1.5, 5, 0, 0.8, 0]))

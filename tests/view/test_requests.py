@@ -1,4 +1,5 @@
-"""Any request is answered, or its connection is closed; nothing that a page or another program sends ends the view."""
+"""Every request is answered, or its connection is closed; nothing that a page or another program sends ends the
+view."""
 import json
 import os
 import random
@@ -12,7 +13,7 @@ from client import Client, frame_of
 
 MIB = 1 << 20
 
-# Of glibc, so that memory which is free again is seen to be.
+# Makes glibc use one heap, so that freed memory is visible as such.
 ONE_HEAP = {"MALLOC_ARENA_MAX": "1"}
 
 
@@ -23,7 +24,7 @@ def random_view(bench, *arguments):
 
 
 def answer_to(client, number):
-    """The answer to a request, or the one to a request without a usable number; others are skipped."""
+    """Returns the answer to a request, or to a request without a usable number; skips others."""
     while True:
         opcode, data = client.receive()
         if opcode == 0x82:
@@ -38,14 +39,14 @@ def answer_to(client, number):
 
 
 def number_of(request):
-    """The number that an answer has; none if the request has none of 32 bits."""
+    """Returns the number in the answer, or None if the request has none that fits 32 bits."""
     number = request.get("re")
     is_number = isinstance(number, (int, float)) and not isinstance(number, bool) and number == number // 1
     return int(number) if is_number and 0 <= number < 2**32 else None
 
 
 def ends_or_answers(view, data):
-    """Sends bytes on a connection of their own, which is then left to itself."""
+    """Sends bytes on a separate connection and leaves it."""
     with socket.create_connection(("127.0.0.1", view.port), timeout=PATIENCE) as raw:
         try:
             raw.sendall(data)
@@ -59,13 +60,14 @@ def ends_or_answers(view, data):
 
 
 def send_random(view, client, source, number):
-    """Sends one random request, and waits for the end of it. The client, or another one if its connection is closed."""
+    """Sends one random request, and waits until it is done. Returns the client, or a new one if its connection was
+    closed."""
     kind = source.randrange(8)
     if kind < 5:
         maker = [random_requests.valid, random_requests.mutated][kind > 1]
         request = maker(source, number)
         client.raw.sendall(frame_of(random_requests.text_of(request)))
-        # A page that is told of changes after a version waits for one.
+        # A page that requests changes after a version waits for one.
         if not (request.get("do") == "status" and request.get("since")):
             answer_to(client, number_of(request))
         return client
@@ -98,7 +100,7 @@ def random_requests_are_answered_and_end_nothing(bench):
             raise AssertionError(f"request {k} of VIEW_REQUESTS_SEED={seed}: {error!r}") from error
         assert view.process.poll() is None, f"request {k} of VIEW_REQUESTS_SEED={seed} ended the view"
     client.close()
-    client = Client(view)  # nobody has asked it for anything
+    client = Client(view)  # nothing was requested from it
     client.until_done(client.ask("set", values={})["run"])
     grown = view.memory() - before
     assert grown < 8 * MIB, f"{count // 2} requests keep {grown / MIB:.1f} MiB"

@@ -29,7 +29,7 @@ def makes_films_of_a_range(bench):
                                capture_output=True, text=True).stdout
         stream = json.loads(probe)["streams"][0]
         assert (stream["width"], stream["height"], int(stream["nb_read_frames"])) == (160, 90, 12), stream
-    # By the same renderer: the film's frames are those of run, as far as the film's colours keep them.
+    # The film uses the same renderer: its frames equal those of run, within the colour precision of films.
     subprocess.run([bench.rapid, "run", "scene.lua", "-f", "3-14", "--quiet", "-o", "run.mp4", "--size=160x90",
                     "--camera=" + browser.run("return rapidView.picture.cameraText()")], cwd=bench.path, check=True)
     assert (bench.path / "run.mp4").stat().st_size > 1000

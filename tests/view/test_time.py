@@ -8,7 +8,7 @@ from bench import SCENE, go, set_parameter, test, wait_for_run
 from browser import View, wait_for
 
 
-# The second frame would take hours: a million sub-steps of many points.
+# The second frame would take hours: a million substeps of many points.
 SLOW = """local rapid = require "rapid"
 local slow = rapid.param("slow", true, "whether it takes hours")
 local P = {}
@@ -168,7 +168,7 @@ def a_cache_keeps_the_frames_for_the_next_view(bench):
     for row, point in zip(rows, points):
         assert all(abs(point["P"][k] - row[name]) <= 1e-8 * max(1, abs(row[name])) for k, name in enumerate(("Px", "Py", "Pz")))
     assert browser.run("return rapidView.picture.shapes.children.length") == 1
-    # Further frames go on behind these; other parameters are another run, and back again the frames are there.
+    # More frames are appended to these. Other parameters are another run; when they are set back, the frames exist.
     bench.ready(SCENE, "-f", "1-30", "--cache", "kept")
     longer = bench.browser.promise(computed)
     assert longer[:20] == first and len(longer) == 30
@@ -179,7 +179,7 @@ def a_cache_keeps_the_frames_for_the_next_view(bench):
     browser.run("document.querySelector('#parameters h2 button').click()")
     wait_for_run(browser, run + 1)
     assert browser.promise(computed) == longer
-    # A file that is not whole is computed again.
+    # A truncated file is computed again.
     bench.end()
     next(file for file in bench.path.glob("kept/view/*/frame.0012.rapid")).unlink()
     browser = bench.ready(SCENE, "-f", "1-20", "--cache", "kept")
@@ -310,7 +310,7 @@ def plays_at_the_frames_a_second_of_the_scene(bench):
     for milliseconds, frame in ((50, 7), (25, 8), (200, 16)):
         browser.run("clock += arguments[0]", milliseconds)
         browser.wait(f"document.body.dataset.frame === '{frame}'")
-    # A browser that has been busy for long skips a quarter of a second at most.
+    # A browser that was busy for long skips at most a quarter of a second.
     browser.run("clock += 5000")
     browser.wait("document.body.dataset.frame === '26'")
     browser.type(" ")

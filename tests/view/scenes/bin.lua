@@ -1,4 +1,4 @@
--- bin: pebbles fall between two walls, come to rest, and sleep; to be looked at in the viewer (tests/view/screenshots).
+-- bin: pebbles fall between two walls, come to rest, and sleep; for the viewer's pictures (tests/view/screenshots).
 local rapid = require "rapid"
 
 local friction = rapid.param("friction", 0.3, "Coulomb's coefficient")

@@ -1,4 +1,4 @@
--- dancer: glitter that a deforming body sheds, to be looked at in the viewer (tests/view/screenshots).
+-- dancer: a deforming body sheds glitter; for the viewer's pictures (tests/view/screenshots).
 local rapid = require "rapid"
 
 local body = rapid.mesh.read(rapid.param("body", "jumper.####.ply", "its meshes"))

@@ -1,4 +1,4 @@
--- tide: a million points on a swell, to be looked at in the viewer (tests/view/screenshots).
+-- tide: a million points on a swell; for the viewer's pictures (tests/view/screenshots).
 local rapid = require "rapid"
 
 local side = rapid.param("side", 1000, "points along each edge of the sea")

@@ -17,7 +17,7 @@ struct RandomPoints {
     float extent = 2;  // m
     std::int64_t first_id = 0;
     bool wide = true;   // an int64 attribute beside id
-    bool texts = true;  // attributes that are texts
+    bool texts = true;  // string attributes
 };
 
 inline PointSet random_points(const RandomPoints& wanted)
@@ -65,7 +65,7 @@ inline PointSet random_points(const RandomPoints& wanted)
     return points;
 }
 
-// The names of what two sets do not have in common to the bit; empty when they are the same.
+// Returns the names of columns that are missing in one of two sets or not bitwise equal.
 inline std::string differing_columns(const PointSet& a, const PointSet& b)
 {
     std::string different;

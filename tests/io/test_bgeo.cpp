@@ -97,7 +97,7 @@ TEST_CASE("a .bgeo of another program is read: texts by their table, odd sizes b
     put(0, 4);
     put(0, 4);
     put(0, 4);
-    name("label");  // an index into a table of two texts
+    name("label");  // an index into a table of two strings
     put(1, 2);
     put(4, 4);
     put(2, 4);
@@ -132,7 +132,7 @@ TEST_CASE("groups of a .bgeo are read behind attributes of the whole, in words o
     for (const std::uint32_t count : {5, 34, 0, 2, 0, 0, 0, 0, 1}) put(count, 4);
     for (int i = 0; i < 34; ++i)
         for (const float number : {float(i), 0.0f, 0.0f, 1.0f}) put(std::bit_cast<std::uint32_t>(number), 4);
-    name("scale");  // of the whole: its declaration, then its value
+    name("scale");  // a detail value: its declaration, then its value
     put(1, 2);
     put(0, 4);
     put(0, 4);

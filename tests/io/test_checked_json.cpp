@@ -1,4 +1,4 @@
-// Numbers of JSON are read as they are written, or refused.
+// Numbers in JSON are read exactly as written, or refused.
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -15,7 +15,7 @@ namespace {
 
 enum class Level : std::uint8_t { Low = 0, High = 255 };
 
-// Whether a text is read as T, or refused, as its number asks: that of long double, which holds all of 64 bits.
+// Returns true if a text is read as T exactly if its number permits. long double, which holds 64 bits, decides.
 template <class T>
 bool is_right(const std::string& text)
 {

@@ -77,7 +77,7 @@ TEST_CASE("max, rms and p95 are those of the lengths of the differences", "[io][
 {
     const PointSet a = diagonal_points();
     PointSet b = a;
-    // 19 points are 0, one 5 (3-4-5) apart; then two of twenty, of which one is beyond the 95th percentile.
+    // 19 points differ by 0 and one by 5 (3-4-5); then two of twenty, of which one is beyond the 95th percentile.
     b.v().write()[4] = Vec3f(3, 0, 4);
 
     const AttributeDifference one = of(compare(a, b), "v");
@@ -124,7 +124,7 @@ TEST_CASE("integers and groups are the same only when they are equal, int64 to t
     CHECK(of(compare(c, d), "hot").different == 1);
     CHECK_FALSE(compare(c, d).same);
     c.group("hot").write()[3] = 0;
-    CHECK(compare(c, d).same);  // a group that nobody is in is no difference
+    CHECK(compare(c, d).same);  // an empty group is no difference
 }
 
 TEST_CASE("NaN equals NaN and differs infinitely from a number", "[io][compare]")

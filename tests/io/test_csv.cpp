@@ -39,7 +39,7 @@ TEST_CASE("points come back from .csv with the same bits", "[io][csv]")
     CAPTURE(size, extent);
     const TemporaryFolder folder;
     PointSet points = random_points({.size = size, .extent = extent, .first_id = std::int64_t{1} << 50});
-    if (size == 0) {  // an empty table does not say that these are integers, or texts
+    if (size == 0) {  // an empty table does not show that these are integers or strings
         points.remove("material");
         points.remove("name");
         points.remove("hitnum");
@@ -49,7 +49,7 @@ TEST_CASE("points come back from .csv with the same bits", "[io][csv]")
     write_points(folder / "a.csv", points);
 
     if (size > 2) CHECK(differing_columns(points, read_points(folder / "a.csv")) == "");
-    // In one or two rows a random int32 may be one that float holds.
+    // In one or two rows a random int32 may be exact as a float.
     points.remove(points.has("hitnum") ? "hitnum" : "none");
     PointSet read = read_points(folder / "a.csv");
     read.remove("hitnum");

@@ -22,7 +22,7 @@ namespace {
 
 constexpr int width = 160, height = 90, pixels = width * height;
 
-// The pictures of a film, as another run of ffmpeg decodes them.
+// Returns the pictures of a film, decoded by another run of ffmpeg.
 std::vector<std::vector<std::uint8_t>> pictures_of(const std::filesystem::path& film)
 {
     const std::string command =
@@ -40,7 +40,7 @@ Picture grey(int frame)
     return {width, height, std::vector<std::uint8_t>(3 * pixels, static_cast<std::uint8_t>(40 + 20 * frame))};
 }
 
-// Sets PATH for as long as it lives.
+// Sets PATH during its lifetime.
 class Path {
 public:
     explicit Path(const std::string& path) : before_(std::getenv("PATH")) { setenv("PATH", path.c_str(), 1); }
@@ -55,10 +55,10 @@ private:
 TEST_CASE("ffmpeg ends with a run that a signal ends", "[io][film]")
 {
     const TemporaryFolder folder;
-    // In a process of its own: the call is for one that ends.
+    // Runs in a separate process, because the call is for a process that ends.
     const pid_t run = fork();
     if (run == 0) {
-        alarm(20);  // else it would wait for ever
+        alarm(20);  // otherwise it would wait without end
         OutputFile file(folder / "a.webm");
         Film film(file, ".webm", width, height, 25);
         film.add(grey(0));
@@ -88,7 +88,7 @@ TEST_CASE("a film has the pictures that it was given, in their order", "[io][fil
     }
     const auto pictures = pictures_of(folder / ("a" + extension));
     REQUIRE(pictures.size() == 8);
-    // Codecs lose a little: a step and a half of a byte's range of 219 levels, in both directions.
+    // The codec loses up to a step and a half of a byte's range of 219 levels, in either direction.
     for (int frame = 0; frame < 8; ++frame)
         for (const std::size_t byte : {std::size_t{0}, std::size_t{3 * pixels / 2}, std::size_t{3 * pixels - 1}})
             CHECK(std::abs(pictures[frame][byte] - grey(frame).rgb[byte]) <= 3);

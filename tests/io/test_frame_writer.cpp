@@ -71,7 +71,7 @@ TEST_CASE("pictures of an empty scene wait for points a hundred frames, and no l
     const auto shapes = std::make_shared<const PictureScene>();
     for (int frame = 1; frame <= 250; ++frame)
         writer.submit(PointSet(), {.number = frame, .picture = small_picture(), .scene = shapes});
-    // At most three of those that were submitted are not yet with the writer's pictures, of which fewer than 100 wait.
+    // At most three submitted pictures are not yet among the writer's pictures, of which fewer than 100 wait.
     CHECK(shapes.use_count() < 1 + 100 + 3 + 2);
     CHECK(writer.take_written().size() >= 200 - 100);
     writer.finish();
@@ -98,7 +98,7 @@ TEST_CASE("a full disk is an error that names the file, earlier frames stay, not
     const auto place = GENERATE(range(std::size_t{0}, formats().size()));
     const std::string extension = formats()[place].extension;
     const SmallDisk disk;
-    if (formats()[place].film || !disk.mounted()) return;  // not allowed to mount: nothing to fill
+    if (formats()[place].film || !disk.mounted()) return;  // mounting is not allowed, so nothing can be filled
     CAPTURE(extension);
     const std::string name = "a.####" + extension;
     const PointSet points = random_points({.size = 4000, .wide = false, .texts = false});
@@ -117,7 +117,7 @@ TEST_CASE("a full disk is an error that names the file, earlier frames stay, not
     for (int frame = 1; frame <= complete; ++frame)
         CHECK(names[static_cast<std::size_t>(frame - 1)] == "a." + four_digits(frame) + extension);
     if (formats()[place].read) CHECK(read_points(disk.folder() / names.back()).size() == 4000);
-    // The same error again: a caller that went on would lose frames without knowing.
+    // The same error again: a caller that continued would otherwise lose frames unnoticed.
     CHECK(error_of([&] { writer.submit(points, {.number = 41}); }) == error);
 }
 
@@ -154,7 +154,7 @@ TEST_CASE("pictures before the first points wait, and share the view of the firs
     writer.finish();
 
     CHECK(file_names(folder.path()).size() == 6);
-    // Frame 2 shows the same lines on the ground as one of no points with the third frame's view.
+    // Frame 2 shows the same ground lines as a picture without points with the third frame's view.
     PictureFit fit;
     const PictureView view = fit.next(far_away, {.number = 3, .time = 2.0 / 24, .picture = small_picture()});
     write_points(folder / "expected.png", PointSet(),

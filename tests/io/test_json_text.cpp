@@ -1,4 +1,4 @@
-// What JsonText writes is what nlohmann's library writes of the same values.
+// JsonText writes the same text as nlohmann's library for the same values.
 #include <array>
 #include <cmath>
 #include <map>

@@ -58,7 +58,7 @@ TEST_CASE("the lines of trails go from each point backwards, and the set comes b
 
 TEST_CASE("points with trails come back from .bgeo and .ply with the same bits", "[io][lines]")
 {
-    const std::size_t size = GENERATE(0, 1, 2, 500, 40000);  // with fewer and with more than 65,536 places
+    const std::size_t size = GENERATE(0, 1, 2, 500, 40000);  // with fewer and with more than 65,536 positions
     const std::string extension = GENERATE(".bgeo", ".ply");
     CAPTURE(size, extension);
     const TemporaryFolder folder;
@@ -79,7 +79,7 @@ TEST_CASE("a .bgeo has open polygons behind its points", "[io][lines][bgeo]")
     const std::vector<std::uint32_t> counts = {5, 7, /*primitives*/ 2, /*groups*/ 3};
     for (const std::uint32_t count : counts) CHECK(header.take(4) == count);
 
-    // Behind the primitives: the groups all, hot and nobody, each a length, its name, a count and a word; the end.
+    // After the primitives: the groups all, hot and nobody, each a length, its name, a count and a word; the end.
     const std::size_t groups = 3 * (2 + 4 + 4) + 3 + 3 + 6 + 2, primitives = 2 * (4 + 4 + 1) + 5 * 2;
     BigEndian reader(text, text.size() - groups - primitives);
     const std::vector<std::vector<std::uint32_t>> lines = {{0, 1, 2}, {4, 5}};
@@ -140,7 +140,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
     CHECK(std::count(told.begin(), told.end(), "its 1 closed polygons") == 1);
 
     std::string wrong = text;
-    wrong[text.size() - 2 - 4 - 4 - 1] = 9;  // the last place
+    wrong[text.size() - 2 - 4 - 4 - 1] = 9;  // the last index
     CHECK_THAT(error_of([&] { read(wrong); }), Catch::EndsWith("a polygon has the point 9 of 5"));
     CHECK_THAT(error_of([&] { read(text.substr(0, text.size() - 8)); }),
                Catch::EndsWith("the file ends within its primitives"));

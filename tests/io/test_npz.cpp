@@ -9,7 +9,7 @@ using namespace rapid::test;
 
 namespace {
 
-// Runs lines of Python with numpy as np, in the folder; whether they ended without an exception.
+// Runs lines of Python with numpy as np, in the folder. Returns true if they ended without an exception.
 bool python(const TemporaryFolder& folder, const std::string& lines)
 {
     folder.write("script.py", "import numpy as np\n" + lines);
@@ -114,12 +114,12 @@ TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")
     CHECK_THAT(error("hello"), Catch::EndsWith("b.npz: not a whole zip file: its directory is missing or damaged"));
     CHECK_THAT(error(whole.substr(0, whole.size() - 30)), Catch::EndsWith("its directory is missing or damaged"));
 
-    // A number of P, whose checksum shows it.
+    // Changes a number of P, which the checksum reveals.
     std::string flipped = whole;
     flipped[whole.find("'shape': (3, 3)") + 100] ^= 1;
     CHECK_THAT(error(flipped), Catch::EndsWith("\"P.npy\" is damaged"));
 
-    // Directories that promise more than there is: of a stored member both sizes, at 20 and 24 of its entry.
+    // Directories that promise more data than exists: for a stored member both sizes, at 20 and 24 of its entry.
     std::string promising = whole;
     const std::size_t entry = whole.find("PK\1\2");
     for (const std::size_t at : {entry + 20, entry + 24}) promising.replace(at, 4, "\xff\xff\xff\x7f");

@@ -1,4 +1,4 @@
-// Files of points that come in pieces: the same as a file of all of them at once.
+// Point files written in pieces are identical to files written at once.
 #include "runtime/io/point_file.h"
 
 #include <numeric>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-// Without groups, and in order of id, in which .csv writes what it has at once.
+// Without groups, and in order of id, because .csv then writes its data at once.
 PointSet some_points(std::size_t size)
 {
     PointSet points = random_points({.size = size, .wide = false});

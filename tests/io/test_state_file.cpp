@@ -1,4 +1,4 @@
-// Files of a state: what was written is read, and what is damaged is refused before it is used.
+// State files: written data is read back, and damaged files are refused before use.
 #include "runtime/io/state_file.h"
 
 #include "runtime/points/state_archive.h"
@@ -66,7 +66,7 @@ TEST_CASE("columns of several pieces are kept, those that compress and those tha
     const SavedState state = state_of(points);
     const fs::path path = written(folder, state);
     CHECK(StateFile(path).state() == state);
-    // The first half of a column is noise, and the sample, behind it, is not.
+    // The first half of a column is noise, but the sample, after it, is not.
     SavedState mixed;
     Column<std::int32_t> half(0);
     const std::span<std::int32_t> values = half.append_for_writing(size);

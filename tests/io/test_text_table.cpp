@@ -51,7 +51,7 @@ TEST_CASE("texts of a file have the tokens of the process, also when more are me
         for (int k = 0; k < 70000; ++k) {
             std::string word = fmt::format("word {}", k);
             const Token token = token_of_word(word);
-            word[0] = 'x';  // not kept
+            word[0] = 'x';  // not stored
             REQUIRE(token == token_of(fmt::format("word {}", k)));
             REQUIRE(token_of_word(fmt::format("word {}", k)) == token);
         }

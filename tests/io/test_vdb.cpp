@@ -142,7 +142,7 @@ TEST_CASE("leaves hold a workable number of points for a line, a sheet and a clo
     const auto grid = read_grid(folder / "a.vdb", "points");
     const double mean = 200000.0 / static_cast<double>(grid->tree().leafCount());
     CAPTURE(mean);
-    // Aimed at 2,048; a power of two in voxel size is up to a factor of 8^(1/2) in a cloud's number, either way.
+    // The target is 2,048. A voxel size rounded to a power of two changes a cloud's count by up to 8^(1/2) either way.
     CHECK(mean > 256);
     CHECK(mean < 16384);
 }
@@ -211,7 +211,7 @@ TEST_CASE("a .vdb that is cut is an error that says so", "[io][vdb]")
     }
     const auto header = folder.write("header.vdb", whole.substr(0, 40));
     CHECK(error_of([&] { read_points(header); }) == header.string() + ": can't be read: it is cut or damaged");
-    // Bytes after the last grid are nobody's.
+    // Bytes after the last grid are ignored.
     CHECK(read_points(folder.write("longer.vdb", whole + "more")).size() == 100);
 }
 

@@ -1,4 +1,4 @@
-// What Rapid writes of a grid by itself, against a grid that OpenVDB makes and writes as a whole.
+// Compares grids that Rapid writes itself with the same grids built and written by OpenVDB.
 #include <fmt/format.h>
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointAttribute.h>
@@ -134,7 +134,7 @@ std::string text_of(const std::filesystem::path& path)
     return text.str();
 }
 
-// Without the UUID, which is Rapid's own.
+// Removes the UUID, which Rapid generates itself.
 std::string without_uuid(std::string text)
 {
     REQUIRE(text.size() > 100);
@@ -181,12 +181,12 @@ TEST_CASE("a .vdb has the bytes that OpenVDB writes", "[io][vdb]")
 TEST_CASE("a .vdb has OpenVDB's bytes where values repeat, and where no page can be packed", "[io][vdb]")
 {
     PointSet points = random_points({.size = 300000, .extent = 3});
-    // Of one value in some leaves, and in all.
+    // A single value in some leaves, and in all.
     points.column<float>("age").fill(2.5f);
     std::span<Vec3f> v = points.v().write();
     for (std::size_t i = 0; i < v.size(); ++i)
         if (points.P()[i].x() > 0) v[i] = Vec3f(0, -1, 0);
-    // Bits without any order.
+    // Incompressible bits.
     points.add({"noise", std::int32_t{0}});
     std::uint64_t state = 1;
     for (std::int32_t& x : points.column<std::int32_t>("noise").write())
@@ -201,7 +201,7 @@ TEST_CASE("a .vdb has OpenVDB's bytes where values repeat, and where no page can
 
 TEST_CASE("a .vdb has OpenVDB's bytes with all points in one voxel, and across the root of the tree", "[io][vdb]")
 {
-    PointSet heap = random_points({.size = 90000});  // more than a page in a leaf
+    PointSet heap = random_points({.size = 90000});  // more than a page per leaf
     heap.P().fill(Vec3f(1, 2, 3));
     check_same_bytes(heap);
 

@@ -38,7 +38,7 @@ std::string zlib(const std::string& bytes)
     return packed.substr(0, size);
 }
 
-// A file of two points, with other attributes of the root, points, arrays, and what is appended.
+// Returns a file of two points with other attributes of the root, other points, arrays, and appended data.
 std::string file_of(const std::string& root, const std::string& points, const std::string& arrays = "",
                     const std::string& appended = "")
 {

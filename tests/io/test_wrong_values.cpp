@@ -1,6 +1,6 @@
-// What a file can say and no reader may believe, for all formats that can say it: numbers that are not of their type,
-// counts beyond the file, points of one id. What only one format can say is in its own test; files that are damaged or
-// cut at random are in tests/mutants.
+// Values that no reader may trust, for all formats that can express them: numbers out of range for their type, counts
+// beyond the file, duplicate ids. The test of each format has values that only it can express. tests/mutants has files
+// damaged or truncated at random.
 #include "runtime/io/compare.h"
 #include "runtime/io/format.h"
 #include "tests/io/random_points.h"
@@ -11,7 +11,7 @@ using namespace rapid::test;
 
 namespace {
 
-// The error of reading a file of these bytes; the file's name is left out.
+// Returns the error of reading a file with these bytes, without the file's name.
 std::string error_in(const std::string& name, const std::string& bytes)
 {
     const TemporaryFolder folder;
@@ -67,7 +67,7 @@ TEST_CASE("an id that is no whole number is an error, in every format that can h
 {
     const float id =
         GENERATE(std::numeric_limits<float>::quiet_NaN(), 0.5f, std::numeric_limits<float>::infinity(), 3e20f);
-    // A float attribute that is given the name of the ids, and these another one.
+    // Gives a float attribute the name of the ids, and the ids another name.
     PointSet points;
     points.append(2);
     points.id().write()[1] = 1;
@@ -110,7 +110,7 @@ TEST_CASE("a number beyond its type is an error, in every format of text that ha
     CHECK_THAT(error_in("a.vtp", vtp(wide, value)), Contains("no number of its type"));
     CHECK_THAT(error_in("a.usda", usda(small, value + ", 1")), Contains("line 5: there is no"));
     CHECK_THAT(error_in("a.usda", usda(small, "1, " + value)), Contains("line 5: there is no"));
-    // The largest and smallest are read.
+    // The largest and smallest values are accepted.
     CHECK(error_in("a.ply", ply("uchar", "kind", "255")) == "");
     CHECK(error_in("a.vtp", vtp("UInt8", "255")) == "");
     CHECK(error_in("a.usda", usda("uchar", "255, 0")) == "");

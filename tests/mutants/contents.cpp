@@ -136,7 +136,7 @@ std::string content_of_state(const std::filesystem::path& path)
     try {
         restore(points, StateFile(path).state());
     } catch (Error& error) {
-        throw error.at({path.string(), 0});  // as who asks for a snapshot does
+        throw error.at({path.string(), 0});  // as the caller that reads a snapshot does
     }
     describe(points);
     Content content;

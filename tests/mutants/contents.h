@@ -1,4 +1,4 @@
-// Everything that a reader makes of a file, as bytes.
+// Everything that a reader extracts from a file, as bytes.
 #pragma once
 
 #include <filesystem>

@@ -21,7 +21,7 @@ unsigned char pattern = 0x5a;
 void* filled(void* block, std::size_t from = 0)
 {
     if (!block) return nullptr;
-    // Damaged files make readers ask for more than they use: all of it would be a gigabyte of pages.
+    // Damaged files make readers allocate more than they use; filling all of it could touch a gigabyte.
     constexpr std::size_t most = std::size_t{16} << 20;
     const std::size_t end = std::min(malloc_usable_size(block), from + most);
     if (from < end) std::memset(static_cast<char*>(block) + from, pattern, end - from);

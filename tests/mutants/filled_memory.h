@@ -1,5 +1,4 @@
-// Fills memory that nobody has written yet. A program that reads from there behaves differently when it runs again with
-// another byte.
+// Fills uninitialised memory. A program that reads from it behaves differently when it runs again with another byte.
 #pragma once
 
 namespace rapid::test {

@@ -1,4 +1,4 @@
-// Damaged copies of a file, the same for the same seed.
+// Damaged copies of a file, reproducible from a seed.
 #pragma once
 
 #include <array>
@@ -13,14 +13,14 @@ class Mutator {
 public:
     explicit Mutator(std::uint64_t seed) : random_(seed) {}
 
-    // One to eight damages: bits, bytes and words, numbers in text, pieces that are cut, doubled or moved.
+    // Damages a text in one to eight ways: bits, bytes and words, numbers in text, pieces removed, doubled or moved.
     std::string operator()(std::string text)
     {
         for (std::size_t left = 1 + below(8); left > 0; --left) damage(text);
         return text;
     }
 
-    // One or two numbers, in bytes or in text, become so large that as counts they ask for much memory.
+    // Replaces one or two numbers, in bytes or in text, by ones so large that as counts they would need much memory.
     std::string with_large_numbers(std::string text)
     {
         static constexpr std::array<std::string_view, 6> numbers = {"1048576",    "16777216",   "268435456",
@@ -78,7 +78,7 @@ private:
         }
     }
 
-    // The low bytes of a word, in either order.
+    // Writes the low bytes of a word, in either byte order.
     void overwrite(std::string& text, std::size_t at, std::uint64_t word, std::size_t bytes)
     {
         const bool swapped = below(2) == 1;

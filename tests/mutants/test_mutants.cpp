@@ -1,11 +1,11 @@
-// Damaged and cut files for every reader. Each file is read twice, with different bytes in memory that nobody has
-// written, and both readings must agree: in all that was read, or in an error that names the file. No file ends the
-// process by a signal, takes more than ten seconds of the processor, or exceeds the limit of memory. Files whose
-// numbers are large take no more than a budget (--memory).
+// Damaged and truncated files for every reader. Each file is read twice, with different bytes in uninitialised memory,
+// and both readings must agree: in everything read, or in an error that names the file. No file crashes the process,
+// takes more than ten seconds of processor time, or exceeds the memory limit. Files with large numbers stay within a
+// budget (--memory).
 //
-//   RAPID_MUTANTS=20000 build/test/bin/test_mutants       as many, of all readers together (200)
+//   RAPID_MUTANTS=20000 build/test/bin/test_mutants       the number for all readers together (200)
 //   RAPID_MUTANT_READER=.vdb build/test/bin/test_mutants  only readers with this in their names
-//   RAPID_MUTANT_FIRST=500 build/test/bin/test_mutants    of each reader, from this one on
+//   RAPID_MUTANT_FIRST=500 build/test/bin/test_mutants    the first mutant of each reader
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/time.h>
@@ -38,14 +38,14 @@ std::size_t mutants_of_each_reader(std::size_t readers)
     return (static_cast<std::size_t>(amount("RAPID_MUTANTS", 200)) + readers - 1) / readers;
 }
 
-// The process that reads the mutants reports here how far it is and what was wrong.
+// The reading process reports its progress and the fault here.
 struct Report {
     std::size_t mutant, read, refused;
     char wrong[1000];
 };
 
-// Grants ten seconds of the processor for the next file, and more by the clock for a busy machine. The copies in which
-// libraries read have a lower limit of their own.
+// Grants ten seconds of processor time for the next file, and more wall time for a busy machine. The processes in which
+// libraries read have their own, lower limit.
 void limit_time()
 {
     const itimerval processor{{0, 0}, {10, 0}};
@@ -89,7 +89,7 @@ Outcome outcome_with_memory_of(unsigned char byte, ContentOf content, const Path
     return outcome_of(content, path);
 }
 
-// Describes a fault in how a file is read. Empty if there is none.
+// Describes a fault in how a file is read, or returns an empty string.
 std::string fault_of(const Outcome& first, const Outcome& second, const Path& path)
 {
     const auto shown = [](const Outcome& outcome) {
@@ -102,7 +102,7 @@ std::string fault_of(const Outcome& first, const Outcome& second, const Path& pa
 }
 
 using MutantOf = std::function<std::string(std::size_t k)>;
-// Reads a mutant and describes what is wrong with that. Empty if nothing is.
+// Reads a mutant and describes the fault, or returns an empty string.
 using FaultOfReading = std::function<std::string(const std::string& mutant, const Path& path, Report& report)>;
 
 // Makes mutants and reads them in a copy of this process, up to the first fault. Returns the number of refused ones.
@@ -153,7 +153,7 @@ void check_mutants(const WholeFile& whole, std::size_t count, const MutantOf& mu
     CHECK(refused > 0);
 }
 
-// The most memory that this process, or one that it has waited for, has had so far. Bytes.
+// Returns the peak memory, in bytes, of this process and of those that it has waited for.
 std::size_t peak_memory()
 {
     std::size_t peak = 0;
@@ -195,7 +195,7 @@ TEST_CASE("a damaged file is read, or is an error that names it: no signal, no h
 TEST_CASE("a file that is cut anywhere is an error, unless it only lacks white space", "[mutants][random]")
 {
     const std::vector<WholeFile> files = chosen_files();
-    // At each byte of what is short, and at more of the last ones.
+    // Truncates short files at each byte, and all files at more of the last ones.
     constexpr std::size_t near_end = 40;
     const std::size_t wanted = near_end + 5 * mutants_of_each_reader(files.size());
     for (const WholeFile& whole : files) {

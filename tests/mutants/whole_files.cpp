@@ -29,7 +29,7 @@ std::string written(const std::string& name, const std::function<void(const Path
     return file_text(folder / name);
 }
 
-// In a process of its own, whose memory is gone with it.
+// Writes a file in a separate process, whose memory is freed with it.
 std::string written_apart(const std::string& name, const std::function<void(const Path& path)>& write)
 {
     return written(name, [&](const Path& path) {
@@ -163,7 +163,7 @@ std::string glb()
            little(static_cast<std::uint32_t>(binary.size())) + std::string("BIN\0", 4) + binary;
 }
 
-// Files that Rapid writes, of every format of points that it reads.
+// Returns files written by Rapid, in every point format that it reads.
 std::vector<WholeFile> registered_formats()
 {
     std::vector<WholeFile> files;
@@ -187,7 +187,7 @@ std::vector<WholeFile> registered_formats()
 
 WholeFile sparse_fog(int values)
 {
-    // Readers are copies of this process: in what it has freed they find room that no limit counts.
+    // Readers are copies of this process, and memory that it has freed is not counted by their limit.
     const auto write = [&](const Path& path) {
         openvdb::initialize();
         const auto grid = openvdb::FloatGrid::create();

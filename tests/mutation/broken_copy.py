@@ -17,17 +17,17 @@ BUILD = pathlib.Path("build/test")
 NOTES = pathlib.Path("build/reached")
 NAMESPACE = ["unshare", *([] if os.geteuid() == 0 else ["--map-root-user"]), "--mount", "--pid", "--fork",
              "--kill-child", "--mount-proc"]
-MOST_MEMORY = 8 << 30  # bytes of a process: a broken loop may append for ever
+MOST_MEMORY = 8 << 30  # bytes of a process: a broken loop may append without end
 
 
 def limit_memory():
-    """Tests may set limits of their own, so only the soft one."""
+    """Sets only the soft limit, because tests may set their own."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, resource.getrlimit(resource.RLIMIT_DATA)[1]))
 
 
 def inside(command, seconds=None, **variables):
     """Runs a command in the copy, which is mounted over the checkout: paths in objects and precompiled headers fit, and
-    no broken program finds the checkout. Returns the status, or None after too many seconds, and the output."""
+    no broken program finds the checkout. Returns the status, or None after a timeout, and the output."""
     mounts = 'mount --bind "$3" /tmp && mount --bind "$1" "$2" && cd "$2" && shift 3 && exec "$@"'
     log = WORK / "log"
     with open(log, "wb") as output:
@@ -48,7 +48,7 @@ def inside(command, seconds=None, **variables):
 
 
 def make():
-    """Copies the files that git knows or would add, and build/test, with their times: the build is up to date."""
+    """Copies the files that git tracks or would add, and build/test, with their times, so the build is up to date."""
     subprocess.run(["ninja", "-C", str(BUILD), "rapid_tests"], check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(WORK, ignore_errors=True)
     TEMPORARY.mkdir(parents=True)
@@ -64,7 +64,7 @@ def make():
 
 
 def batches():
-    """The sources of each batch, which are compiled as one."""
+    """Returns the sources of each batch, which are compiled as one."""
     for unity in sorted(BUILD.rglob("Unity/*.cxx")):
         if any(part.startswith("rapid_abi") for part in unity.parts):
             continue
@@ -73,7 +73,7 @@ def batches():
 
 
 def write(path, changed, top=""):
-    """Writes a source with other lines, by their numbers from 0."""
+    """Writes a source with some lines replaced, by their numbers from 0."""
     lines = (ROOT / path).read_text(encoding="utf-8").splitlines(keepends=True)
     for i, line in changed.items():
         lines[i] = line + "\n"
@@ -81,7 +81,7 @@ def write(path, changed, top=""):
 
 
 def build():
-    """Builds the tests. Returns the places that the compiler complains about, as (file, line): none if all is built."""
+    """Builds the tests. Returns the positions of compiler errors as (file, line); empty if everything was built."""
     status, said = inside(["ninja", "-C", str(BUILD), "-k", "0", "rapid_tests"])
     if status == 0:
         return set()
@@ -93,7 +93,7 @@ def build():
 
 
 class Suite:
-    """Tests that one command runs. It stops at the first failure if it can."""
+    """The tests run by one command. It stops at the first failure if it can."""
 
     def __init__(self, name, command):
         self.name, self.command = name, command
@@ -110,7 +110,7 @@ class Suite:
         return status == 0
 
     def measure(self, count):
-        """Runs the tests as they are, and notes which of the `count` places they reach. False if they fail."""
+        """Runs the unbroken tests, and records which of the `count` lines they execute. Returns False if they fail."""
         notes = TREE / NOTES
         notes.write_bytes(bytes(count))
         passed = self.passes(RAPID_MUTANT_REACHED=str(ROOT / NOTES))
@@ -126,7 +126,7 @@ def catch(folder, chosen="~[long]~[.]"):
 
 
 def suites():
-    """Returns the suites of tests/run, without those that read the sources or have builds of their own."""
+    """Returns the suites of tests/run, except those that read the sources or have their own builds."""
     found = [catch(path.name.removeprefix("test_")) for path in sorted((BUILD / "bin").glob("test_*"))]
     for path in sorted(pathlib.Path("tests").rglob("test_*.lua")):
         if path.parts[1] != "farm":
@@ -138,8 +138,8 @@ def suites():
 
 
 def own_first(known, source):
-    """Sorts suites: first the file of tests of a source, then the suites that belong to it (tests/selected), then the
-    others, the fastest first."""
+    """Sorts suites: first the test file of a source, then the suites that belong to it (tests/selected), then the
+    others by time, fastest first."""
     selected = subprocess.run(["tests/selected", str(source)], check=False, capture_output=True, text=True).stdout
     filters, own = [], set()
     for kind, what, *rest in (line.split() for line in selected.splitlines()):

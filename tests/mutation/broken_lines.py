@@ -8,7 +8,7 @@ STATEMENT = {
     ".lua": re.compile(r" {2,}(return |if |while |local |[\w.\[\]]+ = ).*$"),
 }
 BEFORE = {".cpp": re.compile(r"[;{}:]$"), ".lua": re.compile(r".*\b(then|do|else|end)$|function.*\)$|^ *local ")}
-# Text, and what is computed when it is compiled.
+# Strings, and expressions evaluated at compile time.
 LEFT_OUT = {".cpp": re.compile(r"""["']|//|\b(constexpr|static_assert|static|case|template)\b"""),
             ".lua": re.compile(r"""["']|--|\[\[""")}
 
@@ -25,7 +25,7 @@ ASSIGNMENT = re.compile(r"[\w.\[\]()>*-]+ [-+*/]?= .*;")
 
 
 class Place:
-    """A part of one line, and what it becomes."""
+    """A part of one line, and its replacement."""
 
     def __init__(self, path, line, text, match, kind):
         self.path, self.line, self.text, self.kind = path, line, text, kind
@@ -33,7 +33,7 @@ class Place:
         self.start, self.end = match.span()
 
     def whole(self, replacement=None):
-        """The line, with the part replaced: by default, the broken line."""
+        """Returns the line with the part replaced; by default, the broken line."""
         part = self.mutated if replacement is None else replacement
         return self.text[:self.start] + part + self.text[self.end:]
 
@@ -42,7 +42,7 @@ class Place:
 
 
 def broken(text):
-    """The opposite of a sign or a comparison; a larger constant."""
+    """Returns the opposite of a sign or a comparison, or a larger constant."""
     if text in EXCHANGED:
         return EXCHANGED[text]
     digits = text.rstrip("fu")
@@ -54,7 +54,7 @@ def broken(text):
 
 
 def places_of(path):
-    """Each part of a file that can be broken."""
+    """Yields each part of a file that can be broken."""
     suffix = path.suffix
     lines = path.read_text(encoding="utf-8").splitlines()
     in_text = False  # a raw string over several lines
@@ -71,7 +71,7 @@ def places_of(path):
 
 
 def closing(text, start):
-    """The index of the parenthesis that closes the one at `start`, or None."""
+    """Returns the index of the parenthesis that closes the one at `start`, or None."""
     depth = 0
     for i in range(start, len(text)):
         depth += (text[i] == "(") - (text[i] == ")")
@@ -81,8 +81,8 @@ def closing(text, start):
 
 
 def with_choice(place, number):
-    """Returns the line of C++ in both forms, of which rapid_mutant(number) chooses the broken one. None if the line
-    does not allow that."""
+    """Returns the C++ line in both forms; rapid_mutant(number) selects the broken one. Returns None if the line does
+    not allow that."""
     chosen = f"rapid_mutant({number})"
     if place.kind == "constant":
         return place.whole(f"({chosen} ? {place.mutated} : {place.original})")
@@ -99,7 +99,7 @@ def statement_with_choice(statement, start, place, chosen):
         first, last = head.end(), closing(statement, head.end() - 1)
         if last is None or start < first:
             return None
-        if start > last:  # in what the condition guards
+        if start > last:  # in the body of the condition
             guarded = statement_with_choice(statement[last + 2:], start - last - 2, place, chosen)
             return guarded and statement[:last + 2] + guarded
         if ";" in statement[first:last]:
@@ -131,8 +131,8 @@ def layer_of(path):
 
 
 def sources():
-    """The sources that are broken, below the current folder."""
+    """Returns the sources that are broken, below the current folder."""
     for top, suffix in (("runtime", ".cpp"), ("bindings", ".cpp"), ("lua", ".lua")):
         for path in sorted(pathlib.Path(top).rglob(f"*{suffix}")):
-            if path.parts[1] not in ("examples", "new"):  # programs of others
+            if path.parts[1] not in ("examples", "new"):  # examples for other programs
                 yield path

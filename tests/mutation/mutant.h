@@ -1,7 +1,7 @@
-// Lets one build hold many broken lines: each stands beside its original, and the environment chooses at start which of
-// the two runs. tests/mutation/run includes this header in the files that it breaks, in its own copy of the sources.
+// Lets one build contain many broken lines, each next to its original; the environment selects one of the two at start.
+// tests/mutation/run includes this header in the files that it breaks, in its own copy of the sources.
 //
-//   RAPID_MUTANT=17          runs the broken line 17; all others run as they were
+//   RAPID_MUTANT=17          runs the broken line 17; all others run in their original form
 //   RAPID_MUTANT_REACHED     a file with one byte for each line, which becomes 1 when the line is executed
 #ifndef RAPID_TESTS_MUTATION_MUTANT_H
 #define RAPID_TESTS_MUTATION_MUTANT_H
@@ -13,7 +13,7 @@
 
 #include <cstdlib>
 
-// A broken line may compare or index what no sane line does.
+// A broken line may compare or index in ways that the compiler warns about.
 #pragma GCC diagnostic ignored "-Warray-bounds"
 #pragma GCC diagnostic ignored "-Wbool-compare"
 #pragma GCC diagnostic ignored "-Wparentheses"
@@ -25,7 +25,7 @@ namespace rapid_mutation {
 
 struct Choice {
     long chosen = -1;
-    unsigned char* reached = nullptr;  // mapped, as a sandbox may refuse files later on
+    unsigned char* reached = nullptr;  // mapped, because a sandbox may refuse files later
 
     Choice()
     {
@@ -48,7 +48,7 @@ struct Choice {
     return made;
 }
 
-// Read at start, before a program gives up what it may read.
+// Read at start, before a program gives up access to files.
 [[gnu::visibility("hidden")]] inline const bool is_read = (choice(), true);
 
 }  // namespace rapid_mutation

@@ -1,5 +1,5 @@
-// What an embedder does first: a mesh that is moved, a set of points, the nodes and formats there are. Status 0 when
-// all of it is right.
+// The first steps of an embedder: a moving mesh, a set of points, the registered nodes and formats. Exits with status 0
+// if everything is right.
 #include <cmath>
 #include <cstdio>
 

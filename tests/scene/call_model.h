@@ -1,14 +1,14 @@
-// Random sequences of calls, right, wrong and hostile, against a model of what is open and at which frame it is. Each
-// call has the status that the model says, an error has a text, and open frames hold the formula of a fall.
+// Random sequences of valid, wrong and hostile calls, compared with a model of the open objects and their frames. Each
+// call has the status that the model predicts, an error has a message, and open frames satisfy the formula of a fall.
 //
 // A Face makes the calls in one language:
 //
 //   struct Face {
-//       struct Scene, Frame, Snapshot;                 handles; {} is none
+//       struct Scene, Frame, Snapshot;                 handles; {} is empty
 //       static constexpr bool refuses_closed;          whether closed handles may be used, which is an error
 //       Answer open(Scene&); ...                       as CallModel uses them
-//       std::vector<Hostile> hostile(Scene&, Frame*, Snapshot*)     calls that must be errors and change nothing; of
-//   };                                                              handles that are open, or null if none is
+//       std::vector<Hostile> hostile(Scene&, Frame*, Snapshot*)     calls that must be errors and change nothing; with
+//   };                                                              open handles, or null if there are none
 #pragma once
 
 #include <fmt/format.h>
@@ -33,14 +33,14 @@ local height = rapid.param("height", 10, "m, of the drop")
 return rapid.create { points = rapid.points.from { P = {{0, height, 0}, {1, height, 0}} } } :gravity {} :solve {}
 )";
 
-// What a call has come to: 0 or a SceneError::Kind, and the text of the error.
+// The result of a call: 0 or a SceneError::Kind, and the message of the error.
 struct Answer {
     int status = 0;
     std::string text = {};
 };
 using Hostile = std::function<Answer()>;
 
-// A call: what it does, to which of the things that there have been, and a number.
+// A call: its kind, the index of its object among all that were created, and a number.
 enum What {
     Open,
     Close,
@@ -58,7 +58,7 @@ enum What {
 };
 using Call = std::tuple<What, int, int>;
 
-// Opening and setting run the scene's file, which takes a thousand times as long as any other call.
+// Opening and setting run the scene's file, which takes a thousand times as long as other calls, so they are rarer.
 inline rc::Gen<std::vector<Call>> calls()
 {
     const auto what = rc::gen::weightedElement<What>({{1, Open},
@@ -125,7 +125,7 @@ public:
         }
     }
 
-    // What is open holds what it did at first.
+    // Checks that open frames have kept their values.
     void check_frames()
     {
         for (ModelFrame& frame : frames_) {
@@ -146,7 +146,7 @@ private:
         typename Face::Scene handle{};
         bool open = true, cancelled = false;
         std::int64_t next = 1;
-        double height = 10, set_height = 10;  // of the run; and of the next start
+        double height = 10, set_height = 10;  // of the current run; of the next start
         bool has_advanced() const { return next > 1; }
     };
     struct ModelFrame {
@@ -274,7 +274,7 @@ private:
         inspect(scene);
     }
 
-    // The last one that is open.
+    // Returns the most recent open object.
     template <class Thing>
     static auto open_handle(std::vector<Thing>& things) -> decltype(&things.front().handle)
     {
@@ -297,7 +297,7 @@ void run_calls(const std::vector<Call>& sequence)
     model.check_frames();
 }
 
-// Tries random sequences of so many calls in all, HOST_CALLS (240).
+// Runs random sequences with HOST_CALLS (240) calls in total.
 template <class Face>
 void check_random_calls()
 {

@@ -1,4 +1,4 @@
-// Scenes that are opened from texts, for tests that fail where they are wrong.
+// Scenes opened from strings; a test fails if they have errors.
 #pragma once
 
 #include <string>

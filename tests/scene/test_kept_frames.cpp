@@ -1,4 +1,4 @@
-// Frames that a program keeps, in memory and in files.
+// Frames that a program holds on to, in memory and in files.
 #include <cstring>
 #include <filesystem>
 
@@ -119,7 +119,7 @@ TEST_CASE("points are found by their ids, and dead ones are not", "[kept]")
 {
     Scene scene = test::opened(two_outputs);
     const SceneFrame frame = good(scene.advance_to(4));
-    REQUIRE(frame.size() == 2);  // that of id 0 has died
+    REQUIRE(frame.size() == 2);  // the one with id 0 has died
     CHECK(good(frame.places({2, 0, 1, -1, 77, 2})) ==
           std::vector<std::uint32_t>{1, SceneFrame::no_place, 0, SceneFrame::no_place, SceneFrame::no_place, 1});
     CHECK(good(frame.places({})).empty());

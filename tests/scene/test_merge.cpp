@@ -1,6 +1,6 @@
-// Parts of a run as one: the points of all in the order of their ids, and parts that are no whole.
+// Merged parts of a run: all points in the order of their ids, and parts that do not form a whole.
 //
-//   WRONG_MERGES=2000 test_scene "a merge of wrong parts*"      more of them; WRONG_MERGES_SEED=7 others
+//   WRONG_MERGES=2000 test_scene "a merge of wrong parts*"      more of them; WRONG_MERGES_SEED=7 for others
 #include <array>
 #include <filesystem>
 #include <functional>
@@ -25,7 +25,8 @@ using test::good;
 
 constexpr int points = 100;
 
-// To which of two parts an id belongs (docs/scale.md): the upper half of SplitMix64's values are the second's.
+// Returns the part, of two, to which an id belongs (docs/scale.md): the upper half of SplitMix64's values is the second
+// part's.
 int part_of(std::uint64_t id)
 {
     std::uint64_t bits = id + 0x9e3779b97f4a7c15u;
@@ -34,7 +35,7 @@ int part_of(std::uint64_t id)
     return (bits ^ bits >> 31) >> 63 ? 2 : 1;
 }
 
-// Two parts of a run of three frames, of points at x = id, y = frame.
+// Two parts of a run of three frames, with points at x = id, y = frame.
 struct Parts {
     test::TemporaryFolder folder;
 
@@ -155,7 +156,7 @@ TEST_CASE("a merge refuses files that are not those that their part has written"
 {
     struct Fault {
         const char* name;
-        std::function<std::string(const Parts&, const std::string& file)> change;  // gives the file's new bytes
+        std::function<std::string(const Parts&, const std::string& file)> change;  // returns the file's new bytes
     };
     const auto bytes_of = [](const std::string& file) { return std::string(InputFile(file).text()); };
     const Fault faults[] = {
@@ -193,12 +194,12 @@ TEST_CASE("a merge refuses files that are not those that their part has written"
 
 namespace {
 
-// Two parts of which one thing is wrong, by chance.
+// Two parts with one random fault.
 class WrongParts {
 public:
     explicit WrongParts(std::uint64_t seed) : random_(seed) {}
 
-    // Makes it wrong and says how.
+    // Damages a part and describes how.
     std::string damage()
     {
         switch (below(5)) {
@@ -212,7 +213,7 @@ public:
     }
 
     Result<MergedFiles> merge() const { return merge_files(given_, whole()); }
-    // Whether what has been written are the frames of the whole before the first wrong one, and no others.
+    // Returns true if the written frames are exactly those of the whole before the first wrong one.
     bool is_right_so_far() const
     {
         const Parts right;
@@ -279,7 +280,7 @@ private:
         return std::string("in the record ") + from + " becomes " + to;
     }
 
-    // The file of a frame becomes another one, which the record does not know.
+    // Changes the file of a frame without its record.
     std::string change_file()
     {
         const int part = static_cast<int>(1 + below(2)), frame = static_cast<int>(1 + below(3));
@@ -315,7 +316,7 @@ private:
             case 5:
                 if (line < bytes.size()) bytes.insert(line, bytes.substr(line, next - line));
                 return "a point twice";
-            case 6:  // ids stay, values are others
+            case 6:  // ids stay, values change
                 bytes = std::regex_replace(bytes, std::regex(",0,"), "," + std::to_string(1 + below(9)) + ",");
                 return "another seed";
             default:

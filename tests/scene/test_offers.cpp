@@ -1,5 +1,5 @@
-// What a program offers: its shapes, points, meshes and nodes are as good as Rapid's own, and what is wrong with them
-// is an error by name.
+// Objects that a program offers: its shapes, points, meshes and nodes work like Rapid's own, and faults in them are
+// errors that name them.
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -28,7 +28,7 @@ SceneError error_of(const std::string& text, SceneOptions options, std::int64_t 
     return result.error();
 }
 
-// All values of a column as text of their bits.
+// Returns all values of a column as text of their bits.
 std::string bits_of(const SceneFrame& frame, const char* name)
 {
     const SceneColumn column = *frame.column(name);
@@ -57,7 +57,7 @@ HostShape ball(const std::array<double, 3>& center, double radius)
     return shape;
 }
 
-// Points in a slab above a ball fall onto it and slide off. SHAPE: the ball.
+// Points in a slab above a ball fall onto it and slide off. SHAPE is replaced by the ball.
 std::string rain(const std::string& shape)
 {
     return "local rapid = require 'rapid'\n"
@@ -93,7 +93,7 @@ TEST_CASE("points collide with a program's ball as with Rapid's", "[offers]")
     options.objects = {{"ball", ball({0, 1, 0}, 0.5)}};
     Scene mine = good(Scene::open_text("rain.lua", rain("rapid.host 'ball'"), options));
     Scene own = good(Scene::open_text("rain.lua", rain("rapid.shape.sphere { radius = 0.5, center = {0, 1, 0} }")));
-    // Frame 9 has the first impacts. Later ones differ: of a sphere Rapid knows the curvature, too.
+    // Frame 9 has the first impacts. Later ones differ, because Rapid also knows the curvature of its own sphere.
     const SceneFrame a = good(mine.advance_to(9)), b = good(own.advance_to(9));
     CHECK(a.statistics().collisions == 32);
     CHECK(b.statistics().collisions == 32);
@@ -185,7 +185,7 @@ TEST_CASE("what is not offered is an error that says what is", "[offers]")
 
 TEST_CASE("a program's force is Rapid's own law", "[offers]")
 {
-    // x'' = -4 x is solved by cos 2t; many sub-steps come near.
+    // x'' = -4 x has the solution cos 2t, which many substeps approach.
     SceneOptions options;
     options.nodes = {pull()};
     Scene scene = good(Scene::open_text("pull.lua", one + ":pull { strength = 4 } :solve { substeps = 200 }", options));
@@ -233,7 +233,7 @@ TEST_CASE("a program's edit reads and writes columns, in a group, and takes poin
         ":attribute { shade = 1 } :group { name = 'left', where = function(p) return p.P.z < 0 end }\n"
         ":burn { group = 'left' } :solve {}";
     Scene scene = good(Scene::open_text("burn.lua", text, options));
-    const SceneFrame third = good(scene.advance_to(3));  // two frames behind the start
+    const SceneFrame third = good(scene.advance_to(3));  // two frames after the start
     REQUIRE(third.size() == 100);
     for (std::size_t i = 0; i < 100; ++i) {
         const bool left = third.column("P")->at<float>(i)[2] < 0;
@@ -271,7 +271,7 @@ TEST_CASE("a program's constraint keeps points at a distance", "[offers]")
             const float *a = P.at<float>(i - 1), *b = P.at<float>(i);
             REQUIRE(std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) == Approx(1).epsilon(1e-3));
         }
-        // The middle of their masses falls freely.
+        // Their centre of mass falls freely.
         const double t = (frame - 1) / 24.0;
         const float sum = P.at<float>(0)[1] + P.at<float>(1)[1] + P.at<float>(2)[1];
         REQUIRE(sum / 3 == Approx(t - 9.81 / 2 * t * t).margin(1e-3));

@@ -1,4 +1,4 @@
-// Pictures in rows: their places, what is missing, and files that are none.
+// Contact sheets of pictures: their layout, missing pictures, and files that are not pictures.
 #include "bindings/scene/picture_sheet.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
@@ -10,7 +10,7 @@ namespace {
 using Catch::Contains;
 using test::good;
 
-// Of a .png: its header's sizes, big-endian behind the first 16 bytes.
+// The size of a .png from its header: big-endian after the first 16 bytes.
 struct Size {
     int width, height;
 };
@@ -43,7 +43,7 @@ TEST_CASE("a sheet has its pictures in rows of a series, with labels and free pl
     const Size four = size_of(good(picture_sheet({{picture, {"a"}}, {"", {"b"}}, {picture, {"c"}}, {"", {"d"}}}, 2)));
     CHECK(four.width == row.width);
     CHECK(four.height > row.height);
-    CHECK(four.height < 2 * row.height);  // which have a margin above each
+    CHECK(four.height < 2 * row.height);  // each has a margin above
     CHECK(good(picture_sheet({{picture, {"a"}}, {"", {"b"}}}, 2)) != two_in_series);
     CHECK(good(picture_sheet({{picture, {"a"}}, {picture, {"c"}}}, 2)) != two_in_series);
 }

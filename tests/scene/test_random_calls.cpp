@@ -21,7 +21,7 @@ Answer answer(const Result<T>& result)
     return result ? Answer{} : Answer{result.error().kind, result.error().text()};
 }
 
-// The same, with what was made.
+// Calls like the above, and stores the created object.
 template <class T, class Handle>
 Answer taken(Result<T> result, Handle& handle)
 {
@@ -39,7 +39,7 @@ struct CppFace {
     using Scene = std::optional<rapid::Scene>;
     using Frame = std::optional<SceneFrame>;
     using Snapshot = std::optional<SceneSnapshot>;
-    static constexpr bool refuses_closed = false;  // what is gone can't be called
+    static constexpr bool refuses_closed = false;  // an empty optional cannot be called
 
     static Answer open(Scene& scene) { return taken(rapid::Scene::open_text("fall.lua", test::falling_scene), scene); }
     static Answer close(Scene& scene) { return release(scene); }

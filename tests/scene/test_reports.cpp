@@ -1,4 +1,4 @@
-// What is told of a scene: its graph, the lives of points, scripts that are late, and where in a script an error was.
+// Reports about a scene: its graph, the lives of points, slow scripts, and the position of an error in a script.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -150,7 +150,7 @@ TEST_CASE("the graph of a scene has its nodes, and an edge back from Solve", "[r
     CHECK_THAT(json, Contains(R"("name":"down","type":"gravity")") && Contains(R"("x":)"));
     CHECK_THAT(json, Contains(R"("why":"no output comes from it")"));
     CHECK(scene.graph(static_cast<GraphForm>(7)).error().kind == SceneError::WrongCall);
-    CHECK(good(scene.advance()).number() == 1);  // a scene that is looked at goes on
+    CHECK(good(scene.advance()).number() == 1);  // inspection does not disturb the scene
 }
 
 TEST_CASE("the graph of a scene whose frame failed is there", "[reports]")
@@ -268,7 +268,7 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
     SceneHooks hooks;
     hooks.late = [&](const std::string& message) {
         if (told++ == 0) text = message;
-        throw 1;  // is dropped
+        throw 1;  // ignored
     };
     const Result<Scene> scene = SceneInside::open(file, options, hooks);
     REQUIRE_FALSE(scene);
@@ -287,7 +287,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10, speed =
     SceneHooks hooks;
     hooks.reads = [&](const std::string& path) {
         read.push_back(path);
-        throw 1;  // is dropped
+        throw 1;  // ignored
     };
     good(SceneInside::open(file, {}, hooks));
     CHECK(std::any_of(read.begin(), read.end(), [](const std::string& path) { return path.ends_with("speed.lua"); }));

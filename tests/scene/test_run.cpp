@@ -1,5 +1,5 @@
-// Runs of a program that write files: what `rapid run` writes, and what a program is told; runs that are ended, that
-// go on, of parts; wrong options.
+// Runs of a program that write files: the same files as `rapid run`, callbacks, cancelled and resumed runs, parts, and
+// wrong options.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -47,7 +47,7 @@ RunOptions options(const test::TemporaryFolder& folder, RunFrames frames = {1, 8
     return result;
 }
 
-// What a run has told.
+// Records the callbacks of a run.
 struct Told {
     std::vector<RunFrame> frames;
     std::vector<std::string> lines, warnings;
@@ -183,7 +183,7 @@ TEST_CASE("a run that was ended goes on in another one to the same files", "[run
         CHECK(content(whole / file) == content(parts / file));
     }
 
-    // A run of other values does not take the folder, unless it is to.
+    // A run with other values does not take over the folder unless it is told to replace it.
     SceneOptions other;
     other.set = {{"rate", 1000.0}};
     {
@@ -239,7 +239,7 @@ TEST_CASE("the parts of a run have the points of the whole", "[run]")
     CHECK(merges.front().first == (folder / "cloud.####.csv"));
     CHECK(merges.front().second == (folder / "cloud_part{part}.####.csv"));
     CHECK_THAT(SceneInside::merges(run, 0).error().message, Contains("parts = 0; it must be from 1"));
-    good(run.run());  // of all points still
+    good(run.run());  // still for all points
     CHECK(good(SceneFrame::read(folder / "cloud.0008.csv")).size() == whole.size());
 }
 
@@ -299,7 +299,7 @@ TEST_CASE("a run is abandoned between two frames, or not at all", "[run]")
     Told told;
     SceneRun run = made(asked, told.listener());
     bool is_abandoned = true;
-    told.on_frame = [&](const RunFrame& frame) {  // while the program has been called
+    told.on_frame = [&](const RunFrame& frame) {  // during a callback
         if (frame.number == 3) std::thread([&] { is_abandoned = SceneInside::abandon(run).has_value(); }).join();
         if (frame.number == 4) run.end_after_frame();
     };
@@ -498,7 +498,7 @@ TEST_CASE("a scene is checked without a frame, and for kernels that remember", "
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000, velocity = {0, 1, 0} } :drag { linear = 5000 } :solve {})");
     CHECK_THAT(good(SceneInside::advice_on(stiff, {})), Contains("drag1"));
 
-    // A table in a table of the kernel's own is not followed, and large ones are not compared.
+    // A table inside another table of the kernel is not followed, and large ones are not compared.
     Scene remembers = test::opened(R"(local rapid = require "rapid"
 local box = { n = 0 }
 ballast = {}

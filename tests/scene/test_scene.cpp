@@ -1,5 +1,5 @@
-// Scenes as a program has them (rapid/scene.h): the bits of a session, memory that is shared and stays as it is, errors
-// as values, and a scene that is usable behind each of them.
+// Scenes in a program (rapid/scene.h): bit-identical to a session, memory that is shared and stays unchanged, errors as
+// values, and a scene that stays usable after each error.
 #include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 
@@ -22,7 +22,8 @@ namespace {
 using Catch::Contains, Catch::EndsWith, Catch::StartsWith;
 using test::TemporaryFolder, test::good, test::opened;
 
-// A cloud that kernels, births, deaths and a floor change; P, v, id, age, life, heat; the group "hot"; a detail value.
+// A cloud changed by kernels, births, deaths and a floor, with P, v, id, age, life, heat, the group "hot", and a detail
+// value.
 const std::string cloud = R"(
 local rapid = require "rapid"
 local rate = rapid.param("rate", 20000, "particles born per second")
@@ -42,7 +43,7 @@ return rapid.create { fps = 24, seed = 3 }
   :solve { substeps = 2 }
 )";
 
-// All values of a frame as text of their bits.
+// Returns all values of a frame as text of their bits.
 std::string bits_of(const SceneFrame& frame)
 {
     std::string bits;
@@ -280,7 +281,7 @@ TEST_CASE("behind a snapshot come the same bits, in this scene and in another", 
 
 namespace {
 
-// One kernel runs for ever from frame 2 on, in compiled code; or a function of the frame, interpreted or compiled.
+// A kernel that never ends from frame 2 on, in compiled code, or a function of the frame, interpreted or compiled.
 std::string endless(const std::string& how)
 {
     const std::string head =
@@ -338,7 +339,7 @@ TEST_CASE("another thread cancels an advance", "[scene]")
     good(scene.restart());
     good(scene.advance());
 
-    scene.cancel();  // nothing is running: the next one
+    scene.cancel();  // nothing is running, so this applies to the next frame
     CHECK(scene.advance().error().kind == SceneError::Cancelled);
     good(scene.restart());
     good(scene.advance());
@@ -404,7 +405,7 @@ TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
     CHECK(told.size() == 2);
 }
 
-// A frame that takes minutes, without a script: the test ends because it is cancelled.
+// A frame that takes minutes without a script; the test ends because it is cancelled.
 TEST_CASE("another thread cancels a frame that is long in itself", "[scene]")
 {
     const std::string chain =
@@ -568,7 +569,7 @@ TEST_CASE("an error that a script catches and raises again keeps its kind", "[sc
 
 TEST_CASE("a scene whose frames take more memory than it has is an error, and goes on", "[scene]")
 {
-    // Texts of details, a few hundred MiB in each frame, which nobody estimates.
+    // Detail strings of a few hundred MiB in each frame, which no estimate covers.
     const std::string growing =
         "local rapid = require 'rapid'\n"
         "local large = rapid.param('large', 1)\n"
@@ -577,7 +578,7 @@ TEST_CASE("a scene whose frames take more memory than it has is an error, and go
         "    for i = 1, large do points.detail[('x'):rep(100) .. i .. '_' .. frame.number] = i end\n"
         "  end) :solve {}";
     SceneOptions options;
-    options.memory = 1;  // 128 MiB are let pass
+    options.memory = 1;  // 128 MiB are tolerated
     options.set = {{"large", 1e6}};
     Scene scene = opened(growing, options);
     const SceneError error = scene.advance_to(9).error();
@@ -587,7 +588,7 @@ TEST_CASE("a scene whose frames take more memory than it has is an error, and go
     good(scene.set("large", 1.0));
     CHECK(good(scene.advance_to(4)).size() == 1);
 
-    // Little more in each frame.
+    // Grows only slightly in each frame.
     good(scene.set("large", 3e4));
     CHECK(scene.advance_to(60).error().kind == SceneError::OutOfMemory);
 }

@@ -1,4 +1,4 @@
-// What the frames of a scene follow from, and the files that they read.
+// The inputs of a scene's frames: everything that they depend on, and the files that they read.
 #include <filesystem>
 
 #include "bindings/scene/scene_inside.h"

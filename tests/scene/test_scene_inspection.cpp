@@ -1,4 +1,4 @@
-// What is in a scene and in a frame of it, beside a scene that stays where it is.
+// The contents of a scene and of one of its frames, computed without moving the scene.
 #include <algorithm>
 #include <cstring>
 
@@ -211,7 +211,7 @@ TEST_CASE("a graph without places has the nodes of the one that is laid out", "[
     CHECK(bare.size() < laid_out.size());
     REQUIRE_FALSE(layout.graph.empty());
 
-    // The same graph with another value takes the places that are there.
+    // The same graph with another value keeps its layout.
     const GraphLayout kept = layout;
     layout.places = "{}";
     CHECK_FALSE(good(SceneInside::graph_json(scene, &layout)) == laid_out);

@@ -17,7 +17,7 @@ using test::good;
 
 Scene opened(const std::string& text) { return test::opened("local rapid = require 'rapid'\n" + text); }
 
-// A resting sphere bears points, which fall on a plane and on a box that rises by a metre a frame.
+// A resting sphere emits points, which fall on a plane and on a box that rises by a metre per frame.
 const char* const shapes_of_all_kinds =
     "return rapid.create {} :emit { source = rapid.mesh.sphere { radius = 0.5, center = {0, 3, 0} }, rate = 100 }"
     ":gravity {} :collide { shape = rapid.shape.plane { normal = {0, 1, 0}, offset = -2 } }"

@@ -1,4 +1,4 @@
-// Tests in Lua, run by a program: what it is told of each, and scripts that never end.
+// Lua tests run by a program: the callbacks for each test, and scripts that never end.
 #include <algorithm>
 #include <string>
 #include <vector>

@@ -1,4 +1,5 @@
-// Snapshots in files: the bits of those in memory, in any later scene of the same graph; files that are none.
+// Snapshots in files: bit-identical to those in memory, for any later scene of the same graph; files that are not
+// snapshots.
 #include <cstring>
 #include <fstream>
 

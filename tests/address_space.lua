@@ -1,5 +1,5 @@
--- A line of the shell that limits the address space of the command that comes next, in KiB; empty where the command
--- can't start so: one with the address sanitizer maps terabytes.
+-- A shell line that limits the address space of the next command, in KiB. Empty if the command cannot start with a
+-- limit: one with the address sanitizer maps terabytes.
 local command = require "testing.command"
 
 local can_be_limited

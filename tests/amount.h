@@ -1,12 +1,12 @@
-// How many random cases a test tries (tests/amount.lua has the same for tests in Lua). A test that asks is tagged
-// [random], so that tests/run --thorough runs it again with more of them.
+// The number of random cases of a test (tests/amount.lua is the same for Lua). A test that uses it is tagged [random],
+// so that tests/run --thorough runs it again with more cases.
 #pragma once
 
 #include <cstdlib>
 
 namespace rapid {
 
-// The value of the environment variable `name`, or `quick` times RAPID_TEST_SCALE.
+// Returns the environment variable `name`, or `quick` times RAPID_TEST_SCALE.
 inline int amount(const char* name, int quick)
 {
     if (const char* const text = std::getenv(name)) return std::atoi(text);

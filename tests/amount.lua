@@ -1,4 +1,4 @@
--- How many random cases a test tries.
+-- The number of random cases of a test.
 --
 --   local amount = require "tests.amount"            from the folder of the project
 --   local scenes = amount.of("STABILITY_SCENES", 100)
@@ -10,10 +10,10 @@ local amount = {}
 
 local scale = tonumber(os.getenv "RAPID_TEST_SCALE" or 1)
 
--- Whether tests that take long belong to this run.
+-- True if this run includes slow tests.
 amount.thorough = scale > 1
 
--- The value of the environment variable `name`, or `quick` times the scale.
+-- Returns the environment variable `name`, or `quick` times the scale.
 function amount.of(name, quick)
   return tonumber(os.getenv(name) or quick * scale)
 end

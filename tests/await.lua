@@ -1,8 +1,8 @@
--- Shell text for lines that start a process and wait for what it does:
+-- Shell text for lines that start a process and wait for its effect:
 --
 --   await PID COMMAND...    waits until the command succeeds. Fails if the process ends before that, or after minutes.
 --
--- A loop without the process would never end if the process cannot start.
+-- A loop that ignored the process would never end if the process could not start.
 return [[
 await() {
   process=$1; shift

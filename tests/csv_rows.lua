@@ -1,4 +1,4 @@
--- The rows of the text of a .csv file, as tables by column; and its columns' names.
+-- Returns the rows of a .csv file's text as tables by column, and the names of the columns.
 --
 --   local csv_rows = require "tests.csv_rows"      from the folder of the project
 return function(text)

@@ -1,10 +1,10 @@
--- The statistics of a run without what differs from run to run: times, threads and memory; and passes over the points,
--- of which a run that goes on behind a snapshot makes those again that are made once.
+-- The statistics of a run without values that vary between runs: times, threads and memory, and passes over the points,
+-- because a run resumed from a snapshot repeats passes that are otherwise made once.
 local json = require "dkjson"
 
 local same = {}
 
--- text: of a file of --stats.
+-- text: the contents of a --stats file.
 function same.of(text)
   local run = json.decode(text)
   run.seconds, run.threads, run.peak_bytes = nil, nil, nil

@@ -1,4 +1,4 @@
--- Scenes by the place where a script runs; %s in each is the script, and its line 2.
+-- Scenes by the place in which a script runs. %s in each is the script, on line 2.
 return {
   body = "\n%s\nreturn rapid.create { points = two } :solve {}",
   kernel = "return rapid.create { points = two } :points('k', function(p, frame)\n%s\nend) :solve {}",

@@ -1,4 +1,4 @@
--- Every scene there is, in a row: it runs, stays finite, and each picture in the README has a scene of its name.
+-- Runs every scene: it stays finite, and each picture in the README has a scene of its name.
 local command = require "testing.command"
 
 describe("every scene in graphs", function()

@@ -1,10 +1,10 @@
--- graphs/ash.lua: what its head promises.
+-- graphs/ash.lua: the claims in its header.
 describe("graphs/ash.lua", function()
   local scene = require "testing.scene"
   local command = require "testing.command"
   local folder = command.shell("pwd").stdout:gsub("%s", "") .. "/graphs/smoke"
 
-  -- A chain of frames 49 to 113, with the sequence and two of its files.
+  -- Runs a chain of frames 49 to 113, with the sequence and two of its files.
   local function run(chain, frame)
     return scene.run(([[
 local folder = %q
@@ -19,8 +19,8 @@ return rapid.create { fps = 24, seed = 3, start = 49 } %s]]):format(folder, chai
   end
 
   it("bears flakes where there is smoke at the moment, in one file or the other", function()
-    -- In frame 53, a quarter of the way, by 3/4 of the first file's density and 1/4 of the second's: the parts of the
-    -- flakes are those of the totals, and where files have no smoke in common the flakes of one are not the other's.
+    -- In frame 53, a quarter of the way, the density is 3/4 of the first file's plus 1/4 of the second's. The flakes
+    -- are divided in proportion to the totals, and parts without common smoke share no flakes.
     local function drawn(source, number)
       return run(([[
   :emit { source = %s, impulse = { [53] = %d }, age = 0, attributes = { a = 0, b = 0 } }
@@ -39,14 +39,15 @@ return rapid.create { fps = 24, seed = 3, start = 49 } %s]]):format(folder, chai
     end
     local between = drawn("fog", 40000)
     assert.equal(40000, #between)
-    -- Both files are of as many points, all of weight 1, within a tenth: of the mixture 3/4 are the first file's.
+    -- Both files have equally many points, all of weight 1, within a tenth; 3/4 of the mixture belong to the first
+    -- file.
     assert.near(0.75, part(between, true), 0.03)
     assert.near(0.25, part(between, false), 0.03)
   end)
 
   it("goes as the smoke goes, at each moment between two files", function()
-    -- With such a drag a flake has the velocity of the flow, that of frame 55 three eighths of the way from file to
-    -- file; but for half a sub-step, 1.3 ms, in which it goes some 3 mm and the flow changes by some 0.01 m/s.
+    -- With such a drag a flake has the velocity of the flow, which in frame 55 is three eighths of the way from file to
+    -- file. It lags by half a substep, 1.3 ms, in which it moves about 3 mm and the flow changes by about 0.01 m/s.
     local points = run([[
   :emit { source = fog, impulse = { [54] = 2000 }, age = 0 }
   :attribute { a = {0, 0, 0}, b = {0, 0, 0} }

@@ -1,7 +1,7 @@
 -- clumps: a body that rises out of wet sand.
 local rapid = require "rapid"
 
--- Grains above the height of the sand as it lay.
+-- Counts the grains above the initial height of the sand.
 local function lifted(points)
   local count = 0
   for i = 1, #points do
@@ -18,7 +18,7 @@ end
 describe("clumps", function()
   local wet = after_rising(1)
 
-  -- How a pile tears is chance: the scene's own bonds carry 7 to 59 grains, those of four times their strength 40 to
+  -- How a pile tears is chance: the scene's own bonds carry 7 to 59 grains, bonds of four times their strength 40 to
   -- 73, and 8 to 17 dry grains lie on the head.
   it("carries sand that sticks higher than dry sand", function()
     local sticky, loose = 0, 0
@@ -31,7 +31,7 @@ describe("clumps", function()
 
   it("lets no sand into the body or the floor", function()
     assert.truthy(wet:min("P").y >= 0.04 * 0.999)
-    -- At frame 73 the body's lower sphere is at 0.75 m; its voxels are of 3 cm.
+    -- At frame 73 the body's lower sphere is at 0.75 m; its voxels measure 3 cm.
     for i = 1, #wet do assert.truthy((wet[i].P - vec3(0, 0.75, 0)):length() > 0.3 + 0.02) end
   end)
 end)

@@ -1,10 +1,10 @@
--- column: grain that collapses into a heap.
+-- column: grain collapses into a heap.
 local rapid = require "rapid"
 
 local last = 84
 local r = 0.02
 
--- The angle of the cone of the same mean height and mean distance from its axis, degrees.
+-- Returns the slope, in degrees, of the cone with the same mean height and mean distance from its axis.
 local function slope(points)
   local height, distance = 0, 0
   for i = 1, #points do
@@ -43,7 +43,7 @@ describe("column", function()
     for i = 1, #points do
       local speed = points[i].v:length()
       mean = mean + speed / #points
-      if speed > 0.1 then moving = moving + 1 end -- a grain falls at 0.4 m/s in a frame
+      if speed > 0.1 then moving = moving + 1 end -- a grain gains 0.4 m/s in a frame of free fall
     end
     assert.truthy(moving <= #points / 1000, moving)
     assert.truthy(mean < 1e-3, mean)

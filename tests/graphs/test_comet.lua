@@ -1,9 +1,9 @@
--- graphs/comet.lua: what its head promises.
+-- graphs/comet.lua: the claims in its header.
 describe("graphs/comet.lua", function()
   local turn, emitter, rate = 60, 0.02, 24000
   local result = rapid.run("graphs/comet.lua", { frames = {1, 8}, set = { turn = turn } })
 
-  -- The points of an emitter at frame 8, in the order of their births, about its own middle.
+  -- Returns the points of an emitter at frame 8, in birth order, relative to the emitter's centre.
   local function trail(k)
     local points, found = result[8], {}
     for i = 1, #points do
@@ -22,7 +22,7 @@ describe("graphs/comet.lua", function()
       assert.near(1, p.P:length(), 0.03 + emitter)
       if i > 1 then longest = math.max(longest, (p.P - points[i - 1].P):length()) end
     end
-    -- Each is born at its own place on the emitter; its way from birth to birth is 60 degrees / 1,000.
+    -- Each is born at a separate place on the emitter, which moves 60 degrees / 1,000 from birth to birth.
     assert.truthy(longest < 2 * emitter + 1.2 * math.rad(turn) * 24 / rate, longest)
   end)
 

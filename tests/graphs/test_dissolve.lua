@@ -1,4 +1,4 @@
--- graphs/dissolve.lua: what its head promises.
+-- graphs/dissolve.lua: the claims in its header.
 describe("graphs/dissolve.lua", function()
   local result = rapid.run("graphs/dissolve.lua", { frames = {1, 60}, set = { count = 4000 } })
   local start = result[1]

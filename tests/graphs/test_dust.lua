@@ -1,7 +1,7 @@
--- graphs/dust.lua: what its head promises.
+-- graphs/dust.lua: the claims in its header.
 describe("graphs/dust.lua", function()
   local scene = require "testing.scene"
-  -- Dust that stays where it is born, and the pieces as an output of their own.
+  -- Dust that stays where it is born, and the pieces as a separate output.
   local text = io.open("graphs/dust.lua"):read "*a":gsub("return dust.*", [[
 local born = rapid.create {}:points("read", function(p) local _ = p.birthtime + p.parent end)
   :spawn { from = pieces, rate = rapid.attr "dust", inherit_velocity = 0 } :solve {}
@@ -17,7 +17,7 @@ return { main = born, pieces = pieces }]])
       local frame = math.floor(step) + 1
       local before, after = pieces[frame] and pieces[frame]:by_id(p.parent), pieces[frame + 1]:by_id(p.parent)
       if before and after then
-        -- On a parabola no place is farther from the chord than g dt² / 8; a bounce bends it by a part of v dt.
+        -- A parabola deviates from its chord by at most g dt² / 8; a bounce bends it by a fraction of v dt.
         local u = step % 1
         local far = before.v:length() / 24
         assert.is_true((p.P - before.P:lerp(after.P, u)):length() < 0.35 * far + 9.81 / 24 ^ 2 / 8, i)

@@ -1,4 +1,4 @@
--- graphs/embers.lua: what its head promises.
+-- graphs/embers.lua: the claims in its header.
 describe("graphs/embers.lua", function()
   local result = rapid.run("graphs/embers.lua", { frames = {1, 120} })
 
@@ -6,7 +6,7 @@ describe("graphs/embers.lua", function()
     for _, points in result:frames() do
       if #points > 0 then assert.is_true(points:min "heat" >= 0.06) end
     end
-    assert.is_true(#result[120] < 900 * 119 / 24) -- some have
+    assert.is_true(#result[120] < 900 * 119 / 24) -- some have died
   end)
 
   it("moves finitely, and upwards on the whole", function()

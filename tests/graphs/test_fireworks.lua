@@ -1,9 +1,9 @@
--- graphs/fireworks.lua: what its head promises.
+-- graphs/fireworks.lua: the claims in its header.
 describe("graphs/fireworks.lua", function()
   local command = require "testing.command"
   local folder = command.folder()
   local text = io.open("graphs/fireworks.lua"):read "*a"
-  -- The chains apart, with what they bear left where it is born.
+  -- The chains separately, with all children left where they are born.
   local body = text:gsub("return sparks:merge%b()", [[
 local still = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
   :spawn { from = shells, on = "death", inherit_velocity = 0 } :solve {}
@@ -38,7 +38,7 @@ return { main = still, trail = trail, stars = stars }]])
         gaps = gaps + 1
         assert.near(1 / 160, p.birthtime - before.birthtime, 2e-6)
         local gap = (p.P - before.P):length()
-        -- At 6.5 m/s at first, under a drag of 0.9/s and gravity: no two gaps differ by more than that allows.
+        -- 6.5 m/s at first, with a drag of 0.9/s and gravity, which limit the difference between any two gaps.
         if before.gap then assert.near(before.gap, gap, 0.002 * before.gap + (0.9 * 8 + 9.81) / 160 ^ 2) end
         last[p.parent] = { birthtime = p.birthtime, P = p.P, gap = gap }
       else

@@ -1,7 +1,7 @@
--- graphs/first.lua: what its head promises.
+-- graphs/first.lua: the claims in its header.
 local torus_radius, tube, voxel = 0.6, 0.22, 0.02
 
--- Distance to the torus that the scene's mesh approximates; the mesh and its level set lie within a voxel of it.
+-- Returns the distance to the torus that the scene's mesh approximates; mesh and level set lie within a voxel of it.
 local function distance(P)
   local ring = math.sqrt(P.x * P.x + P.z * P.z) - torus_radius
   local y = P.y - 0.7

@@ -31,6 +31,6 @@ describe("hourglass", function()
         deepest = math.max(deepest, tube + r - math.sqrt(across ^ 2 + (P.y - middle) ^ 2))
       end
     end
-    assert.truthy(deepest < 0.002, deepest) -- the level set's voxels are of 15 mm
+    assert.truthy(deepest < 0.002, deepest) -- the level set's voxels measure 15 mm
   end)
 end)

@@ -1,4 +1,4 @@
--- graphs/jump.lua: what its head promises.
+-- graphs/jump.lua: the claims in its header.
 describe("graphs/jump.lua", function()
   local scene = require "testing.scene"
   local text = io.open("graphs/jump.lua"):read "*a":gsub("return splash.*", "return { main = splash, drops = drops }")
@@ -8,7 +8,7 @@ describe("graphs/jump.lua", function()
   it("has drops that ride on the figure, up and down", function()
     local top, riding = drops[11], 0 -- 0.42 s after the start: the top of the first hop
     for i = 1, #top do
-      -- What rides has hardly any velocity there but that of the turn.
+      -- Drops that ride along have almost no velocity there except that of the rotation.
       if math.abs(top[i].v.y) < 0.3 and top[i].P.y > 0.6 then riding = riding + 1 end
     end
     assert.is_true(riding > 300, riding)

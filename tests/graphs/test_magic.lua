@@ -1,4 +1,4 @@
--- graphs/magic.lua: what its head promises.
+-- graphs/magic.lua: the claims in its header.
 describe("graphs/magic.lua", function()
   local result = rapid.run("graphs/magic.lua", { frames = {1, 60} })
 

@@ -1,11 +1,11 @@
--- graphs/methods.lua: what its head promises.
+-- graphs/methods.lua: the claims in its header.
 describe("graphs/methods.lua", function()
   local methods = { "project", "backtrack", "continuous" }
   local columns, rows, apart, lane = 30, 44, 0.028, 2
   local bounce, speed, start = 0.6, 11, 1.7
   local result = rapid.run("graphs/methods.lua", { frames = {1, 14} })
 
-  -- Where a row is, by the parabola that it bounces on: exact.
+  -- Returns the exact height of a row, from the parabola between its bounces.
   local function height(row, t)
     local from, g = start + apart * row, 9.81
     local meets = (math.sqrt(speed * speed + 2 * g * from) - speed) / g
@@ -14,7 +14,7 @@ describe("graphs/methods.lua", function()
     return u * (t - meets) - g * (t - meets) ^ 2 / 2
   end
 
-  -- The largest error of the heights, of each method, over all frames; level sets are flat to rounding there.
+  -- The largest height error of each method over all frames; level sets are flat to within rounding there.
   local off = {0, 0, 0}
   for frame, points in result:frames() do
     for i = 1, #points do
@@ -27,7 +27,7 @@ describe("graphs/methods.lua", function()
 
   it("keeps the rows apart: continuous to rounding, backtrack to a step's own fall, project not", function()
     assert.truthy(off[3] < 2e-5, off[3])
-    -- The time by which it goes back is that of a straight line: off by up to g h²/2, and once more on leaving.
+    -- The method backs up by a time on a straight line: an error of up to g h²/2, and again when the point leaves.
     assert.truthy(off[2] < (1 + bounce) * 9.81 / 24 ^ 2 / 2, off[2])
     assert.truthy(off[1] > 0.2, off[1])
   end)

@@ -1,4 +1,4 @@
--- mill: paddles that turn among falling grain.
+-- mill: paddles rotate among falling grain.
 local rapid = require "rapid"
 
 describe("mill", function()
@@ -14,7 +14,7 @@ describe("mill", function()
         x, y = math.abs(x), math.abs(y)
         local depth = math.min(math.max(math.min(0.8 - x, 0.075 - y), math.min(0.075 - x, 0.8 - y)),
           0.4 - math.abs(P.z))
-        inside = math.max(inside, depth) -- of the boxes; their level set rounds the edges by half a voxel
+        inside = math.max(inside, depth) -- inside the boxes; their level set rounds the edges by half a voxel
       end
       if #points > 0 then assert.truthy(points:min("P").y >= 0) end
     end

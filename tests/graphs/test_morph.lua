@@ -1,8 +1,8 @@
--- graphs/morph.lua: what its head promises.
+-- graphs/morph.lua: the claims in its header.
 describe("graphs/morph.lua", function()
   local result = rapid.run("graphs/morph.lua", { frames = {1, 90}, set = { count = 3000 } })
 
-  -- The same knot, in steps so fine that chords do not count.
+  -- The same knot in steps so fine that chords do not matter.
   local knot = {}
   for k = 1, 2000 do
     local t = 2 * math.pi * k / 2000
@@ -28,7 +28,7 @@ describe("graphs/morph.lua", function()
       taken[place] = true
       local near = math.huge
       for k = 1, #knot, 4 do near = math.min(near, (knot[k] - p.P):length()) end
-      assert.near(0.16, near, 0.012) -- twelve sides: 0.16 cos 15°, and the steps along the curve
+      assert.near(0.16, near, 0.012) -- twelve sides: 0.16 cos 15°, plus the steps along the curve
     end
   end)
 

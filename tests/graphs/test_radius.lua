@@ -1,9 +1,9 @@
--- graphs/radius.lua: what its head promises.
+-- graphs/radius.lua: the claims in its header.
 describe("graphs/radius.lua", function()
   local size = 0.1
   local result = rapid.run("graphs/radius.lua", { frames = {1, 48}, set = { size = size } })
 
-  -- How far a middle is from a ring about the y axis through (x, 0.3, 0).
+  -- Returns the distance of a centre from a ring about the y axis through (x, 0.3, 0).
   local function from_ring(P, x)
     local around = math.sqrt((P.x - x) ^ 2 + P.z ^ 2) - 0.55
     return math.sqrt(around ^ 2 + (P.y - 0.3) ^ 2) - 0.16
@@ -15,7 +15,7 @@ describe("graphs/radius.lua", function()
     for i = 1, #points do
       local p = points[i]
       local right = p:within "side2"
-      -- The level set of a tube is off by about voxel² / tube: 6 mm at most.
+      -- The level set of a tube has an error of about voxel² / tube: at most 6 mm.
       assert.near(right and size or 0, from_ring(p.P, right and 2 or 0), 0.006)
     end
   end)

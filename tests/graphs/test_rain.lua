@@ -1,11 +1,11 @@
--- graphs/rain.lua: what its head promises.
+-- graphs/rain.lua: the claims in its header.
 describe("graphs/rain.lua", function()
   local scene = require "testing.scene"
   local text = io.open("graphs/rain.lua"):read "*a":gsub("return splash.*", "return { main = rain, splash = splash }")
   local path = scene.folder:write("rain.lua", text)
   local middle = vec3(0, 0.7, 0)
 
-  -- The place on the canopy: the angle from the top, and about the axis; nil for a drop that is not on it.
+  -- Returns the position on the canopy: the angle from the top, and about the axis; nil for a drop that is not on it.
   local function on_canopy(p)
     local d = p.P - middle
     if math.abs(d:length() - 1.1 - p.pscale) > 0.01 or d.y < 0.6 then return nil end
@@ -21,7 +21,7 @@ describe("graphs/rain.lua", function()
         local after = result[frame + 1]:by_id(p.id)
         local angle = on_canopy(p)
         local next_angle = after and on_canopy(after)
-        -- That it has been there for so long that what it came with is gone: e^(-25/s · 6/24 s) = 0.002.
+        -- The drop has been there so long that its initial velocity has decayed: e^(-25/s · 6/24 s) = 0.002.
         local earlier = result[frame - 6]:by_id(p.id)
         if next_angle and earlier and on_canopy(earlier) and angle > 0.15 then
           local between = 0.5 * (angle + next_angle)
@@ -41,7 +41,8 @@ describe("graphs/rain.lua", function()
       for i = 1, #points do if on_canopy(points[i]) then count = count + 1 end end
       return count
     end
-    -- At 3.5 s it turns 3 times in a second: 1440 · 1.5 / 2 degrees a second, 18.8 rad/s; 14 m/s² hold to 0.04 m.
+    -- At 3.5 s it makes 3 revolutions per second: 1440 · 1.5 / 2 degrees per second, 18.8 rad/s. 14 m/s² hold up to
+    -- 0.04 m.
     local wet, spun = on(result[60]), on(result[88])
     assert.is_true(wet > 200, wet)
     assert.is_true(spun < 0.6 * wet, spun .. " of " .. wet)

@@ -1,4 +1,4 @@
--- graphs/ribbons.lua: what its head promises.
+-- graphs/ribbons.lua: the claims in its header.
 describe("graphs/ribbons.lua", function()
   local result = rapid.run("graphs/ribbons.lua", { frames = {1, 48} })
 

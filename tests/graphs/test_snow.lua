@@ -1,9 +1,9 @@
--- graphs/snow.lua: what its head promises.
+-- graphs/snow.lua: the claims in its header.
 describe("graphs/snow.lua", function()
   local function run(set) return rapid.run("graphs/snow.lua", { frames = {1, 112}, set = set }) end
   local result = run { rate = 1500 }
 
-  -- Flakes of a frame that have come to lie above the ground, by id.
+  -- Returns the flakes of a frame that lie above the ground, by id.
   local function lying(points)
     local list = {}
     for i = 1, #points do
@@ -39,7 +39,7 @@ describe("graphs/snow.lua", function()
 
   it("stays on whatever the motion, where it sticks fast", function()
     local fast = run { rate = 600, adhesion = 1000 }
-    local before, after = lying(fast[82]), fast[112] -- at 4.625 s the fir is as it was
+    local before, after = lying(fast[82]), fast[112] -- at 4.625 s the fir is back in its initial position
     assert.is_true(size(before) > 100)
     for id, P in pairs(before) do assert.near(P, after:by_id(id).P, 1e-4) end
   end)

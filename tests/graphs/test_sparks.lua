@@ -1,4 +1,4 @@
--- graphs/sparks.lua: what its head promises.
+-- graphs/sparks.lua: the claims in its header.
 describe("graphs/sparks.lua", function()
   local result = rapid.run("graphs/sparks.lua", { frames = {1, 60}, set = { rate = 1200 } })
 

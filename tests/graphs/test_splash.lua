@@ -1,9 +1,9 @@
--- graphs/splash.lua: what its head promises.
+-- graphs/splash.lua: the claims in its header.
 describe("graphs/splash.lua", function()
   local command = require "testing.command"
   local folder = command.folder()
   local text = io.open("graphs/splash.lua"):read "*a"
-  -- What is born stays where it is, and the drops are an output of their own.
+  -- Droplets stay where they are born, and the drops are a separate output.
   local body = text:gsub("return crown:merge%b()", [[
 local born = rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthtime + p.parent end)
   :spawn { from = drops, on = "hit", min_speed = 2, count = 24, split = true, inherit_velocity = 0 } :solve {}

@@ -1,10 +1,10 @@
--- graphs/spray.lua: what its head promises.
+-- graphs/spray.lua: the claims in its header.
 describe("graphs/spray.lua", function()
   local result = rapid.run("graphs/spray.lua", { frames = {1, 72}, set = { rate = 3000 } })
   local center, radius, drop, voxel = vec3(0.8, 0.5, 0), 0.5, 0.008, 0.025
 
   it("keeps each drop's radius from the ball and from the floor", function()
-    -- A sphere's level set is off by at most voxel² / radius between its samples.
+    -- A sphere's level set has an error of at most voxel² / radius between its samples.
     local slack = voxel * voxel / radius
     for frame, points in result:frames() do
       for i = 1, #points do
@@ -17,7 +17,7 @@ describe("graphs/spray.lua", function()
   end)
 
   it("traps no drop where the ball falls away from under it", function()
-    -- Drops that lift off met the same facet of the level set again and again, up to the limit of contacts.
+    -- Drops that lifted off used to hit the same facet of the level set again and again, up to the contact limit.
     assert.same({}, rapid.run("graphs/spray.lua", { frames = {96, 96} }).warnings)
   end)
 

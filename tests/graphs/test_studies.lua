@@ -1,11 +1,11 @@
--- The studies in graphs/studies: each runs, and proves what its first lines say.
+-- The studies in graphs/studies: each runs, and proves the claims in its first lines.
 local amount = require "tests.amount"
 local command = require "testing.command"
 local json = require "dkjson"
 
 local folder = command.folder()
 
--- The lines of a study by name, each with the errors of its rows; every row ran.
+-- Returns the lines of a study by name, each with the errors of its rows, all of which ran.
 local function lines_of(name)
   local result = command.rapid(("study graphs/studies/%s.lua --json --repeat 1 -o %s"):format(name, folder.path))
   assert.equal(0, result.status, result.stderr)
@@ -30,7 +30,7 @@ describe("the study", function()
       for i, exact in ipairs(lines.continuous.errors) do
         assert.is_true(exact < lines.backtrack.errors[i] and lines.backtrack.errors[i] < lines.project.errors[i])
       end
-      -- Where a step happens to end beside a contact is luck, so the slope is loose.
+      -- Whether a step ends next to a contact is chance, so the tolerance of the slope is large.
       assert.near(1, lines.project.order, 0.35)
       assert.near(2, lines.backtrack.order, 0.35)
     end)
@@ -74,7 +74,7 @@ describe("the study", function()
     local lines = lines_of "collapse"
     local substeps, iterations = lines["sub-steps"].errors, lines.iterations.errors
     falls(substeps)
-    assert.equal(substeps[1], iterations[1]) -- eight sub-steps of one iteration, both
+    assert.equal(substeps[1], iterations[1]) -- both eight substeps of one iteration
     for i = 2, #substeps do -- 16, 32, 64, 128 sweeps
       local most = iterations[i] / (({ [2] = 1, [3] = 3 })[i] or 10)
       assert.is_true(substeps[i] < most, ("%g and %g"):format(substeps[i], iterations[i]))

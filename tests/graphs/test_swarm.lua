@@ -1,4 +1,4 @@
--- graphs/swarm.lua: what its head promises.
+-- graphs/swarm.lua: the claims in its header.
 describe("graphs/swarm.lua", function()
   local result = rapid.run("graphs/swarm.lua", { frames = {1, 112} })
 

@@ -1,4 +1,4 @@
--- graphs/trails.lua: what its head promises.
+-- graphs/trails.lua: the claims in its header.
 describe("graphs/trails.lua", function()
   local command = require "testing.command"
   local folder = command.folder()

@@ -24,7 +24,7 @@ local function acceleration(P)
   return rapid.math.curl_noise(P / 0.8, 0, 3, 0) * 50 - vec3(0, 9.81, 0)
 end
 
--- What is left of a step on the floor: place and velocity along it.
+-- Returns position and velocity after the rest of a step on the floor.
 local function slide(P, u, a, t)
   local along, most = vec3(a.x, 0, a.z), -mu * a.y
   local speed = u:length()
@@ -34,7 +34,7 @@ local function slide(P, u, a, t)
     along = along * (1 - most / pull)
   else
     along = along - u * (most / speed)
-    -- Where the speed is least; u·(u + along s) = 0.
+    -- The time of the least speed: u·(u + along s) = 0.
     local stop = -speed * speed / along:dot(u)
     if stop > 0 and stop < t then
       local P1, u1 = P + u * stop + along * (stop * stop / 2), u + along * stop

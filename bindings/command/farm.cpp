@@ -77,7 +77,7 @@ std::string ranges_of(const std::vector<std::size_t>& numbers)
     return fmt::format("{}", fmt::join(ranges, ","));
 }
 
-// Submits the tasks of these numbers, from 1, as an array, and returns its id.
+// Submits tasks by number, from 1, as an array, and returns its id.
 std::int64_t submit_tasks(const FarmJob& job, const std::vector<std::size_t>& tasks)
 {
     return submit(job, job.scripts() / "tasks.sh", {"--array=" + ranges_of(tasks)});
@@ -93,8 +93,8 @@ std::int64_t submit_last(const FarmJob& job, const std::vector<std::string>& wai
     return submit(job, job.scripts() / "last.sh", std::move(words));
 }
 
-// The state and reason ("PENDING", "Resources") of each queued or running task of these jobs, by job and number in an
-// array; the number is 0 outside of arrays.
+// The state and reason ("PENDING", "Resources") of a queued or running task, by job and number in an array; the number
+// is 0 outside of arrays.
 struct QueuedTask {
     std::string state, reason;
 };

@@ -1,5 +1,5 @@
-// Reports on a run while it goes on and when it ends, however it ends: its frames, its warnings, the files of its
-// statistics and its profile; and the cached form of these.
+// Reports on a run while it goes on and when it ends, however it ends: its frames, its warnings, and the files of its
+// statistics and profile, which also have a cached form.
 #pragma once
 
 #include <chrono>
@@ -102,8 +102,8 @@ public:
     void line(const std::string& text);
     // Reports each text once.
     void warning(const std::string& text);
-    // Reports a warning of a frame. Warnings tend to repeat in later frames: of those that differ only in numbers the
-    // first are printed at once, and the rest is counted for the end.
+    // Reports a warning of a frame. Warnings tend to repeat in later frames: the first of those that differ only in
+    // numbers are printed at once, and the others are counted for the end.
     void warning(const std::string& text, std::int64_t frame);
 
     // Ends a complete run: reports the counted warnings, and writes statistics and profile. Returns the summary. Throws

@@ -14,11 +14,12 @@ struct Installation {
     std::string lua;
     std::string library;  // the library, and its part that is loaded on first use
 
-    // Callable from any thread. Error: the Lua files are not in their place.
+    // Callable from any thread. Fails if the Lua files are missing.
     static Result<Installation> find();
 
-    // Loads that part now, which reads and writes level sets, meshes and .vdb, for a program that then limits its
-    // memory or the files that it may open. Callable from any thread. Error: it is missing, or of another version.
+    // Loads the deferred part now, which reads and writes level sets, meshes and .vdb. For a program that then limits
+    // its memory or the files that it may open. Callable from any thread. Fails if the part is missing or of another
+    // version.
     static Result<Done> load_all();
 };
 

@@ -26,8 +26,8 @@ struct FilmOptions {
 // A film in progress.
 class SceneFilm {
 public:
-    // path: a file of .mp4, .webm or .gif. Error: another extension; a pattern of several files; an impossible rate,
-    // size or angle of view; no ffmpeg on the PATH.
+    // path: a file of .mp4, .webm or .gif. Fails if the extension is another one, if the path is a pattern of several
+    // files, if the rate, size or angle of view is impossible, or if there is no ffmpeg on the PATH.
     static Result<SceneFilm> begin(const std::string& path, const FilmOptions& options = {});
 
     // A moved-from film may only be assigned to or destroyed.
@@ -35,12 +35,12 @@ public:
     SceneFilm& operator=(SceneFilm&&) noexcept;
     ~SceneFilm();  // without finish() there is no file
 
-    // Adds a picture, which the film's own thread draws; waits while another one waits. Error: one of this or of an
-    // earlier picture, after which there will be no film; ffmpeg's message.
+    // Adds a picture, which the film's own thread draws; waits while another one waits. Fails with ffmpeg's message if
+    // this or an earlier picture failed; there will then be no film.
     Result<Done> add(const SceneFrame& frame, const SceneShapes& shapes);
     // Returns the number of pictures in the film at the last add() or finish().
     std::int64_t done() const;
-    // Waits until all are done; the file then has its name, and nothing more can be added. Error: as in add(); no
+    // Waits until all are done; the file then has its name, and nothing more can be added. Fails like add(), and if no
     // picture was added.
     Result<Done> finish();
 

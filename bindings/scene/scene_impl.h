@@ -151,7 +151,8 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     void refuse_unless_ready() const;
     void refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const;
     void refuse_unless_kept() const;  // keep_state
-    // What SceneHooks::beyond_memory asks for, with the place of what is computed; empty where nobody does.
+    // Returns the callback that SceneHooks::beyond_memory needs, with the position of the computation; empty if no
+    // program set that hook.
     MemoryWatch::Tell too_late() const;
 
     // While it lives, cancel() stops scripts.

@@ -142,19 +142,19 @@ struct SceneInside {
     static Result<std::map<std::string, std::map<std::string, std::string>>> arguments(Scene& scene,
                                                                                        std::int64_t frame);
     // Returns the graph like GraphForm::Json. `kept` is used if it belongs to this graph, and replaced otherwise.
-    // nullptr: without positions, for a program that lays graphs out itself, or may not start another one. Error: `dot`
-    // is needed, and missing.
+    // nullptr: without positions, for a program that lays graphs out itself, or may not start another one. Fails if
+    // `dot` is needed but missing.
     static Result<std::string> graph_json(Scene& scene, GraphLayout* kept);
     // Returns the points after each node that is evaluated in a frame, as frames with a single output of the node's
     // name. The scene stays where it is: the frames are computed separately, from a snapshot of this scene before the
     // frame, or from the first one. Those of the last requested frame are cached. Nodes whose result never changes are
-    // not evaluated in each frame. Error: a frame before the first one; a snapshot of another graph, or after the
-    // frame. If a script had to be stopped, the scene must be restarted.
+    // not evaluated in each frame. Fails if the frame is before the first one, or if the snapshot belongs to another
+    // graph or a later frame. If a script had to be stopped, the scene must be restarted.
     static Result<std::map<std::string, SceneFrame>> points_behind_all(Scene& scene, std::int64_t frame,
                                                                        const std::optional<SceneSnapshot>& from = {});
-    // Returns the create node of a point of a frame's output, and its id there: if the points of several are merged, by
-    // position and velocity, from points_behind_all(). Error: the frame has no such output or point; several points are
-    // at its position; nodes after its Solve have moved it.
+    // Returns the create node of a point of a frame's output, and its id there. If the points of several are merged,
+    // they are identified by position and velocity, from points_behind_all(). Fails if the frame has no such output or
+    // point, if several points share its position, or if nodes after its Solve have moved it.
     static Result<PointOrigin> origin(Scene& scene, const SceneFrame& frame, std::int64_t id,
                                       const std::optional<SceneSnapshot>& from = {});
     // The next three need SceneHooks::keep_state.
@@ -172,13 +172,13 @@ struct SceneInside {
     // Returns only the points, without statistics, profile and warnings, for a program that stores many frames: errors
     // may be estimated for each point.
     static Result<SceneFrame> without_statistics(const SceneFrame& frame);
-    // Returns the camera of a picture, with the values that `camera` leaves open. Error: as in SceneFrame::picture().
+    // Returns the camera of a picture, with the values that `camera` leaves open. Fails like SceneFrame::picture().
     static Result<PictureCamera> camera(const SceneFrame& frame, const SceneShapes& shapes,
                                         const PictureCamera& camera = {}, PictureSize size = {});
 
     // Save bitwise to a file for the same build of Rapid, and load again. key: of the inputs, such as fingerprint(). A
-    // frame's file has the points of all outputs; that of shapes everything but warnings. Error: that of the system;
-    // for load also a file of another kind, a damaged one, or one of another build or key.
+    // frame's file has the points of all outputs; that of shapes everything but warnings. They fail with the system's
+    // error; load also fails if the file is of another kind, damaged, or of another build or key.
     static Result<Done> save(const SceneFrame& frame, const std::string& path, const std::string& key);
     static Result<SceneFrame> load_frame(const std::string& path, const std::string& key);
     static Result<Done> save(const SceneShapes& shapes, const std::string& path);
@@ -188,8 +188,8 @@ struct SceneInside {
 
     // Returns true if a file begins like one of a snapshot, of a scene or of `rapid run --cache`.
     static bool is_snapshot(const std::string& path);
-    // Describes such a file, as printed by `rapid info`. Error: that of the system; a file of another kind, or a
-    // damaged one.
+    // Describes such a file, as printed by `rapid info`. Fails with the system's error, or if the file is of another
+    // kind or damaged.
     static Result<SceneReport> describe_snapshot(const std::string& path);
 
     // ---- Runs.
@@ -198,7 +198,8 @@ struct SceneInside {
     static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
                                  RunListener listener);
     // Returns, for a prepared run in `parts` parts, for each output the pattern of the whole and that of the parts,
-    // with {part}. Error: points that are coupled; pictures and films, which cannot be merged; a name with {part}.
+    // with {part}. Fails if points are coupled, if an output is a picture or film, which cannot be merged, or if a name
+    // contains {part}.
     static Result<std::vector<std::pair<std::string, std::string>>> merges(SceneRun& run, int parts);
     // For a program that is about to end. Callable from any thread at any time, but not from a listener: writes
     // statistics and profile of the frames so far. A call of the run does not return afterwards. Returns nothing if the
@@ -208,28 +209,29 @@ struct SceneInside {
     // ---- Requested files, and the parts of a plan that they need. The scene stays where it is; if a script had to be
     // stopped, it is at its start afterwards, or must be restarted.
 
-    // Error: an unknown extension, with the known ones; not a pattern; no attributes after a colon.
+    // Fails if the extension is unknown (the message lists the known ones), if the name is not a pattern, or if no
+    // attributes follow a colon.
     static Result<OutputFormat> output_format(const std::string& output);
     static std::vector<OutputFormat> output_formats();  // all, ordered by extension
-    // Returns the folders that a run writes to, that of its first output first; missing ones are made. Error: one
+    // Returns the folders that a run writes to, that of its first output first; missing ones are made. Fails if one
     // cannot be made.
     static Result<std::vector<std::string>> output_folders(const FileOutputs& files);
     static Result<std::vector<std::string>> output_folders(const RunOptions& options);
-    // Explains the plan like Scene::explain(), for these files: the attributes that they need are kept. Error: of an
-    // output, as in SceneRun::prepare().
+    // Explains the plan like Scene::explain(), for these files: the attributes that they need are kept. Fails for wrong
+    // outputs, like SceneRun::prepare().
     static Result<SceneReport> explain_outputs(Scene& scene, const FileOutputs& files);
     // Returns what one of two scenes keeps and the other does not, as printed by `rapid explain --against`.
     static Result<SceneReport> explain_difference(Scene& scene, const FileOutputs& files, Scene& other);
     // Returns the bytes that the points of each create node, and each node, hold after a frame, as in a snapshot:
-    // computes the frames up to this one separately. Error: a frame before the first one.
+    // computes the frames up to this one separately. Fails if the frame is before the first one.
     static Result<SceneReport> explain_state(Scene& scene, const FileOutputs& files, std::int64_t frame);
     // Checks everything that needs no frame: returns a line for each parameter, and the number of nodes that each
-    // output reaches. Error: of an output, as in SceneRun::prepare().
+    // output reaches. Fails for wrong outputs, like SceneRun::prepare().
     static Result<std::string> check_outputs(Scene& scene, const FileOutputs& files);
     // Returns a line for each stiff node, and for each shape that is too coarse for its points, by trying the first
-    // frame with a few points. Error: that of a kernel for one of these points; other errors are left to the run.
+    // frame with a few points. Fails if a kernel fails for one of them; other errors are left to the run.
     static Result<std::string> advice_on(Scene& scene, const FileOutputs& files);
-    // Runs on one thread. Error: FailedFrame if a frame fails.
+    // Runs on one thread. Fails with FailedFrame if a frame fails.
     static Result<SceneRaces> find_races(Scene& scene, const FileOutputs& files, RunFrames frames);
 };
 

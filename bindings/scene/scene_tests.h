@@ -38,7 +38,8 @@ struct SceneTestOptions {
 // limited. Only one thread of the process may call this at a time: `threads` applies to the whole process meanwhile
 // (tbb::global_control).
 //
-// Error: WrongCall if options are not possible or busted is missing; the exception of `tell`, after the last test.
+// Fails with WrongCall if options are not possible or busted is missing, or with the exception of `tell`, after the
+// last test.
 Result<Done> run_scene_tests(const std::string& file, const SceneTestOptions& options,
                              const std::function<void(const SceneTestEvent& event)>& tell);
 

@@ -25,11 +25,11 @@ struct MergedFiles {
 // output: the pattern of the whole, where #### is the frame's number; missing folders are made.
 // progress: called with each frame that is written and its points; false ends the merge with the error Cancelled.
 //
-// Errors: WrongCall, before anything is written, if a part or a frame is missing or belongs to another run (each is
-// listed), if a format holds no points, or if an output would replace a part. FailedFrame if a file cannot be read or
-// written, or if a point belongs to another part; earlier frames are written. Busy if another thread merges.
-// OutOfMemory and Unexpected at any time. Meanwhile no scene may run and no frame may be read or copied, since its
-// points would be stored in those files, too.
+// Fails with WrongCall, before anything is written, if a part or a frame is missing or belongs to another run (each is
+// listed), if a format holds no points, or if an output would replace a part. Fails with FailedFrame if a file cannot
+// be read or written, or if a point belongs to another part; earlier frames are written. Fails with Busy if another
+// thread merges, and with OutOfMemory or Unexpected at any time. Meanwhile no scene may run and no frame may be read or
+// copied, since its points would be stored in those files, too.
 Result<MergedFiles> merge_files(const std::vector<std::string>& parts, const std::string& output,
                                 const std::function<bool(std::int64_t frame, std::uint64_t points)>& progress = {});
 

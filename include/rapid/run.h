@@ -116,7 +116,7 @@ struct RunOutcome {
 class SceneRun {
 public:
     // Makes a run, and starts its clock. Nothing is opened or written yet, but the folders of statistics and profile
-    // are made. Error: WrongCall if an option is not possible.
+    // are made. Fails with WrongCall if an option is not possible.
     static Result<SceneRun> make(std::string file, SceneOptions scene = {}, RunOptions options = {},
                                  RunListener listener = {});
 

@@ -220,19 +220,19 @@ public:
     // Returns the names of the scene's outputs, in order; a scene that returns one node has "main". All functions below
     // apply to the selected output: initially "main", or the first one if there is no "main".
     std::vector<std::string> outputs() const;
-    // Returns the same frame with another output selected. Error: no such output, with the nearest name.
+    // Returns the same frame with another output selected. Fails, with the nearest name, if there is no such output.
     Result<SceneFrame> output(std::string_view name) const;
 
     std::size_t size() const;                  // of points
     std::vector<std::string> columns() const;  // names, in order
     std::vector<std::string> groups() const;   // names, in order
-    // Takes some nanoseconds for any number of points. Error: no such column, with the nearest name.
+    // Takes some nanoseconds for any number of points. Fails, with the nearest name, if there is no such column.
     Result<SceneColumn> column(std::string_view name) const;
     Result<SceneColumn> group(std::string_view name) const;
     // Returns the string of a token, a value of a String column. In a process, equal strings have equal tokens, in no
-    // order, and 0 is the empty string. Valid as long as the process. Error: no string has the token.
+    // order, and 0 is the empty string. Valid as long as the process. Fails if no string has the token.
     static Result<std::string_view> text_of(std::uint32_t token);
-    // Returns the token of a string, for points that the program offers. Error: the text is not UTF-8.
+    // Returns the token of a string, for points that the program offers. Fails if the text is not UTF-8.
     static Result<std::uint32_t> token_of(std::string_view text);
     // Does the same as column(), but writes out a value that all points share, so that `stride` is never 0. The frame
     // owns it.
@@ -244,7 +244,7 @@ public:
     Result<std::vector<std::uint32_t>> places(const std::vector<std::int64_t>& ids) const;
 
     std::vector<std::string> details() const;  // names of values of the whole set (:detail), in order
-    // Returns such a value: a number or three. Error: no such detail value, with the nearest name.
+    // Returns such a value: a number or three. Fails, with the nearest name, if there is no such detail value.
     Result<SceneValue> detail(std::string_view name) const;
 
     // Returns the most requested statistics.
@@ -259,15 +259,16 @@ public:
     std::vector<std::string> warnings() const;
 
     // Writes the points to a file in a format that Rapid knows, by the extension; missing folders are made. The file
-    // gets its name when it is complete. Error: an unknown extension, with the known ones; an error of the system.
+    // gets its name when it is complete. Fails with the system's error, or if the extension is unknown; the message
+    // lists the known ones.
     Result<Done> write(const std::string& path) const;
     // Reads the points of such a file as a frame with the one output "main", with number and time 0. warnings() lists
-    // the file's other contents. Error: an extension that is unknown or write-only; an error of the system; a damaged
-    // file.
+    // the file's other contents. Fails with the system's error, or if the extension is unknown or write-only, or the
+    // file damaged.
     static Result<SceneFrame> read(const std::string& path);
 
     // Returns the bytes of a .png of the points with these shapes, in the style of their `:picture` nodes. Callable
-    // from any thread. Error: an impossible size or angle of view.
+    // from any thread. Fails if the size or angle of view is impossible.
     Result<std::string> picture(const SceneShapes& shapes, const PictureCamera& camera = {},
                                 PictureSize size = {}) const;
 
@@ -276,7 +277,7 @@ public:
     Result<SceneReport> describe() const;
     // Compares the points of this frame, called A, with those of another one, B, by id. Positions are the same within
     // `tolerance` times the diagonal of the bounds of both, other floats relatively, and everything else if it is
-    // equal. Error: a tolerance that is negative or NaN.
+    // equal. Fails if the tolerance is negative or NaN.
     Result<FrameComparison> compare(const SceneFrame& other, double tolerance = 1e-6) const;
 
 private:
@@ -296,11 +297,11 @@ public:
     std::int64_t frame() const;  // the last one computed before it was taken
     std::size_t size() const;    // bytes
 
-    // Writes it to a file, which gets its name when it is complete; missing folders are made. Error: that of the
-    // system.
+    // Writes it to a file, which gets its name when it is complete; missing folders are made. Fails with the system's
+    // error.
     Result<Done> write(const std::string& path) const;
-    // Reads a file. Error: that of the system; a file of another kind, a damaged one, one of another build of Rapid, or
-    // one of a run of the command.
+    // Reads a file. Fails with the system's error, or if the file is of another kind, damaged, of another build of
+    // Rapid, or of a run of the command.
     static Result<SceneSnapshot> read(const std::string& path);
 
 private:
@@ -375,7 +376,7 @@ struct SceneTrace {
 class Scene {
 public:
     // Opens the scene of a file, or of a text with a name for messages; modules are searched next to the file, or in
-    // the folder of the name. Runs the file and plans the run, but computes no frame. Errors: WrongScene; TooLong;
+    // the folder of the name. Runs the file and plans the run, but computes no frame. Fails with WrongScene, TooLong or
     // OutOfMemory.
     static Result<Scene> open(const std::string& file, SceneOptions options = {});
     static Result<Scene> open_text(const std::string& name, const std::string& text, SceneOptions options = {});
@@ -386,7 +387,7 @@ public:
     ~Scene();  // not while a call of another thread is running
 
     // Loads node types from a library built against the runtime's headers (docs/extending.md), for scenes opened later
-    // in the whole process. No other thread may open a scene meanwhile. Error: a file that cannot be read or loaded, is
+    // in the whole process. No other thread may open a scene meanwhile. Fails if the file cannot be read or loaded, is
     // not a plugin, was built with other headers, or has a node whose name is taken.
     static Result<Done> load_plugin(const std::string& file);
 
@@ -407,8 +408,8 @@ public:
     Result<Done> set(const std::string& name, SceneValue value);
 
     // Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on,
-    // everything else when the scene's file is run again (set()). Error: WrongCall, with the array that is missing or
-    // wrong.
+    // everything else when the scene's file is run again (set()). Fails with WrongCall if an array is missing or wrong,
+    // and names it.
     Result<Done> offer(const std::string& name, const HostObject& object);
 
     std::int64_t first_frame() const;  // of the scene
@@ -416,7 +417,7 @@ public:
 
     // Computes the next frame. After an error the scene has no next frame until restart(), restore() or set().
     Result<SceneFrame> advance();
-    // Computes frames up to this one and returns it. Error: WrongCall if the frame has been computed already.
+    // Computes frames up to this one and returns it. Fails with WrongCall if the frame has been computed already.
     Result<SceneFrame> advance_to(std::int64_t frame);
 
     // Returns to the start.
@@ -438,13 +439,13 @@ public:
     // `dot`, which lays them out, is missing.
     Result<std::string> graph(GraphForm form);
     // Traces points by id. Returns to the start and computes the frames up to the last one separately; afterwards the
-    // scene is at its start. If a script had to be stopped, the scene must be restarted. Error: no ids; no such create
-    // node, with the nearest name; a last frame before the first one.
+    // scene is at its start. If a script had to be stopped, the scene must be restarted. Fails if there are no ids, if
+    // there is no such create node (with the nearest name), or if the last frame is before the first one.
     Result<SceneTrace> trace(const TraceOptions& options);
 
-    // The points as they leave a node in a frame, as one with the only output of the node's name: goes to the start,
-    // and computes the frames up to this one beside the scene, as trace(). Error: no such node, with the nearest name;
-    // one that is left out; a frame before the first one.
+    // Returns the points as they leave a node in a frame, as a frame whose only output has the node's name. Goes to the
+    // start, and computes the frames up to this one separately, like trace(). Fails if there is no such node (with the
+    // nearest name), if the plan omits it, or if the frame is before the first one.
     Result<SceneFrame> points_behind(const std::string& node, std::int64_t frame);
     // Returns the shapes that points collide with or are born from in a frame, which need not be computed, and the look
     // of its pictures.

@@ -11,7 +11,7 @@ namespace rapid {
 
 class Cancellation {
 public:
-    // What is thrown if there is no other reason.
+    // The error that is thrown if there is no other reason.
     static Error cancelled() { return Error("the run was cancelled", ErrorKind::Cancelled); }
 
     // From any thread. Whoever asks afterwards ends with this error; the first one counts.

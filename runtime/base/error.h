@@ -14,8 +14,8 @@
 namespace rapid {
 
 struct Location {
-    std::string file;  // as the user named it; empty where there is none
-    int line = 0;      // from 1; 0 where unknown
+    std::string file;  // as the user named it, or empty
+    int line = 0;      // from 1, or 0 if unknown
 };
 
 // FILE:LINE: node "NAME": MESSAGE, as far as they are known, each shortened if it is endless.
@@ -36,14 +36,14 @@ public:
         compose();
     }
 
-    // Each sets what is not set yet: the location nearest to the fault is kept.
+    // Each sets only what is still empty, so the location nearest to the fault is kept.
     Error& at(const Location& location);
     Error& in_node(std::string_view name);
 
-    // Only for --verbose: the call stack of the script.
+    // The script's call stack, which --verbose prints.
     Error& with_trace(std::string trace);
 
-    // The same error in other words.
+    // Returns the same error with another message.
     Error reworded(std::string message) const;
 
     const char* what() const noexcept override { return text_.c_str(); }

@@ -1,5 +1,5 @@
-// What messages call the settings of a run. The library has neutral names, those of the members of SceneOptions and
-// RunOptions; a program whose users know them by others, as the command has options, gives these.
+// The names of a run's settings in messages. The library uses neutral names, those of the members of SceneOptions and
+// RunOptions. A program whose users know them by other names, such as the command's options, provides these.
 #pragma once
 
 #include <map>

@@ -48,7 +48,7 @@ enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
 struct Header {
     Outcome outcome;
     std::size_t bytes;                  // of the message
-    ErrorKind kind = ErrorKind::Fault;  // of what was refused
+    ErrorKind kind = ErrorKind::Fault;  // of the refused file
 };
 
 std::function<void()>& further_limits()

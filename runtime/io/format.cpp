@@ -23,7 +23,7 @@ std::string lower_extension(const std::filesystem::path& path)
     return extension;
 }
 
-// What a file calls P, v or id may be of any type.
+// Throws Error if P, v or id of a file has another type than Rapid's.
 void check_type(const PointSet& points, const char* name, AttributeType type)
 {
     const AttributeType found = type_of(*points.find(name));

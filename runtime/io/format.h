@@ -16,8 +16,8 @@ namespace rapid {
 struct Format {
     std::string extension;  // with the dot, lower case: ".vdb"
     std::string doc;        // one line, for the help
-    // Writes all columns and groups of `points` to a new file; the caller finishes it. Error: a full disk; values that
-    // the format can't hold (int64 ids), with the formats that can.
+    // Writes all columns and groups of `points` to a new file; the caller finishes it. Throws Error if the disk is
+    // full, or if the format cannot hold a value (int64 ids); the message lists the formats that can.
     void (*write)(OutputFile& file, const PointSet& points, const FrameInfo& frame);
     // Null where the format can't be read (.png). Matrices are skipped; an attribute of n other numbers
     // becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
@@ -35,7 +35,7 @@ struct Format {
 
 // All formats, in order of extension.
 const std::vector<Format>& formats();
-// Error: an unknown extension, with the known ones.
+// Throws Error if the extension is unknown; the message lists the known ones.
 const Format& format_of(const std::filesystem::path& path);
 
 // Registers a format during static initialisation: `RAPID_FORMAT(Format{".csv", ...});` in the file of the format.
@@ -46,7 +46,7 @@ struct FormatRegistration {
 #define RAPID_FORMAT_COUNTED(count, ...) RAPID_FORMAT_NUMBER(count, __VA_ARGS__)
 #define RAPID_FORMAT_NUMBER(count, ...) static const ::rapid::FormatRegistration format_##count(__VA_ARGS__)
 
-// Format::write, of what the format holds.
+// Calls Format::write, without the strings if the format holds none.
 void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame);
 
 // Reads a file of any readable format. Errors name the file.

@@ -507,7 +507,7 @@ async function showFigures(status) {
   askingFigures = true;
   try {
     for (let more = true; more;) {
-      // Those of the previous run stay until new ones arrive.
+      // The figures of the previous run stay until new ones arrive.
       const known = state.statisticsRun === state.status.run ? state.statistics : [];
       const answer = await ask("figures", known.length ? { after: known[known.length - 1].frame } : {});
       if (answer.run !== state.status.run || !answer.figures.length) break;

@@ -23,7 +23,7 @@ struct Range {
     bool accepts(double x) const { return contains(x) && (std::isfinite(x) || infinity); }
     bool bounded() const { return std::isfinite(lo) || std::isfinite(hi); }
     std::string text() const;   // "from 0 to 1", "at least 0", "above 0"
-    std::string right() const;  // what a refused value must be: text(), or "finite"
+    std::string right() const;  // the legal values: text(), or "finite"
 };
 
 inline Range any_number() { return {}; }

@@ -67,7 +67,7 @@ function Quat:slerp(r, t) end
 ---@field error_frames? "all"|"last"
 ---@field repeat_runs? integer  timed runs of each row, 5 if not given
 
----What `rapid study` runs; its file returns it.
+---Defines a study, which `rapid study` runs. The file of the study returns it.
 ---@param definition rapid.StudyDefinition
 ---@return table
 function rapid.study(definition) end

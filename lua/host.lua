@@ -160,7 +160,7 @@ function entry.study()
   return studies.describe(asked)
 end
 
--- Evaluates a study's closed form at a frame, for a row of these knobs.
+-- Evaluates a study's closed form at a frame, for the knobs of a row.
 function entry.reference(number, time, dt, knobs)
   return asked.reference(engine.frame(number, time, dt), knobs)
 end

@@ -150,7 +150,7 @@ local function copy_state(state)
   return { regs = copy(state.regs), memory = copy(state.memory), mask = state.mask, results = state.results }
 end
 
--- Returns the states of the points with a flag, and of those without.
+-- Returns the states of the points with a flag, and of the points without it.
 function Program:split(state, flag)
   local with, without = copy_state(state), copy_state(state)
   with.mask = self:emit("And", state.mask, flag)

@@ -4,7 +4,7 @@
 --   -a.b ^ 2 ^ c      becomes      -(POWER(a.b,((POWER(2,(c))))))
 --
 -- The parentheses keep one value of each operand, and keep `return a ^ b` from being a tail call: LuaJIT compiles at
--- most fifteen of these in a trace.
+-- most fifteen tail calls in a trace.
 --
 -- The left operand is the simple expression before the operator. The right operand may start with unary operators and
 -- includes any ^ that follows it. A function as an operand is left to LuaJIT, which raises the error.

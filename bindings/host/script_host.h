@@ -59,7 +59,7 @@ public:
     MakerCache* maker_cache = nullptr;
 
     std::vector<std::shared_ptr<Kernel>> kernels;
-    // With keeps_state, the functions made before the graph had run.
+    // The functions made before the graph had run, if keeps_state is set.
     std::vector<std::shared_ptr<const FrameFunction>> frame_functions;
 
     void load_shipped_nodes();

@@ -100,7 +100,7 @@ public:
     // interruptible session.
     void interrupt(const Error& why);
     bool is_interrupted() const;
-    // With keeps_state, hashes of each function by file, with the lines in which they begin; the body's comes first.
+    // If keeps_state is set, hashes of each function by file, with the first line of each; the file's body comes first.
     // Equal for programs that differ only in comments and line numbers.
     struct FunctionCode {
         int line;
@@ -112,7 +112,7 @@ public:
     // frame make objects, too.
     std::vector<std::string> take_warnings();
 
-    // Methods of a study file: its description; its closed form for a row of these knobs, with ids from 0 in order; and
+    // The methods of a study file: its description; its closed form for a row's knobs, with ids from 0 in order; and
     // its own measure of error, for points matched by index. They throw the errors that the script raises or returns.
     Study study() const;
     PointSet study_reference(const Frame& frame, const Knobs& knobs) const;

@@ -231,7 +231,7 @@ void add_colours(Message& message, const SceneFrame& points, const FrameWish& wi
     add_values(message, "value", numbers_of(points, name, places), name.starts_with(group_mark) || name == "asleep");
 }
 
-// Returns the rank of each point's string among those of these points, in alphabetical order.
+// Returns the alphabetical rank of each point's string among the strings of all these points.
 std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
 {
     std::unordered_map<std::uint32_t, float> ranks;

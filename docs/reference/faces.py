@@ -1,7 +1,8 @@
-"""What C, C++ and Python offer, by name: `python3 docs/reference/faces.py` writes the table in docs/host.md.
+"""The names of everything that C, C++ and Python offer. `python3 docs/reference/faces.py` writes the table in
+docs/host.md.
 
-Names are read from the headers and the module. A function of C is rapid_SUBJECT_VERB, and VERB a member of the classes of
-the other two. tests/python/test_faces.py fails where one of the three lacks a name, and where the table is another one.
+Names are read from the headers and the module. A function of C is rapid_SUBJECT_VERB, and VERB is a member of the class
+in the other two languages. tests/python/test_faces.py fails if a language lacks a name, or if the table is outdated.
 """
 import ast
 import pathlib
@@ -11,16 +12,16 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs/host.md"
 BEGIN, END = "<!-- by docs/reference/faces.py -->\n", "<!-- end -->\n"
 
-# By the subject in C, the class in C++ and the one in Python; None: functions of no class.
+# By the subject in C: the class in C++ and the class in Python. None: functions of no class.
 CLASSES = {"scene": ("Scene", "Scene"), "frame": ("SceneFrame", "Frame"), "snapshot": ("SceneSnapshot", "Snapshot"),
            "shapes": ("SceneShapes", "Shapes"), "run": ("SceneRun", "Run"), "error": ("SceneError", "Error"),
            None: (None, None)}
 
-# What programs offer is an object in C++ and Python, and a call in C.
+# Objects that programs offer: classes in C++ and Python, calls in C.
 OFFERS = {"mesh": ("HostMesh", "Mesh"), "points": ("HostPoints", "Points"), "shape": ("HostShape", "Shape"),
           "node": ("HostNode", "Force, Edit, Constraint")}
 
-# Python's constructors, and what it has besides for notebooks and loops.
+# Python's constructors, and functions that only Python has, for notebooks and loops.
 CONSTRUCTORS = {"open", "open_text", "make"}
 PYTHON_ALONE = {"Frame.categories", "Frame.show", "Scene.run"}
 

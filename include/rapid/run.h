@@ -26,7 +26,7 @@ namespace rapid {
 struct RunFrames {
     std::int64_t first = 1, last = 48, step = 1;  // numbers of frames, and a distance of them
 
-    // Returns true if the frame is one of these.
+    // Returns true if this frame is included.
     bool contains(std::int64_t frame) const { return frame >= first && frame <= last && (frame - first) % step == 0; }
     // Returns true if there is one frame only.
     bool single() const { return first + step > last; }

@@ -1,9 +1,9 @@
-// Errors that a user can cause: exceptions that say what is wrong, where, and what would be right.
+// Errors that a user can cause: exceptions that describe the fault, its location and the remedy.
 //
 //   FILE:LINE: node "NAME": what is wrong; what would be right
 //
-// An Error is thrown where the fault is found, and gets its node, file and line as it propagates. Its kind says what
-// the caller can do about it. Faults that only a bug of Rapid can cause are for RAPID_ASSERT.
+// An Error is thrown where the fault is found, and gets its node, file and line as it propagates. Its kind tells the
+// caller how to react. Faults that only a bug of Rapid can cause are for RAPID_ASSERT.
 #pragma once
 
 #include <exception>

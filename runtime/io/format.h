@@ -19,17 +19,16 @@ struct Format {
     // Writes all columns and groups of `points` to a new file; the caller finishes it. Throws Error if the disk is
     // full, or if the format cannot hold a value (int64 ids); the message lists the formats that can.
     void (*write)(OutputFile& file, const PointSet& points, const FrameInfo& frame);
-    // Null where the format can't be read (.png). Matrices are skipped; an attribute of n other numbers
-    // becomes the floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
+    // Null if the format cannot be read (.png). Matrices are skipped; an attribute of n other numbers becomes the
+    // floats or integers NAME0 ... NAMEn-1. Without an id in the file, points are numbered from 0.
     PointSet (*read)(const std::filesystem::path& path);
-    // Whether a file shows all frames of a sequence, one after another (film.h).
+    // True if one file contains all frames of a sequence (film.h).
     bool film = false;
-    // Whether it holds the places of points, and nothing else of them.
+    // True if the format holds only the positions of points.
     bool places_alone = false;
-    // Whether it holds attributes that are texts; write_as() leaves them out where it does not.
+    // True if the format holds string attributes; otherwise write_as() drops them.
     bool holds_texts = true;
-    // Whether it is text of lines that stand alone, without a count: a file that is cut after one is another whole
-    // file.
+    // True for text with independent lines and no stated length: a file cut after a line is another whole file.
     bool lines_stand_alone = false;
 };
 

@@ -148,8 +148,8 @@ void Collisions::advance(std::span<Vec3d> P, std::span<Vec3d> v, const Drift& dr
     }
 }
 
-// Between contacts, the mean acceleration represents springs. If springs turn a point several times in the substep,
-// its energy may come out arbitrary. The energy is therefore limited to what the point had, plus the work of
+// Between contacts, the mean acceleration represents springs. If springs turn a point several times in the substep, its
+// energy may come out arbitrary. The energy is therefore limited to the point's initial energy, plus the work of
 // displacements and of moving shapes. A position beyond that energy is rejected, and the point waits at its initial
 // position. Its energy change is then the work of contacts; drag, which may have taken part of it, adds none.
 void Collisions::limit_energy(std::size_t displaced)

@@ -100,8 +100,8 @@ end
 local over = "points can't be used outside the :detail function that they were given to"
 
 -- native: the host's functions, which act on the set that the function runs on; rand: the random function of kernels;
--- point_names: the table of the host; texts: the strings of attributes (lua/text.lua). Returns run(f, frame, params,
--- size, random, details), which returns the indices (from 0) of the killed points, and the details.
+-- point_names: the host's table of a point's names; texts: the strings of attributes (lua/text.lua). Returns run(f,
+-- frame, params, size, random, details), which returns the indices (from 0) of the killed points, and the details.
 local function make(native, rand, point_names, texts)
   local of_texts = string_type(texts)
   local read_only = point_names.read_only

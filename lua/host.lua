@@ -204,8 +204,8 @@ end
 
 entry.make_ramp = ramp.make
 
--- Called once per pass or frame, so not worth a trace. Besides, with jit.attach an event at a function that C calls
--- directly ends the process (LuaJIT 2.1 of 2022).
+-- Never compiles these functions. Each is called once per pass or frame, which is not worth a trace, and with
+-- jit.attach a trace event in a function that C calls directly ends the process (LuaJIT 2.1 of 2022).
 for _, f in pairs(entry) do
   if type(f) == "function" then jit.off(f) end
 end

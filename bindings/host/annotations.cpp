@@ -99,8 +99,7 @@ bool takes_kernel(const NodeType& type)
     return kernel && !kernel->internal;
 }
 
-// Returns the signature of the kernel: function(p, frame), as the documentation of the parameter says, or function(p,
-// step).
+// Returns the type of a kernel: fun(p, step) in an action, otherwise fun(p, frame).
 std::string kernel_of(const NodeType& type)
 {
     const bool action = type.kind == NodeKind::Dynamic;

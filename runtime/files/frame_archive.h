@@ -70,8 +70,8 @@ public:
     // Returns the files of one kind by frame.
     std::map<std::int64_t, std::filesystem::path> files(std::string_view kind) const;
 
-    // Writes a file on a thread of the archive, while at most one other file waits. `write` throws if the file can't be
-    // written. Its captures are released when it is done. Thread-safe, as are the next two.
+    // Writes a file on a thread of the archive. Blocks while another file waits to be written. `write` throws if the
+    // file can't be written. Its captures are released when it is done. Thread-safe, as are the next two.
     using Write = std::function<void(const std::filesystem::path& path)>;
     void submit(std::string_view kind, std::int64_t frame, Write write);
     // Waits until all files are written.

@@ -73,8 +73,8 @@ void remove_abandoned_files(const fs::path& folder)
         if (is_hidden_name(entry->path().filename().native())) remove_if_abandoned(entry->path());
 }
 
-// Identifies a file that this process wrote and has not been replaced or changed. Includes the time of the last status
-// change, which no program can set.
+// Identifies a file that this process wrote and that has not been replaced or changed since. Includes the time of the
+// last status change, which no program can set.
 using Identity = std::array<std::int64_t, 7>;
 
 Identity identity_of(const struct stat& status)

@@ -1,5 +1,5 @@
-// transfer: gives points the attributes at the nearest position of a mesh: of its vertices and corners, linear on each
-// face, and of its faces.
+// transfer: gives points the attributes of the nearest position on a mesh. Attributes of vertices and corners are
+// linear on each face; attributes of faces are constant on it.
 //
 // A moving or deforming mesh is used in its state at the end of the frame.
 #include <fmt/format.h>

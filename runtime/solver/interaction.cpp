@@ -188,8 +188,8 @@ private:
         return part * share * change;
     }
 
-    // Returns the acceleration away from the other's position at the nearest approach; on a collision course, to an
-    // arbitrary side.
+    // Returns the direction of avoidance, away from the other's position at the nearest approach, scaled by the urgency
+    // from 0 to 1. On a collision course it points to an arbitrary side.
     Vec3d aside(const Vec3d& d, const Vec3d& u, std::int64_t i, std::int64_t j) const
     {
         const double closing = -d.dot(u);

@@ -32,8 +32,8 @@ struct SolveOptions {
     std::string group;       // only these points are advanced; all if empty
     // Set to 1 for points that touch a shape, by their index before the step; null if not requested.
     std::uint8_t* met = nullptr;
-    // Set to the substeps of each point's result, by its index before the step, if there is a tolerance; null if not
-    // requested.
+    // If there is a tolerance, set to the number of substeps of each point's result, by its index before the step. Null
+    // if not requested.
     std::int32_t* taken = nullptr;
     StepLog* log = nullptr;    // receives contacts and deaths; null if not requested
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0

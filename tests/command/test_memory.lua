@@ -160,8 +160,7 @@ describe("a neighbourhood of all points", function()
     assert.match('^scene%.lua:1: node "interact1": radius = 1e%+09 m: about 6%.4e%+04 neighbours of each of 64000 ' ..
       "points, 1%.6e%+13 looks in a frame of 1000 steps, of which at most 1e%+12 are taken; give it a smaller " ..
       "radius\n$", result.stderr)
-    -- With few neighbours it passes, although all pairs would be too many in these steps: pairs are counted, not
-    -- points.
+    -- The check counts pairs within the radius, not all pairs, so the same scene with few neighbours passes.
     local near = text:format(1.1):gsub(":contact { radius = 0.1 }", ""):gsub("1000 }", "%%d }")
     assert.match("looks in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
       "-f 1-2 --quiet").stderr)

@@ -16,7 +16,8 @@ struct TriangleTree;
 std::shared_ptr<const TriangleTree> triangle_tree(const MeshPtr& mesh);
 
 // Creates the surface during an interval. begin, end: level sets of the mesh. If the interval begins with a jump, begin
-// is null and `end` is carried back. curves: of the vertices, m, with times from 0 to 1. duration: s.
+// is null and only `end` is used, carried back with the faces. curves: of the vertices, m, with times from 0 to 1.
+// duration: s.
 ShapePtr deforming_shape(const LevelSetPtr& begin, const LevelSetPtr& end,
                          const std::shared_ptr<const TriangleTree>& tree, std::vector<Cubic<Vec3d>> curves,
                          double duration);

@@ -159,8 +159,8 @@ namespace {
 // then accurate to 1e-5 per piece.
 constexpr double min_cosine = 0.98;
 
-// A surface that curves inwards by a smaller radius than its field can resolve is a kink, at which a point bounces. A
-// smaller turn than this, in radians, is noise of the field.
+// A surface that curves inwards with a radius below the field's resolution is a kink, at which a point bounces. Turns
+// by less than this angle, in radians, are noise of the field.
 constexpr double min_kink = 0.02;
 
 // Returns the shortest piece, s.

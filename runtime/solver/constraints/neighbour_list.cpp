@@ -12,8 +12,8 @@
 namespace rapid {
 namespace {
 
-// Slack relative to a point's radius: lower and upper bound, and in between the distance that it moves in this many
-// substeps. A trade-off between more pairs to check and more searches.
+// A point's slack is the distance that it moves in slack_substeps substeps, within these bounds relative to its radius.
+// More slack means more pairs to check, but fewer searches.
 constexpr double least_slack = 0.25, most_slack = 0.5, slack_substeps = 3;
 
 // The largest fraction of strays: their pairs take longer to find, one by one, and are solved on one thread.

@@ -4,11 +4,11 @@
 //
 //   x' = x + d,   v' = V + ω × (x - X)
 //
-// with d the mean displacement of their free motion, X and V their center and velocity of mass, and ω from their
-// angular momentum. Both momenta are conserved, as is the energy stored in rows, because no distance changes. All
-// kinetic energy beyond that of the rigid body is lost. The body does not turn within the substep, because that would
-// change one of these. Points linked to something that no row moves follow it. Points on springs follow the mean
-// motion of the positions or surfaces that the springs attach to.
+// with d the mean displacement of their free motion, X and V the position and velocity of their centre of mass, and ω
+// from their angular momentum. Both momenta are conserved, as is the energy stored in rows, because no distance
+// changes. All kinetic energy beyond that of the rigid body is lost. The positions do not turn within the substep: with
+// the same ω, turned positions would have another angular momentum. Points linked to something that no row moves follow
+// it. Points on springs follow the mean motion of the positions or surfaces that the springs attach to.
 #pragma once
 
 #include <cstdint>

@@ -92,9 +92,9 @@ class Frame:
         self._handle, self._scene = _Handle(handle, "frame_release"), scene
 
     number = property(lambda self: value_of("frame_number", self._handle.value))
-    time = property(lambda self: value_of("frame_time", self._handle.value), doc="s since the start")
+    time = property(lambda self: value_of("frame_time", self._handle.value), doc="Seconds since the start.")
     fps = property(lambda self: value_of("frame_fps", self._handle.value))
-    size = property(lambda self: value_of("frame_size", self._handle.value), doc="points")
+    size = property(lambda self: value_of("frame_size", self._handle.value), doc="The number of points.")
     outputs = property(lambda self: lines("frame_outputs", self._handle.value))
     columns = property(lambda self: lines("frame_columns", self._handle.value))
     groups = property(lambda self: lines("frame_groups", self._handle.value))
@@ -280,7 +280,7 @@ class Shapes:
         return result
 
     has_camera = property(lambda self: bool(value_of("shapes_has_camera", self._handle.value)),
-                          doc="Whether the scene says from where its pictures are seen.")
+                          doc="True if the scene sets the camera of its pictures.")
     warnings = property(lambda self: lines("shapes_warnings", self._handle.value))
 
     def _array(self, address, count, dtype):
@@ -488,7 +488,7 @@ class Scene(_Program):
         types = json.loads(get("scene_node_types", self._handle.value, c_char_p()).value)
         return {one.pop("name"): one for one in types}
 
-    warnings = property(lambda self: lines("scene_warnings", self._handle.value), doc="Of opening.")
+    warnings = property(lambda self: lines("scene_warnings", self._handle.value), doc="The warnings from opening the scene.")
     fps = property(lambda self: value_of("scene_fps", self._handle.value))
     first_frame = property(lambda self: value_of("scene_first_frame", self._handle.value))
     next_frame = property(lambda self: value_of("scene_next_frame", self._handle.value))
@@ -640,7 +640,7 @@ class Run(_Program):
         """Opens and plans the scene, and checks the names of the output files."""
         self._call("run_prepare", self._handle.value)
 
-    first_frame = property(lambda self: value_of("run_first_frame", self._handle.value), doc="Of the scene.")
+    first_frame = property(lambda self: value_of("run_first_frame", self._handle.value), doc="The first frame of the scene.")
 
     @property
     def frames(self):

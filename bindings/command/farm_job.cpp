@@ -75,8 +75,8 @@ std::string head(const FarmJob& job, const std::string& log)
         shell_word(job.name), shell_word((job.scripts() / log).string()), shell_word(job.folder.string()));
 }
 
-// Runs commands of this program and records their exit statuses. The number of threads is the job's: in Slurm's first
-// variable if --cpus-per-task is an option of the job, else in the second.
+// Returns a script that runs commands of this program and records their exit status. The number of threads is
+// --cpus-per-task if the job has that option, else the processors that Slurm assigned on the node.
 std::string body(const std::string& status, const std::string& program, const std::vector<std::string>& commands)
 {
     std::string text = fmt::format(

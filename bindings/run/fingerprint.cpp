@@ -96,8 +96,8 @@ std::vector<std::string> words_of(const std::string& text)
     return words;
 }
 
-// Describes the difference between the functions of a file; functions that only moved to another line are equal. A
-// change of the body follows from others that are known by name: of_body is true if it is reported.
+// Describes the first difference between the functions of a file. Functions that only moved to another line are equal.
+// of_body: also compares the code outside of functions; false if other reported differences already imply its change.
 std::string difference_of_code(const std::string& file, const std::string& was, const std::string& is, bool of_body)
 {
     const std::vector<std::string> before = words_of(was), now = words_of(is);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""A promised header as Doxygen wants it: its comments, which are plain ones, marked as documentation. The first is that
-of the file. A comment above declarations speaks of all up to the next empty line or comment, one behind a declaration of
-all in its line; `/* ---- TITLE. TEXT */` begins a section. For INPUT_FILTER; argument: the file."""
+"""Converts the plain comments of a promised header into documentation for Doxygen. The first comment documents the
+file. A comment above declarations documents all up to the next empty line or comment; one after a declaration documents
+everything on its line. `/* ---- TITLE. TEXT */` begins a section. Used as INPUT_FILTER; argument: the file."""
 import re
 import sys
 
@@ -10,7 +10,8 @@ OPENING = re.compile(r"\s*(template|struct|class|enum|namespace|typedef struct \
 
 
 def parts(line):
-    """Code, and the text of the comment behind or instead of it; None: no comment. C's must end in the line."""
+    """Splits a line into code and comment text; the text is None without a comment. A C comment must end on its
+    line."""
     code, _, text = re.match(r"((?:[^/\"]|/(?![/*])|\"[^\"]*\")*)(//|/\*)?(.*)", line).groups()
     if len(code) == len(line):
         return line, None
@@ -18,7 +19,7 @@ def parts(line):
 
 
 def as_lines(text):
-    """Comments of C as those of C++, a line each."""
+    """Converts C comments to C++ comments, one per line."""
     def lines(match):
         indent, body = match.groups()
         return "\n".join(f"{indent}//{'' if line.startswith(' ') or not line else ' '}{line}"
@@ -27,7 +28,7 @@ def as_lines(text):
 
 
 def runs(lines):
-    """The lines in runs: a comment, with the declarations that it speaks of."""
+    """Yields runs of lines: a comment, with the declarations that it documents."""
     run = ([], [])
     for line in lines:
         code, text = parts(line)

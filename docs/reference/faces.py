@@ -35,7 +35,7 @@ def without_comments(text):
 
 
 def functions_in_c():
-    """{subject: {verb: function}}, where a list's count and its member are one verb."""
+    """Returns {subject: {verb: function}}. A list's count and its member are one verb."""
     found = {subject: {} for subject in CLASSES}
     offers = {}
     declarations = re.findall(r"^(?:int|void|const char\*|size_t|u?int64_t|double) (rapid_\w+)\(",
@@ -59,7 +59,7 @@ def functions_in_c():
 
 
 def body_of(name, text):
-    """The public part of a class or struct."""
+    """Returns the public part of a class or struct."""
     begin = re.search(rf"^(?:class|struct) {name}\b[^;{{]*{{", text, re.M).end()
     return re.split(r"^private:", text[begin:text.index("\n};", begin)], flags=re.M)[0]
 
@@ -111,7 +111,7 @@ def names_in_python():
 
 
 def members_of_options():
-    """The names of a scene's options in each of the three."""
+    """Returns the names of a scene's options in each of the three languages."""
     c = re.search(r"typedef struct rapid_options {(.*?)} rapid_options;", without_comments(read("include/rapid/rapid.h")), re.S)
     in_c = set(re.findall(r"\(\*(\w+)\)\(|(\w+);", c[1]))
     in_c = {pointer or member for pointer, member in in_c} - {"size", "user", "offers", "set_count", "path_count"}
@@ -125,7 +125,7 @@ def members_of_options():
 
 
 def differences():
-    """A line for each name that one of the three lacks."""
+    """Returns a line for each name that one of the three lacks."""
     (c, offers), cpp, (python, classes) = functions_in_c(), names_in_cpp(), names_in_python()
     lines = []
     for subject, (in_cpp, in_python) in CLASSES.items():
@@ -159,7 +159,7 @@ def table():
 
 
 def document():
-    """docs/host.md with the table as it should be."""
+    """Returns docs/host.md with the current table."""
     text = DOCUMENT.read_text(encoding="utf-8")
     begin = text.index(BEGIN) + len(BEGIN)
     return text[:begin] + table() + text[text.index(END, begin):]

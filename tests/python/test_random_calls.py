@@ -30,7 +30,7 @@ def fall(**options):
 
 
 class Sequence:
-    """The calls of one seed. `said` lists them for the message of a failure."""
+    """The calls of one seed. `said` lists them for the failure message."""
 
     def __init__(self, test, seed):
         self.test, self.random, self.said = test, random.Random(seed), []

@@ -39,7 +39,7 @@ def test(function):
 
 
 class Bench:
-    """What the tests share: the command, a browser, and a view of SCENE."""
+    """Shared by the tests: the command, a browser, and a view of SCENE."""
 
     def __init__(self, rapid):
         self.rapid = rapid

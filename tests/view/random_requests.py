@@ -21,7 +21,7 @@ NAMES = ["P", "v", "heat", "speed", "error", "group:low", "Cd", "id", "nothing",
 
 
 def points_of(random):
-    """The fields that name points."""
+    """Returns the fields that select points."""
     fields = {"frame": random.randint(0, 7)}
     if random.random() < 0.3:
         fields["group"] = random.choice(["", "low", "none"])

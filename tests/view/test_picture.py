@@ -143,7 +143,7 @@ return rapid.create { points = rapid.points.from { P = P } } :attribute { pscale
     assert 0 < asleep < 60
     values = column(browser, 36, "asleep")
     assert sum(value == 1 for value in values) == asleep
-    # Where none sleeps, these are the colours of those that do not.
+    # If no point sleeps, all have the colour of points that are awake.
     assert set(column(browser, 1, "asleep")) == {0}
     assert browser.promise("rapidView.ask('frame', {frame: 1, colour: 'asleep'}).then((m) => m.ranges.value)") == [0, 1]
 

@@ -16,7 +16,7 @@ for i = 1, 20000 do P[i] = {i * 1e-4 + 0.5, 1, 0} end
 return rapid.create { points = rapid.points.from { P = P } } :attract { strength = 0.1 }
   :solve { substeps = slow and 1000000 or 1 }
 """
-# Likewise in a script.
+# The same in a script.
 SLOW_SCRIPT = SLOW.replace(":attract {", """:points("wait", function(p)
       if slow and p.id == 7 then while true do end end end) :attract {""").replace("1000000", "1")
 

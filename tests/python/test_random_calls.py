@@ -1,7 +1,7 @@
 """Random sequences of valid, wrong and hostile calls of the Python module, compared with a model of the open objects
 and their frames. tests/scene/call_model.h does the same in C and C++.
 
-HOST_CALLS=24000 HOST_CALLS_SEED=7 tests/python/run build/test
+    HOST_CALLS=24000 HOST_CALLS_SEED=7 tests/python/run build/test
 """
 import ctypes
 import math

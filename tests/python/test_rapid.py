@@ -1,6 +1,6 @@
 """The Python module: arrays that share memory, errors, callbacks. tests/scene/test_scene.cpp tests scenes.
 
-RAPID_LIBRARY=build/test/lib/librapid_host.so python3 tests/python/test_rapid.py
+    RAPID_LIBRARY=build/test/lib/librapid_host.so python3 tests/python/test_rapid.py
 """
 import gc
 import math

@@ -21,7 +21,7 @@ Answer answer(const Result<T>& result)
     return result ? Answer{} : Answer{result.error().kind, result.error().text()};
 }
 
-// Calls like the above, and stores the created object.
+// Converts the result of a call to an answer, and stores the created object in the handle.
 template <class T, class Handle>
 Answer taken(Result<T> result, Handle& handle)
 {

@@ -569,7 +569,7 @@ TEST_CASE("an error that a script catches and raises again keeps its kind", "[sc
 
 TEST_CASE("a scene whose frames take more memory than it has is an error, and goes on", "[scene]")
 {
-    // Detail strings of a few hundred MiB in each frame, which no estimate covers.
+    // Detail values with long names, a few hundred MiB in each frame, which no estimate covers.
     const std::string growing =
         "local rapid = require 'rapid'\n"
         "local large = rapid.param('large', 1)\n"

@@ -5,7 +5,7 @@
 ---@meta rapid
 -- The graph language, for editors with the Lua language server. Written by `rapid nodes --annotations`; do not edit.
 
----Three numbers that do not change.
+---An immutable vector of three numbers.
 ---@class rapid.Vec3
 ---@field x number
 ---@field y number
@@ -24,16 +24,16 @@ function Vec3:dot(w) end
 function Vec3:cross(w) end
 ---@return number
 function Vec3:length() end
----Returns it with length 1; zero stays zero.
+---Returns the vector with length 1; zero stays zero.
 ---@return rapid.Vec3
 function Vec3:normalized() end
----Interpolates from this (t = 0) to w (t = 1).
+---Interpolates from this vector (t = 0) to w (t = 1).
 ---@param w rapid.Vec3
 ---@param t number
 ---@return rapid.Vec3
 function Vec3:lerp(w, t) end
 
----A rotation that does not change: q * r turns by r, and then by q.
+---An immutable rotation; q * r turns by r, then by q.
 ---@class rapid.Quat
 ---@field x number
 ---@field y number
@@ -50,7 +50,7 @@ function Quat:inverse() end
 function Quat:length() end
 ---@return rapid.Quat
 function Quat:normalized() end
----The shortest way from this (t = 0) to r (t = 1).
+---Interpolates from this rotation (t = 0) to r (t = 1) along the shortest path.
 ---@param r rapid.Quat
 ---@param t number
 ---@return rapid.Quat
@@ -59,13 +59,13 @@ function Quat:slerp(r, t) end
 ---@class rapid.StudyDefinition
 ---@field name string
 ---@field scene fun(knobs: table): rapid.Node|table<string, rapid.Node>
----@field frames integer[]  the first and the last
+---@field frames integer[]  {first, last}
 ---@field sweep table<string, (number|string|boolean)[]>  the values of each knob
----@field lines? string|string[]  the knobs that tell the lines of the plot apart
----@field reference? table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form: { P = {...} }
----@field error? "rms"|"max"|"p95"|"residual"|fun(points: table, reference: table): number  of columns, place by place
+---@field lines? string|string[]  the knobs that distinguish the lines of the plot
+---@field reference? table|fun(frame: rapid.Frame, knobs: table): table  knobs, or a closed form { P = {...} }
+---@field error? "rms"|"max"|"p95"|"residual"|fun(points: table, reference: table): number  a norm, or a function of columns
 ---@field error_frames? "all"|"last"
----@field repeat_runs? integer  timed runs of each row, 5 if not given
+---@field repeat_runs? integer  number of timed runs per row; the default is 5
 
 ---Defines a study, which `rapid study` runs. The file of the study returns it.
 ---@param definition rapid.StudyDefinition
@@ -89,17 +89,17 @@ function quat(x, y, z, w) end
 ---@alias rapid.Place rapid.Vec3|number[]
 
 ---@class rapid.Frame
----@field number number  counted from the scene's start
----@field time number    seconds since the start
----@field dt number      seconds to the next frame
+---@field number number  number of the frame
+---@field time number    seconds since the start frame
+---@field dt number      length of the frame in seconds
 
----A point's own time, in an action.
+---The substep of an action, in the point's own time.
 ---@class rapid.Step
----@field time number    seconds since the start
----@field dt number      seconds of this sub-step
----@field index integer  of the sub-step
+---@field time number    seconds since the start frame
+---@field dt number      length of the substep in seconds
+---@field index integer  number of the substep
 
----@class rapid.Attribute  each point's own value, from rapid.attr
+---@class rapid.Attribute  an attribute of each point, from rapid.attr
 ---@class rapid.Points
 local Points = {}
 ---@param motion rapid.Motion
@@ -108,7 +108,7 @@ function Points:transform(motion) end
 
 ---@class rapid.Camera
 
----@class rapid.Motion  a * b moves by b, and then by a
+---@class rapid.Motion  a * b moves by b, then by a
 ---@operator mul(rapid.Motion): rapid.Motion
 
 ---@class rapid.Mesh
@@ -116,19 +116,19 @@ local Mesh = {}
 ---@param motion rapid.Motion
 ---@return rapid.Mesh
 function Mesh:transform(motion) end
----Distance to the nearest face, metres; in kernels.
+---Returns the distance to the nearest face in metres; in kernels.
 ---@param P rapid.Vec3
 ---@return number
 function Mesh:distance(P) end
----Direction away from the nearest face; in kernels.
+---Returns the direction away from the nearest face; in kernels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Mesh:gradient(P) end
----Velocity of the nearest face, m/s; in kernels.
+---Returns the velocity of the nearest face in m/s; in kernels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Mesh:velocity(P) end
----The nearest position; with a name, the value of that attribute there; in kernels.
+---Returns the nearest position, or with a name the value of that attribute there; in kernels.
 ---@param P rapid.Vec3
 ---@param attribute? string
 ---@return any
@@ -136,19 +136,19 @@ function Mesh:closest(P, attribute) end
 
 ---@class rapid.Shape
 local Shape = {}
----Signed distance, metres, negative inside.
+---Returns the signed distance in metres, negative inside.
 ---@param P rapid.Vec3
 ---@return number
 function Shape:distance(P) end
----Direction out of the shape.
+---Returns the direction out of the shape.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:gradient(P) end
----Velocity of the shape there, m/s.
+---Returns the velocity of the shape at this position in m/s.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:velocity(P) end
----The nearest position on the surface; for a level set within its band.
+---Returns the nearest position on the surface; for a level set within its band.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Shape:closest(P) end
@@ -156,7 +156,7 @@ function Shape:closest(P) end
 ---@class rapid.LevelSet: rapid.Shape
 local LevelSet = {}
 ---Writes a .vdb file, in a run.
----@param path string  relative to the current folder
+---@param path string  path, relative to the current folder
 ---@param options? { grid?: string }
 ---@return rapid.LevelSet
 function LevelSet:write(path, options) end
@@ -170,31 +170,31 @@ function LevelSet:intersect(other) end
 ---@return rapid.LevelSet
 function LevelSet:subtract(other) end
 
----@class rapid.Fog  a volume of a density
+---@class rapid.Fog  a grid of densities
 local Fog = {}
----The density, trilinear between voxels.
+---Returns the density, interpolated between voxels.
 ---@param P rapid.Vec3
 ---@return number
 function Fog:sample(P) end
 ---Writes a .vdb file, in a run.
----@param path string  relative to the current folder
+---@param path string  path, relative to the current folder
 ---@param options? { grid?: string }
 ---@return rapid.Fog
 function Fog:write(path, options) end
 
----@class rapid.Grid  of vectors
+---@class rapid.Grid  a grid of vectors
 local Grid = {}
----Interpolates between voxels.
+---Returns the vector, interpolated between voxels.
 ---@param P rapid.Vec3
 ---@return rapid.Vec3
 function Grid:sample(P) end
 ---Writes a .vdb file, in a run.
----@param path string  relative to the current folder
+---@param path string  path, relative to the current folder
 ---@param options? { grid?: string }
 ---@return rapid.Grid
 function Grid:write(path, options) end
 
----@class rapid.Curve  lines from place to place
+---@class rapid.Curve  lines through positions
 local Curve = {}
 ---@param motion rapid.Motion|fun(frame: rapid.Frame): rapid.Motion|table<integer, rapid.Motion>
 ---@return rapid.Curve
@@ -205,7 +205,7 @@ local rapid = {}
 rapid.mesh, rapid.levelset, rapid.grid, rapid.fog, rapid.shape, rapid.points, rapid.math = {}, {}, {}, {}, {}, {}, {}
 rapid.curve = {}
 
----A value that --set can replace.
+---Returns a value that --set can replace.
 ---@generic T
 ---@param name string
 ---@param default T  a number, a boolean, a string or a vec3
@@ -213,12 +213,12 @@ rapid.curve = {}
 ---@return T
 function rapid.param(name, default, doc) end
 
----Each point's own value of an attribute, for parameters that take it.
+---Names an attribute, for parameters that take a value of each point.
 ---@param name string
 ---@return rapid.Attribute
 function rapid.attr(name) end
 
----A shape, a mesh or points offered by the program that has opened the scene.
+---Returns a shape, a mesh or points offered by the program that has opened the scene.
 ---@param name string
 ---@return any
 function rapid.host(name) end
@@ -234,15 +234,15 @@ function rapid.host(name) end
 ---@field doc string
 
 ---@class rapid.NodeDefinition
----@field name string  of its file, too
+---@field name string  name of the node, and of its file
 ---@field doc string
 ---@field params? table<string, rapid.NodeParameter>
----@field makes? table<string, number|number[]>  attributes that it brings into being, with their value
+---@field makes? table<string, number|number[]>  attributes that the node creates, with their initial values
 ---@field points? fun(p: rapid.Point, frame: rapid.Frame, params: table)
----@field action? fun(p: rapid.Point, step: rapid.Step, params: table)  inside Solve, at every sub-step
+---@field action? fun(p: rapid.Point, step: rapid.Step, params: table)  inside Solve, in every substep
 ---@field expand? fun(input: rapid.Node, params: table): rapid.Node
 
----A node written in Lua; its file returns it.
+---Defines a node; the file of a node returns it.
 ---@param definition rapid.NodeDefinition
 ---@return rapid.NodeDefinition
 function rapid.node(definition) end
@@ -257,7 +257,7 @@ function rapid.translate(x, y, z) end
 ---@return rapid.Points
 function rapid.points.from(columns) end
 
----Points at even distances along a curve, with its direction N and the part u of its length.
+---Returns points at equal distances along a curve, with the direction N and the fraction u of the length.
 ---@param curve rapid.Place[]
 ---@param options? { count?: integer, closed?: boolean }
 ---@return rapid.Points
@@ -278,14 +278,14 @@ function rapid.math.clamp(x, lo, hi) end
 ---@return number
 function rapid.math.fit(x, lo, hi, from, to) end
 
----0 up to lo, 1 from hi on, smooth between.
+---Returns 0 up to lo, 1 from hi on, and a smooth curve between them.
 ---@param lo number
 ---@param hi number
 ---@param x number
 ---@return number
 function rapid.math.smoothstep(lo, hi, x) end
 
----A number in [-1, 1] that changes smoothly with position and time.
+---Returns a number in [-1, 1] that changes smoothly with position and time.
 ---@param P rapid.Vec3
 ---@param time? number
 ---@param octaves? integer
@@ -293,7 +293,7 @@ function rapid.math.smoothstep(lo, hi, x) end
 ---@return number
 function rapid.math.noise(P, time, octaves, seed) end
 
----A flow, about 1 long, that neither gathers nor spreads points.
+---Returns the velocity of a flow without divergence, with a magnitude of about 1.
 ---@param P rapid.Vec3
 ---@param time? number
 ---@param octaves? integer
@@ -312,7 +312,7 @@ function rapid.math.rotation(axis, degrees) end
 function rapid.math.rotation_between(from, to) end
 --@makers except levelset.at levelset.combine levelset.write motion.product motion.translate points.from transform
 
----The point that a kernel sees. Other attributes are those that the scene makes.
+---The point of a kernel, with all attributes that the scene makes.
 ---@class rapid.Point
 --@point_fields
 ---@field [string] any
@@ -326,7 +326,7 @@ function Point:leave(group) end
 function Point:within(group) end
 ---Removes the point when its node ends.
 function Point:kill() end
----The point's own random number k in [0, 1): the same in every frame, or a new one in each if given the frame.
+---Returns the point's random number k in [0, 1): the same in every frame, or with `frame` another in each.
 ---@param k number
 ---@param frame? rapid.Frame|number
 ---@return number

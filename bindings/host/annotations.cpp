@@ -143,7 +143,7 @@ std::string annotated(const NodeType& type)
     const bool source = type.kind == NodeKind::Source;
     std::string text =
         fmt::format("\n---@class rapid.params.{}\n{}", type.name, fields_of(type.params, true, kernel_of(type)));
-    if (!type.find("name")) text += "---@field name? string  what the node is called in messages [string]\n";
+    if (!type.find("name")) text += "---@field name? string  name of the node in messages [string]\n";
     if (type.rest) text += fmt::format("---@field [string] {}  {}\n", lua_type(*type.rest), type.rest->doc);
     text += fmt::format("\n---{}\n", type.doc);
     const bool required =

@@ -11,8 +11,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::string_view reads_doc = "attributes that the kernel reads under names that it computes";
-constexpr std::string_view writes_doc = "attributes that it assigns under names that it computes";
+constexpr std::string_view reads_doc = "attributes that the kernel reads by computed names";
+constexpr std::string_view writes_doc = "attributes that the kernel assigns by computed names";
 
 // Returns the declared names, which a kernel computes and its bytecode does not show.
 KernelArguments declared(const std::vector<std::string>& reads, const std::vector<std::string>& writes)
@@ -38,8 +38,8 @@ struct Points {
 
     static NodeType declare()
     {
-        return node<Points>("points", "Edits the points with a Lua function, one by one, in parallel.")
-            .param(&Points::kernel, "kernel", Value(), any_number(), "", "function(p, frame)")
+        return node<Points>("points", "Runs a Lua function on each point, in parallel.")
+            .param(&Points::kernel, "kernel", Value(), any_number(), "", "function of a point, function(p, frame)")
             .of_type(std::string(PointFunction::param_type))
             .required()
             .constant()
@@ -69,8 +69,8 @@ struct ScriptAction {
 
     static NodeType declare()
     {
-        return node<ScriptAction>("action", "Edits the points with a Lua function inside Solve, at every sub-step.")
-            .param(&ScriptAction::kernel, "kernel", Value(), any_number(), "", "function(p, step)")
+        return node<ScriptAction>("action", "Runs a Lua function on each point inside Solve, in every substep.")
+            .param(&ScriptAction::kernel, "kernel", Value(), any_number(), "", "function of a point, function(p, step)")
             .of_type(std::string(PointFunction::param_type))
             .required()
             .constant()
@@ -95,8 +95,8 @@ struct Detail {
 
     static NodeType declare()
     {
-        return node<Detail>("detail", "Runs a Lua function over the whole set of points, once.")
-            .param(&Detail::kernel, "kernel", Value(), any_number(), "", "function(points, frame)")
+        return node<Detail>("detail", "Runs a Lua function over the whole set of points, once per frame.")
+            .param(&Detail::kernel, "kernel", Value(), any_number(), "", "function of the set, function(points, frame)")
             .of_type(std::string(Kernel::set_function_type))
             .required()
             .constant()

@@ -72,8 +72,7 @@ std::string page_of(const NodeType& type)
         if (param.internal) continue;
         text += fmt::format("  {:{}}  {} {}\n", param.name, width, param.doc, facts_of(param));
     }
-    if (!type.find("name"))
-        text += fmt::format("  {:{}}  what the node is called in messages [string]\n", "name", width);
+    if (!type.find("name")) text += fmt::format("  {:{}}  name of the node in messages [string]\n", "name", width);
     if (type.rest) text += fmt::format("  {:{}}  {} [{}]\n", "...", width, type.rest->doc, type.rest->type);
 
     const auto names = [&](std::string_view what, const std::vector<std::string>& list) {

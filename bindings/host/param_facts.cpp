@@ -15,6 +15,7 @@ std::string facts_of(const Param& param)
     else if (!param.fallback.is_nil())
         facts.push_back("default " + describe(param.fallback));
     if (param.per_point) facts.push_back("takes rapid.attr");
+    if (!param.of_the_frame && param.type.find("function") == std::string::npos) facts.push_back("constant");
     return fmt::format("[{}]", fmt::join(facts, ", "));
 }
 

@@ -7,7 +7,7 @@
 
 namespace rapid {
 
-// "[number, m/s, at least 0, default 0.5, takes rapid.attr]"
+// "[number, m/s, at least 0, default 0.5, takes rapid.attr]", "[integer, default 1, constant]"
 std::string facts_of(const Param& param);
 
 }  // namespace rapid

@@ -48,7 +48,7 @@ Param group_param()
     Param group;
     group.name = "group";
     group.type = "string";
-    group.doc = "acts on this group only";
+    group.doc = "limits the node to the points of this group";
     group.of_the_frame = false;
     group.assign = [](const Param& self, void* fields, const Value& value) {
         read_value(self, value, static_cast<ScriptFields*>(fields)->group);

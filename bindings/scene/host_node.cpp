@@ -299,7 +299,8 @@ try {
         type.uses.takes.push_back("mass");
     }
     type.varies = node.kind == HostNode::Edit;
-    type.params.push_back(param_of(&HostFields::group, "group", Value(), any_number(), "", "acts on this group only"));
+    type.params.push_back(param_of(&HostFields::group, "group", Value(), any_number(), "",
+                                   "limits the node to the points of this group"));
     std::size_t place = 0;
     for (const HostParameter& parameter : node.parameters) {
         if (!is_name(parameter.name) || type.find(parameter.name) || parameter.name == "name")

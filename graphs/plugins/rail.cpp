@@ -26,8 +26,8 @@ struct Rail {
     {
         return node<Rail>("rail", "Keeps points at a distance from the y axis.")
             .stage(Stage::Constraints)
-            .param(&Rail::radius, "radius", 1.0, above(0), "m", "the distance")
-            .param(&Rail::compliance, "compliance", 0.0, at_least(0), "m/N", "give by force; 0: rigid");
+            .param(&Rail::radius, "radius", 1.0, above(0), "m", "distance from the axis")
+            .param(&Rail::compliance, "compliance", 0.0, at_least(0), "m/N", "displacement per force; 0 is rigid");
     }
     auto dynamic(const Evaluation& now) const
     {
@@ -44,8 +44,8 @@ struct Brake {
     double most;
     static NodeType declare()
     {
-        return node<Brake>("brake", "Holds the speed of points below a bound, at every sub-step.")
-            .param(&Brake::most, "most", 1.0, at_least(0), "m/s", "the bound");
+        return node<Brake>("brake", "Limits the speed of points, in every substep.")
+            .param(&Brake::most, "most", 1.0, at_least(0), "m/s", "maximum speed");
     }
     auto dynamic(const Evaluation& now) const
     {

@@ -7,11 +7,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "align",
-  doc  = "Turns orient so that an axis points along an attribute.",
+  doc  = "Turns orient so that an axis of each point follows an attribute.",
   params = {
-    to       = { "read", default = "N", doc = "a vec3: where the axis is to point" },
-    axis     = { "vec3", default = {0, 1, 0}, doc = "of the point, any length but zero" },
-    response = { "float", default = 0, min = 0, unit = "s", doc = "time in which the angle falls to 1/e" },
+    to       = { "read", default = "N", doc = "vec3 attribute that gives the target direction" },
+    axis     = { "vec3", default = {0, 1, 0}, doc = "axis of the point that is turned, of any nonzero length" },
+    response = { "float", default = 0, min = 0, unit = "s",
+                 doc = "time in which the angle falls to 1/e; 0 turns at once" },
   },
   makes = { orient = {0, 0, 0, 1} },
   points = function(p, _, params)

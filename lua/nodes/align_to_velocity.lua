@@ -8,10 +8,10 @@ local y, z = vec3(0, 1, 0), vec3(0, 0, 1)
 
 return rapid.node {
   name = "align_to_velocity",
-  doc  = "Turns orient so that its z axis points along the velocity.",
+  doc  = "Turns orient so that the z axis of each point follows its velocity.",
   params = {
-    up    = { "vec3", default = {0, 1, 0}, doc = "where the y axis points as far as it can" },
-    least = { "float", default = 1e-6, min = 0, unit = "m/s", doc = "slower points keep their orientation" },
+    up    = { "vec3", default = {0, 1, 0}, doc = "direction towards which the y axis turns as far as possible" },
+    least = { "float", default = 1e-6, min = 0, unit = "m/s", doc = "speed below which a point keeps its orientation" },
   },
   makes = { orient = {0, 0, 0, 1} },
   points = function(p, _, params)

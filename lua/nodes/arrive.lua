@@ -9,12 +9,14 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "arrive",
-  doc  = "Takes points to a place, slowing down before it.",
+  doc  = "Moves points to a target and slows them down before it.",
   params = {
-    target   = { "vec3", default = {0, 0, 0}, unit = "m", doc = "where to" },
-    speed    = { "float", default = 1, min = 1e-6, unit = "m/s", doc = "beyond the radius" },
-    radius   = { "float", default = 1, min = 1e-6, unit = "m", doc = "where they begin to slow down" },
-    response = { "float", default = 0.2, min = 1e-6, unit = "s", doc = "time in which other velocity falls to 1/e" },
+    target   = { "vec3", default = {0, 0, 0}, unit = "m", doc = "target position" },
+    speed    = { "float", default = 1, min = 1e-6, unit = "m/s", doc = "speed outside the radius" },
+    radius   = { "float", default = 1, min = 1e-6, unit = "m",
+                 doc = "distance from the target at which points begin to slow down" },
+    response = { "float", default = 0.2, min = 1e-6, unit = "s",
+                 doc = "time in which any other velocity falls to 1/e" },
   },
   points = function(p, _, params)
     local dt = p.dt

@@ -10,8 +10,9 @@ return rapid.node {
   name = "avoid",
   doc  = "Pushes points away from a shape that they come near.",
   params = {
-    shape    = { "shape", required = true, doc = "a shape or a level set" },
-    distance = { "float", default = 0.5, min = 1e-6, unit = "m", doc = "where it begins to act" },
+    shape    = { "shape", required = true, doc = "shape or level set" },
+    distance = { "float", default = 0.5, min = 1e-6, unit = "m",
+                 doc = "distance from the surface at which the push begins" },
     strength = { "float", default = 10, unit = "m/s²", doc = "acceleration at the surface" },
   },
   points = function(p, _, params)

@@ -5,12 +5,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "color_by_speed",
-  doc  = "Colours points by their speed.",
+  doc  = "Blends the colour of points between two colours by their speed.",
   params = {
-    slow = { "vec3", default = {0.1, 0.2, 0.9}, min = 0, doc = "colour at low and below, linear RGB" },
-    fast = { "vec3", default = {1, 0.9, 0.6}, min = 0, doc = "colour at high and above, linear RGB" },
-    low  = { "float", default = 0, min = 0, unit = "m/s", doc = "a speed" },
-    high = { "float", default = 5, min = 0, unit = "m/s", doc = "another speed" },
+    slow = { "vec3", default = {0.1, 0.2, 0.9}, min = 0, doc = "linear RGB colour at the speed low and below" },
+    fast = { "vec3", default = {1, 0.9, 0.6}, min = 0, doc = "linear RGB colour at the speed high and above" },
+    low  = { "float", default = 0, min = 0, unit = "m/s", doc = "speed of the colour slow" },
+    high = { "float", default = 5, min = 0, unit = "m/s", doc = "speed of the colour fast" },
   },
   makes = { Cd = {1, 1, 1} },
   points = function(p, _, params)

@@ -7,12 +7,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "fade_by_age",
-  doc  = "Fades an attribute over the life of each point.",
+  doc  = "Changes an attribute over the life of each point.",
   params = {
-    attribute = { "write", default = "pscale", doc = "a float" },
-    first     = { "float", default = 1, doc = "its value at birth" },
-    last      = { "float", default = 0, doc = "its value at death" },
-    hold      = { "float", default = 0, min = 0, max = 0.999, doc = "part of the life before the fade begins" },
+    attribute = { "write", default = "pscale", doc = "float attribute that is written" },
+    first     = { "float", default = 1, doc = "value at birth" },
+    last      = { "float", default = 0, doc = "value at death" },
+    hold      = { "float", default = 0, min = 0, max = 0.999, doc = "fraction of the life before the change begins" },
   },
   points = function(p, _, params)
     local t = p.life > 0 and (p.age + p.dt) / p.life or 1

@@ -23,8 +23,9 @@ return rapid.node {
   name = "follow_curve",
   doc  = "Moves points along a curve.",
   params = {
-    points   = { "vec3s", required = true, unit = "m", doc = "the curve goes through them, at least two" },
-    duration = { "float", default = 1, min = 1e-6, unit = "s", doc = "from the first to the last, each span alike" },
+    points   = { "vec3s", required = true, unit = "m", doc = "positions that the curve passes through, at least two" },
+    duration = { "float", default = 1, min = 1e-6, unit = "s",
+                 doc = "time from the first position to the last; each span takes the same part of it" },
   },
   points = function(p, _, params)
     local points = params.points

@@ -16,15 +16,16 @@ end
 
 return rapid.node {
   name = "follow_leader",
-  doc  = "Has points follow one that leads them.",
+  doc  = "Makes points follow a leader.",
   params = {
-    leader   = { "string", required = true, doc = "the group of the leader" },
-    distance = { "float", default = 0.5, min = 0, unit = "m", doc = "behind the leader at which the train begins" },
-    length   = { "float", default = 2, min = 0, unit = "m", doc = "of the train" },
-    width    = { "float", default = 0.5, min = 0, unit = "m", doc = "of the train, to each side" },
-    speed    = { "float", default = 5, min = 1e-6, unit = "m/s", doc = "greatest" },
-    time     = { "float", default = 0.5, min = 1e-6, unit = "s", doc = "in which they close up" },
-    response = { "float", default = 0.2, min = 1e-6, unit = "s", doc = "time in which the difference falls to 1/e" },
+    leader   = { "string", required = true, doc = "group of the leader" },
+    distance = { "float", default = 0.5, min = 0, unit = "m", doc = "distance between the leader and the train" },
+    length   = { "float", default = 2, min = 0, unit = "m", doc = "length of the train" },
+    width    = { "float", default = 0.5, min = 0, unit = "m", doc = "radius of the train" },
+    speed    = { "float", default = 5, min = 1e-6, unit = "m/s", doc = "maximum speed" },
+    time     = { "float", default = 0.5, min = 1e-6, unit = "s", doc = "time in which points close up to the train" },
+    response = { "float", default = 0.2, min = 1e-6, unit = "s",
+                 doc = "time in which the difference of the velocity falls to 1/e" },
   },
   expand = function(input, params)
     return input

@@ -3,11 +3,11 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "group_by_bounds",
-  doc  = "Puts the points in a box into a group, and takes the others out of it.",
+  doc  = "Puts the points in a box into a group and removes all others from it.",
   params = {
-    into = { "group", required = true, doc = "the group" },
-    min  = { "vec3", default = {-1, -1, -1}, unit = "m", doc = "least corner of the box; on its faces is in it" },
-    max  = { "vec3", default = {1, 1, 1}, unit = "m", doc = "greatest corner of the box" },
+    into = { "group", required = true, doc = "name of the group" },
+    min  = { "vec3", default = {-1, -1, -1}, unit = "m", doc = "lower corner of the box; its faces are inside" },
+    max  = { "vec3", default = {1, 1, 1}, unit = "m", doc = "upper corner of the box" },
   },
   points = function(p, _, params)
     local P, min, max = p.P, params.min, params.max

@@ -5,11 +5,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "group_by_shape",
-  doc  = "Puts the points in or near a shape into a group, and takes the others out of it.",
+  doc  = "Puts the points in or near a shape into a group and removes all others from it.",
   params = {
-    into     = { "group", required = true, doc = "the group" },
-    shape    = { "shape", required = true, doc = "a shape or a level set" },
-    distance = { "float", default = 0, unit = "m", doc = "how far from the surface is in; negative is deep inside" },
+    into     = { "group", required = true, doc = "name of the group" },
+    shape    = { "shape", required = true, doc = "shape or level set" },
+    distance = { "float", default = 0, unit = "m",
+                 doc = "maximum signed distance of members from the surface; negative values are inside" },
   },
   points = function(p, _, params)
     if params.shape:distance(p.P) <= params.distance then p:join(params.into) else p:leave(params.into) end

@@ -7,9 +7,10 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "impact_spin",
-  doc  = "Sets points turning that have hit a shape.",
+  doc  = "Makes points spin after they hit a shape.",
   params = {
-    grip = { "float", default = 1, min = 0, max = 1, doc = "part of the way to rolling at each contact" },
+    grip = { "float", default = 1, min = 0, max = 1,
+             doc = "fraction of the change to rolling that each contact makes" },
   },
   makes = { w = {0, 0, 0} },
   points = function(p, _, params)

@@ -7,9 +7,9 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "jitter",
-  doc  = "Kicks points in random directions.",
+  doc  = "Kicks points in random directions, in each frame.",
   params = {
-    strength = { "float", default = 1, min = 0, unit = "m/s", doc = "root mean square speed gained in a second" },
+    strength = { "float", default = 1, min = 0, unit = "m/s", doc = "root mean square speed gained in one second" },
   },
   points = function(p, frame, params)
     local k = vec3(2 * p:rand(1, frame) - 1, 2 * p:rand(2, frame) - 1, 2 * p:rand(3, frame) - 1)

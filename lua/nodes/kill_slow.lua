@@ -7,8 +7,8 @@ return rapid.node {
   name = "kill_slow",
   doc  = "Removes points that move too slowly.",
   params = {
-    speed = { "float", default = 0.05, min = 0, unit = "m/s", doc = "slower points go" },
-    age   = { "float", default = 0, min = 0, unit = "s", doc = "younger points stay" },
+    speed = { "float", default = 0.05, min = 0, unit = "m/s", doc = "speed below which points are removed" },
+    age   = { "float", default = 0, min = 0, unit = "s", doc = "age below which points stay" },
   },
   points = function(p, _, params)
     if p.age >= params.age and p.v:length() < params.speed then p:kill() end

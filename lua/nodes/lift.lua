@@ -6,10 +6,10 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "lift",
-  doc  = "Raises points by their heat, and cools them.",
+  doc  = "Raises points in proportion to their heat and cools them.",
   params = {
     strength = { "float", default = 1, min = 0, unit = "m/s²", doc = "acceleration at a heat of 1" },
-    cooling  = { "float", default = 0.5, min = 1e-3, unit = "s", doc = "time in which heat falls to 1/e" },
+    cooling  = { "float", default = 0.5, min = 1e-3, unit = "s", doc = "time in which the heat falls to 1/e" },
   },
   points = function(p, _, params)
     p.v = p.v + vec3(0, params.strength * p.heat * p.dt, 0)

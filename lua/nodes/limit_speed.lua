@@ -5,10 +5,10 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "limit_speed",
-  doc  = "Holds the speed of points between two bounds.",
+  doc  = "Keeps the speed of points within a range.",
   params = {
-    min = { "float", default = 0, min = 0, unit = "m/s", doc = "least speed of a moving point" },
-    max = { "float", default = math.huge, min = 0, max = math.huge, unit = "m/s", doc = "greatest speed" },
+    min = { "float", default = 0, min = 0, unit = "m/s", doc = "minimum speed of a moving point" },
+    max = { "float", default = math.huge, min = 0, max = math.huge, unit = "m/s", doc = "maximum speed" },
   },
   points = function(p, _, params)
     local speed = p.v:length()

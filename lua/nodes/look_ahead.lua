@@ -20,10 +20,10 @@ return rapid.node {
   name = "look_ahead",
   doc  = "Turns points aside before they hit a shape.",
   params = {
-    shape     = { "shape", required = true, doc = "a shape or a level set" },
-    time      = { "float", default = 1, min = 1e-6, unit = "s", doc = "how far ahead they see" },
-    clearance = { "float", default = 0.1, min = 0, unit = "m", doc = "from the surface at which they pass" },
-    strength  = { "float", default = 20, min = 0, unit = "m/s²", doc = "greatest acceleration" },
+    shape     = { "shape", required = true, doc = "shape or level set" },
+    time      = { "float", default = 1, min = 1e-6, unit = "s", doc = "time for which points look ahead" },
+    clearance = { "float", default = 0.1, min = 0, unit = "m", doc = "distance from the surface at which points pass" },
+    strength  = { "float", default = 20, min = 0, unit = "m/s²", doc = "maximum acceleration" },
   },
   points = function(p, _, params)
     local speed = p.v:length()

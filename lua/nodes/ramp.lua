@@ -5,11 +5,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "ramp",
-  doc  = "Draws an attribute from another by way of keys.",
+  doc  = "Computes an attribute from another through a ramp of keys.",
   params = {
-    from = { "read", default = "age", doc = "the attribute that is looked up" },
-    keys = { "ramp", default = {{0, {1, 1, 1}}, {1, {0, 0, 0}}}, doc = "{value of from, value of to}, rising" },
-    to   = { "write", default = "Cd", doc = "the attribute that is written" },
+    from = { "read", default = "age", doc = "attribute that is looked up, a vec3 by its length" },
+    keys = { "ramp", default = {{0, {1, 1, 1}}, {1, {0, 0, 0}}},
+             doc = "keys {value of from, value of to}, in rising order" },
+    to   = { "write", default = "Cd", doc = "attribute that is written" },
   },
   points = function(p, _, params)
     local x = p[params.from]

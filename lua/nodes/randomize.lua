@@ -7,10 +7,11 @@ return rapid.node {
   name = "randomize",
   doc  = "Gives each point its own random value of an attribute.",
   params = {
-    attribute = { "write", default = "pscale", doc = "a float" },
-    min       = { "float", default = 0, doc = "least value" },
-    max       = { "float", default = 1, doc = "greatest value" },
-    bias      = { "float", default = 1, min = 1e-3, doc = "1: all values alike" },
+    attribute = { "write", default = "pscale", doc = "float attribute that is written" },
+    min       = { "float", default = 0, doc = "smallest value" },
+    max       = { "float", default = 1, doc = "largest value" },
+    bias      = { "float", default = 1, min = 1e-3,
+                  doc = "exponent of the distribution: 1 is uniform, larger values favour min" },
   },
   points = function(p, _, params)
     p[params.attribute] = params.min + (params.max - params.min) * p:rand(1) ^ params.bias

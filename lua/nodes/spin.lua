@@ -5,11 +5,12 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "spin",
-  doc  = "Turns orient about an axis.",
+  doc  = "Turns orient about a fixed axis.",
   params = {
-    axis      = { "vec3", default = {0, 1, 0}, doc = "of the world, any length but zero" },
-    rate      = { "float", default = 360, unit = "deg/s", doc = "how fast" },
-    variation = { "float", default = 0, min = 0, doc = "part of the rate by which points differ from it" },
+    axis      = { "vec3", default = {0, 1, 0}, doc = "axis in world space, of any nonzero length" },
+    rate      = { "float", default = 360, unit = "deg/s", doc = "angular speed" },
+    variation = { "float", default = 0, min = 0,
+                  doc = "maximum random deviation of a point's rate, as a fraction of it" },
   },
   makes = { orient = {0, 0, 0, 1} },
   points = function(p, _, params)

@@ -5,11 +5,11 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "swirl",
-  doc  = "Turns points about an axis.",
+  doc  = "Accelerates points around an axis in proportion to their distance from it.",
   params = {
-    axis     = { "vec3", default = {0, 1, 0}, doc = "axis of rotation, any length but zero" },
-    center   = { "vec3", default = {0, 0, 0}, unit = "m", doc = "a place on the axis" },
-    strength = { "float", default = 1, unit = "1/s²", doc = "acceleration at 1 m from the axis" },
+    axis     = { "vec3", default = {0, 1, 0}, doc = "axis of rotation, of any nonzero length" },
+    center   = { "vec3", default = {0, 0, 0}, unit = "m", doc = "position on the axis" },
+    strength = { "float", default = 1, unit = "1/s²", doc = "acceleration per metre of distance from the axis" },
   },
   points = function(p, _, params)
     local n = params.axis:normalized()

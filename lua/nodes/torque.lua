@@ -5,10 +5,11 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "torque",
-  doc  = "Speeds up the turning of points.",
+  doc  = "Changes the angular velocity w of points by a torque.",
   params = {
-    torque  = { "vec3", default = {0, 0, 0}, unit = "N m", doc = "about its own direction" },
-    inertia = { "float", default = 0, min = 0, unit = "kg m²", doc = "moment of inertia; 0: of a solid sphere" },
+    torque  = { "vec3", default = {0, 0, 0}, unit = "N m", doc = "torque in world space" },
+    inertia = { "float", default = 0, min = 0, unit = "kg m²",
+                doc = "moment of inertia; 0 for that of a solid sphere" },
   },
   makes = { w = {0, 0, 0} },
   points = function(p, _, params)

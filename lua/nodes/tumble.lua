@@ -7,9 +7,9 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "tumble",
-  doc  = "Turns orient by each point's own angular velocity w.",
+  doc  = "Turns orient by the angular velocity w of each point.",
   params = {
-    drag = { "float", default = 0, min = 0, unit = "1/s", doc = "rate at which w falls" },
+    drag = { "float", default = 0, min = 0, unit = "1/s", doc = "rate at which w decreases" },
   },
   makes = { orient = {0, 0, 0, 1}, w = {0, 0, 0} },
   points = function(p, _, params)

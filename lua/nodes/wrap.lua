@@ -5,10 +5,10 @@ local rapid = require "rapid"
 
 return rapid.node {
   name = "wrap",
-  doc  = "Brings points that leave a box back on its other side.",
+  doc  = "Moves points that leave a box to its opposite side.",
   params = {
-    min = { "vec3", default = {-1, -1, -1}, unit = "m", doc = "least corner of the box" },
-    max = { "vec3", default = {1, 1, 1}, unit = "m", doc = "greatest corner of the box, above min on each axis" },
+    min = { "vec3", default = {-1, -1, -1}, unit = "m", doc = "lower corner of the box" },
+    max = { "vec3", default = {1, 1, 1}, unit = "m", doc = "upper corner of the box, above min on each axis" },
   },
   points = function(p, _, params)
     local min, size = params.min, params.max - params.min

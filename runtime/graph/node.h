@@ -4,7 +4,7 @@
 //       Vec3d g;
 //       static NodeType declare()
 //       {
-//           return node<Gravity>("gravity", "Accelerates all points alike.")
+//           return node<Gravity>("gravity", "Accelerates all points equally.")
 //               .param(&Gravity::g, "g", Vec3d(0, -9.81, 0), any_number(), "m/s²", "acceleration");
 //       }
 //       ...
@@ -59,7 +59,7 @@ public:
         else
             type_.make = [] { return std::make_unique<detail::OperatorOf<T>>(); };
         if constexpr (requires(T t) { t.group; })
-            param(&T::group, "group", Value(), any_number(), "", "acts on this group only");
+            param(&T::group, "group", Value(), any_number(), "", "limits the node to the points of this group");
     }
 
     // Declares a parameter stored in `field`, which needs no initialiser and may belong to a shared base. fallback:

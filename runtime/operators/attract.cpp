@@ -22,13 +22,16 @@ struct Attract {
 
     static NodeType declare()
     {
-        return node<Attract>("attract", "Draws points to a place, or to the surface of a shape.")
-            .param(&Attract::center, "center", Vec3d(0, 0, 0), any_number(), "m", "where to")
+        return node<Attract>("attract", "Attracts points to a position or to the surface of a shape.")
+            .param(&Attract::center, "center", Vec3d(0, 0, 0), any_number(), "m", "position that attracts the points")
             .param(&Attract::shape, "shape", Value(), any_number(), "",
-                   "to its surface, in place of center; also a mesh")
-            .param(&Attract::strength, "strength", 1.0, any_number(), "m/s² at 1 m", "acceleration; negative: away")
-            .param(&Attract::falloff, "falloff", 2.0, any_number(), "", "power of the distance by which it falls")
-            .param(&Attract::core, "core", 0.0, at_least(0), "m", "within about this distance it grows no more");
+                   "shape or mesh whose surface attracts the points, instead of center")
+            .param(&Attract::strength, "strength", 1.0, any_number(), "m/s²",
+                   "acceleration at a distance of 1 m; a negative value repels")
+            .param(&Attract::falloff, "falloff", 2.0, any_number(), "",
+                   "power of the distance with which the acceleration decreases")
+            .param(&Attract::core, "core", 0.0, at_least(0), "m",
+                   "distance below which the acceleration stops growing; with a shape, 0 lets the node choose it");
     }
 
     std::shared_ptr<const Force> dynamic(const Evaluation& now) const

@@ -12,11 +12,12 @@ struct Attribute {
 
     static NodeType declare()
     {
-        return node<Attribute>("attribute", "Gives attributes to points that do not have them; never overwrites.")
+        return node<Attribute>("attribute",
+                               "Gives attributes to points that do not have them and never overwrites values.")
             .param(&Attribute::attributes, "attributes", Value(), any_number(), "",
-                   "those whose names are parameters of nodes: { name = \"\" }")
+                   "values by name, for names that are also parameters of nodes: { name = \"\" }")
             .rest(&Attribute::values,
-                  "value of points that have none: a number is a float, {x, y, z} a vec3, a text a string");
+                  "initial value of the attribute: a number, a vec3 {x, y, z}, a quaternion {x, y, z, w} or a string");
     }
 
     static std::unique_ptr<Operator> make() { return std::make_unique<PointEditOf<Attribute>>(); }

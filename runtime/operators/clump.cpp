@@ -139,14 +139,14 @@ struct Clump {
 
     static NodeType declare()
     {
-        return node<Clump>("clump", "Sticks points together that touch, until they are torn apart.")
+        return node<Clump>("clump", "Bonds touching points until a force tears them apart.")
             .stage(Stage::ContactGrid)
             .stage(Stage::Constraints)
             .takes("pscale")
             .takes("mass")
             .param(&Clump::radius, "radius", Value(), at_least(0), "m",
-                   "of the points; the attribute pscale where they have it, else 0")
-            .param(&Clump::strength, "strength", 1.0, at_least(0), "N", "the pull that a bond bears");
+                   "radius of the points; the default is the attribute pscale, or 0 without it")
+            .param(&Clump::strength, "strength", 1.0, at_least(0), "N", "pull at which a bond breaks");
     }
 
     std::shared_ptr<const Constraint> dynamic(const Evaluation& now) const

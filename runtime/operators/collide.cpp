@@ -82,37 +82,37 @@ struct Collide {
 
     static NodeType declare()
     {
-        return node<Collide>("collide", "Keeps points out of a shape: they bounce, slide and come to rest on it.")
+        return node<Collide>("collide", "Keeps points out of a shape: they bounce, slide, stick or die on it.")
             .stage(Stage::Collision)
             .takes("pscale")
             .param(&Collide::shape, "shape", Value(), any_number(), "",
-                   "what the points collide with; a function of the frame may return nil, where there is nothing")
+                   "shape that points collide with; a function of the frame may return nil for no shape")
             .required()
             .or_nothing()
             .param(&Collide::transform, "transform", Value(), any_number(), "",
-                   "moves the shape: a motion, a function of the frame that returns one, or keys by frame")
+                   "motion of the shape, a function of the frame that returns one, or keys by frame")
             .param(&Collide::cut, "cut", Value(), any_number(), "",
-                   "frames to which the shape jumps: nothing is swept along on the way; found where not given")
+                   "frames to which the shape jumps without sweeping points along; by default jumps are detected")
             .param(&Collide::bounce, "bounce", 0.5, between(0, 1), "",
-                   "restitution: the part of the speed that is kept")
-            .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb's coefficient")
+                   "restitution: the fraction of the normal speed that remains after a contact")
+            .param(&Collide::friction, "friction", 0.0, at_least(0), "", "Coulomb coefficient of friction")
             .param(&Collide::radius, "radius", Value(), at_least(0), "m",
-                   "of the points; the attribute pscale, where that is 0 the radius of contact, else 0")
+                   "collision radius of the points; the default is pscale, or the radius of :contact if pscale is 0")
             .param(&Collide::method, "method", "continuous", any_number(), "",
-                   "on the path, at the time of impact; or after the step, by going back or out along the gradient")
+                   "continuous: contact at the time of impact; backtrack, project: correction after the step, back "
+                   "along the path or out along the gradient")
             .choices({"continuous", "backtrack", "project"})
             .param(&Collide::response, "response", "bounce", any_number(), "",
-                   "slide: without bounce; stick: held by the shape; die: killed")
+                   "effect of a contact: the point bounces, slides without a bounce, sticks to the shape, or dies")
             .choices({"bounce", "slide", "stick", "die"})
-            .param(
-                &Collide::adhesion, "adhesion", Value(), or_infinity(at_least(0)), "m/s²",
-                "what it takes to tear a point off that sticks or slides; where not given, no pull is enough for one "
-                "that sticks, and any for one that slides")
+            .param(&Collide::adhesion, "adhesion", Value(), or_infinity(at_least(0)), "m/s²",
+                   "acceleration that tears points off the surface; the default is infinite for points that stick, 0 "
+                   "for points that slide")
             .param(&Collide::viscosity, "viscosity", 0.0, at_least(0), "1/s",
-                   "at which the surface slows what slides on it")
+                   "rate at which the surface slows down points that slide on it")
             .param(&Collide::record, "record", false, at_least(0), "m/s",
-                   "writes contacts at least as fast to the hit attributes: hittotal, hitnum, hitpos, hitnml, hitv, "
-                   "hittime, hitimpulse, hitpath");
+                   "minimum speed of contacts that are written to the hit attributes (hittotal, hitpos, hitnml, ...), "
+                   "or false");
     }
 
     void check() const

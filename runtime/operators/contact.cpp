@@ -40,34 +40,34 @@ struct ContactNode {
 
     static NodeType declare()
     {
-        return node<ContactNode>("contact", "Points collide with each other, as spheres: sand, rubble, balls.")
+        return node<ContactNode>("contact", "Makes points collide with each other as spheres: sand, rubble, balls.")
             .stage(Stage::ContactGrid)
             .stage(Stage::Constraints)
             .takes("pscale")
             .takes("mass")
             .param(&ContactNode::radius, "radius", Value(), at_least(0), "m",
-                   "of the points; the attribute pscale where they have it, else 0")
+                   "radius of the points; the default is the attribute pscale, or 0 without it")
             .param(&ContactNode::bounce, "bounce", 0.0, between(0, 1), "",
-                   "restitution; of two points that differ the larger")
+                   "restitution between points; a pair uses the larger value of its points")
             .param(&ContactNode::friction, "friction", 0.0, at_least(0), "",
-                   "Coulomb's coefficient; of two points that differ the geometric mean")
-            .param(&ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
-                   "of the radii in one grid; where not given, half of the largest in it")
-            .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "", "the most grids for different radii")
+                   "Coulomb coefficient of friction; a pair uses the geometric mean of its points")
             .param(
-                &ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",
-                "a point counts as e^mass_scaling times lighter than what it stands on, against gravity: tall stacks "
-                "hold with few sub-steps, and flow less")
+                &ContactNode::max_difference, "max_difference", Value(), at_least(0), "m",
+                "largest difference of radii within one search grid; the default is half of the largest radius in it")
+            .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "",
+                   "maximum number of search grids for different radii")
+            .param(&ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",
+                   "makes a point count as e^mass_scaling times lighter than the one below it, so that tall stacks "
+                   "hold with few substeps")
             .param(&ContactNode::record, "record", false, any_number(), "",
-                   "writes the forces of contacts, with points and shapes, to the attributes normalforce and "
-                   "frictionforce (N, means over the frame) and contactnum")
+                   "writes contact forces to normalforce and frictionforce (N, mean over the frame), and their number "
+                   "to contactnum")
             .constant()
             .param(&ContactNode::spin, "spin", false, any_number(), "",
-                   "friction turns points, as solid spheres, by the attributes w (rad/s) and orient")
+                   "lets friction turn the points as solid spheres, with the attributes w (rad/s) and orient")
             .constant()
             .param(&ContactNode::rolling, "rolling", 0.0, at_least(0), "",
-                   "with spin: coefficient of rolling friction, a torque of at most rolling times the normal force "
-                   "and the radius; of two points the geometric mean");
+                   "coefficient of rolling friction, with spin; a pair uses the geometric mean of its points");
     }
 
     void check() const

@@ -27,19 +27,21 @@ struct Create {
 
     static NodeType declare()
     {
-        return node<Create>("create", "Starts a simulation; yields its points as Solve left them at the frame before.")
+        return node<Create>("create",
+                            "Starts a simulation and returns its points as Solve left them in the previous frame.")
             .kind(NodeKind::Source)
-            .param(&Create::fps, "fps", 24.0, above(0), "1/s", "frames a second")
+            .param(&Create::fps, "fps", 24.0, above(0), "1/s", "frames per second")
             .constant()
-            .param(&Create::start_frame, "start", 1.0, any_number(), "", "first frame: the initial state, at time 0")
+            .param(&Create::start_frame, "start", 1.0, any_number(), "",
+                   "number of the first frame, which is the initial state at time 0")
             .constant()
-            .param(&Create::seed, "seed", 0.0, at_least(0), "", "of all random numbers of this simulation")
+            .param(&Create::seed, "seed", 0.0, at_least(0), "", "seed of all random numbers of this simulation")
             .constant()
             .param(&Create::subframes, "subframes", 1.0, between(1, most_subframes), "",
-                   "times a frame that the whole graph is evaluated, scripts, emitters and colliders included; not the "
-                   "solver's sub-steps")
+                   "evaluations of the whole graph per frame, with scripts, emitters and colliders; not the solver's "
+                   "substeps")
             .constant()
-            .param(&Create::points, "points", Value(), any_number(), "", "initial points; their ids count from 0")
+            .param(&Create::points, "points", Value(), any_number(), "", "initial points")
             .constant();
     }
 

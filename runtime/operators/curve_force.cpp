@@ -75,17 +75,18 @@ struct CurveForce {
 
     static NodeType declare()
     {
-        return node<CurveForce>("curve_force", "Draws points to a curve, and drives them along it.")
+        return node<CurveForce>("curve_force", "Pulls points to a curve and drives them along it.")
             .param(&CurveForce::curve, "curve", Value(), any_number(), "m",
-                   "{{x, y, z}, ...} or points, in the order of the curve; or rapid.curve, which may move and deform: "
-                   "points are driven along it at its velocity")
+                   "list of positions {{x, y, z}, ...}, points, or a rapid.curve, which may move and deform")
             .required()
-            .param(&CurveForce::closed, "closed", false, any_number(), "", "from the last point to the first, too")
-            .param(&CurveForce::speed, "speed", 1.0, any_number(), "m/s", "along the curve; below 0: backwards")
-            .param(&CurveForce::pull, "pull", 10.0, at_least(0), "1/s²", "towards the curve, a metre of distance")
-            .param(&CurveForce::drag, "drag", 3.0, at_least(0), "1/s", "the rate at which points come to the speed")
+            .param(&CurveForce::closed, "closed", false, any_number(), "", "connects the last point to the first")
+            .param(&CurveForce::speed, "speed", 1.0, any_number(), "m/s",
+                   "speed along the curve; a negative value drives points backwards")
+            .param(&CurveForce::pull, "pull", 10.0, at_least(0), "1/s²",
+                   "acceleration towards the curve per metre of distance")
+            .param(&CurveForce::drag, "drag", 3.0, at_least(0), "1/s", "rate at which points reach the speed")
             .param(&CurveForce::radius, "radius", Value(), above(0), "m",
-                   "the distance at which the force has fallen to 0; without it, it does not fall");
+                   "distance at which the force has fallen to 0; without it the force does not decrease");
     }
 
     void check() const

@@ -27,7 +27,8 @@ struct Delete {
     static NodeType declare()
     {
         return node<Delete>("delete", "Removes the points of a group, or those for which `where` is true.")
-            .param(&Delete::where, "where", Value(), any_number(), "", "says of a point whether it is removed")
+            .param(&Delete::where, "where", Value(), any_number(), "",
+                   "function of a point that returns true for points to remove")
             .constant();
     }
 

@@ -95,23 +95,24 @@ struct Distance {
             .stage(Stage::Constraints)
             .takes("mass")
             .param(&Distance::pairs, "pairs", Value(), any_number(), "",
-                   "{{i, j}, ...}: by place, from 1, in the set that first enters the node")
+                   "pairs {{i, j}, ...} of indices from 1, in the set that first enters the node")
             .constant()
             .param(&Distance::within, "within", Value(), above(0), "m",
-                   "in place of pairs: all that are as near in the set that first enters the node")
+                   "distance up to which points form pairs, in the set that first enters the node; instead of pairs")
             .constant()
-            .param(&Distance::rest, "rest", Value(), at_least(0), "m", "the distance; where not given, that at first")
+            .param(&Distance::rest, "rest", Value(), at_least(0), "m",
+                   "distance of each pair; the default is its initial distance")
             .constant()
-            .param(&Distance::compliance, "compliance", 0.0, at_least(0), "m/N", "stretch by force; 0: rigid")
+            .param(&Distance::compliance, "compliance", 0.0, at_least(0), "m/N",
+                   "stretch per force; 0 makes a rigid rod")
             .constant()
             .param(
                 &Distance::strain, "strain", Value(), above(0), "",
-                "breaks a pair that is longer than its distance by more than this part of it; for springs, as no load "
-                "stretches a rigid pair")
+                "breaks a spring that is stretched by more than this fraction of its distance; no load stretches a rod")
             .constant()
             .param(&Distance::strength, "strength", Value(), above(0), "N",
-                   "breaks a pair that pulls with more; an impact on a collider or contact counts as a force over its "
-                   "sub-step, so that more sub-steps break more")
+                   "breaks a pair that pulls with a larger force; an impact counts as a force over its substep, so "
+                   "more substeps break more")
             .constant();
     }
 

@@ -15,10 +15,11 @@ struct Drag {
 
     static NodeType declare()
     {
-        return node<Drag>("drag", "Slows points down.")
-            .param(&Drag::linear, "linear", 0.0, at_least(0), "1/s", "rate of the drag that grows with the speed")
+        return node<Drag>("drag", "Slows points down by the resistance of still air.")
+            .param(&Drag::linear, "linear", 0.0, at_least(0), "1/s",
+                   "rate of the drag that is proportional to the speed")
             .param(&Drag::quadratic, "quadratic", 0.0, at_least(0), "1/m",
-                   "of the drag that grows with the square of the speed");
+                   "coefficient of the drag that is proportional to the square of the speed");
     }
 
     std::optional<Uniform> uniform() const

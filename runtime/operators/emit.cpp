@@ -71,46 +71,44 @@ struct Emit : Newborn {
 
     static NodeType declare()
     {
-        auto type = node<Emit>("emit", "Bears points from a surface, in a volume, along a curve or at points.");
+        auto type = node<Emit>("emit", "Emits points from a surface, a volume, a curve or points.");
         declare_source(type);
-        type.param(&Emit::rate, "rate", Value(), at_least(0), "1/s", "points born a second")
-            .param(&Emit::count, "count", Value(), at_least(0), "", "points born a frame")
+        type.param(&Emit::rate, "rate", Value(), at_least(0), "1/s", "births per second")
+            .param(&Emit::count, "count", Value(), at_least(0), "", "births per frame")
             .param(&Emit::impulse, "impulse", Value(), between(0, most_births), "",
-                   "points born in single frames, {[frame] = count}; at the first frame they have not moved yet")
-            .param(
-                &Emit::age, "age", Value(), at_least(0), "s",
-                "age at the end of the frame of birth, instead of `birth`; a number, {min, max}, or the source's own "
-                "attribute, rapid.attr");
+                   "births in single frames, {[frame] = count}; those of the first frame have not moved yet")
+            .param(&Emit::age, "age", Value(), at_least(0), "s",
+                   "age at the end of the frame of birth, instead of birth: a number, {min, max}, or an attribute of "
+                   "the source");
         declare_newborn(type, "the source's normal N");
         return type;
     }
 
     static void declare_source(Declaration<Emit>& type)
     {
-        type.param(&Emit::source, "source", Value(), any_number(), "", "what points are born from")
+        type.param(&Emit::source, "source", Value(), any_number(), "", "object that emits the points")
             .of_type("mesh, level set, shape, fog, curve or points")
             .required()
             .param(&Emit::from, "from", Value(), any_number(), "",
-                   "where on the source; without it \"points\" of points, else \"surface\". A mesh's points are its "
-                   "vertices. With count or impulse points are taken in order, so that as many births as points take "
-                   "each once; with rate at random")
+                   "part of the source that emits; the default is \"points\" for points, otherwise \"surface\" (the "
+                   "points of a mesh are its vertices)")
             .choices({"surface", "volume", "points"})
             .param(&Emit::density, "density", Value(), any_number(), "",
-                   "an attribute of the source's points, or of a mesh's vertices: births are drawn in proportion to it")
+                   "attribute of the source's points, or of a mesh's vertices or faces; births are distributed in "
+                   "proportion to it")
             .param(&Emit::source_group, "source_group", Value(), any_number(), "",
-                   "of a mesh: only its faces in this group bear")
+                   "group of a mesh's faces; only these emit")
             .constant()
             .param(&Emit::motion, "motion", "spline", any_number(), "",
-                   "the way of a moving source within a frame: a cubic through the frames around it, a straight line, "
-                   "or none, as if it were where it is at the frame's end, at rest")
+                   "path of a moving source within a frame: a cubic spline, a straight line, or none (at rest at the "
+                   "frame's end)")
             .choices({"spline", "linear", "none"})
             .param(
                 &Emit::alpha, "alpha", 0.5, any_number(), "",
-                "tangents of the spline, as a part of the way over two frames; a half keeps a uniform motion uniform")
-            .param(
-                &Emit::cut, "cut", Value(), between(-most_births, most_births), "",
-                "frames to which the source jumps from the frame before: nothing is born on the way. Where it is not "
-                "given, a step of 8 times those around it and half the source's size is a jump, and reported")
+                "tangents of the spline as a fraction of the path over two frames; 0.5 keeps a uniform motion uniform")
+            .param(&Emit::cut, "cut", Value(), between(-most_births, most_births), "",
+                   "frames to which the source jumps, without births in between; by default large jumps are detected "
+                   "and reported")
             .param(&Emit::inherit_velocity, "inherit_velocity", 1.0, any_number(), "",
                    "fraction of the source's velocity that is added");
     }

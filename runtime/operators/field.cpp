@@ -20,16 +20,16 @@ struct Field {
 
     static NodeType declare()
     {
-        return node<Field>("field", "Moves points by a grid of vectors: a force, or the velocity of a flow.")
+        return node<Field>("field", "Moves points by a grid of vectors: as a force, or as the velocity of a flow.")
             .takes("mass")
-            .param(&Field::grid, "grid", Value(), any_number(), "", "of vectors, by rapid.grid; also a sequence")
+            .param(&Field::grid, "grid", Value(), any_number(), "", "grid of vectors, or a sequence of them")
             .required()
             .param(&Field::mode, "mode", "force", any_number(), "",
-                   "what the vectors are: forces (N), or velocities (m/s) that points are drawn to")
+                   "meaning of the vectors: forces (N), or velocities (m/s) that points approach")
             .choices({"force", "velocity"})
-            .param(&Field::strength, "strength", 1.0, any_number(), "", "the vectors are multiplied by it")
+            .param(&Field::strength, "strength", 1.0, any_number(), "", "factor of the vectors")
             .param(&Field::drag, "drag", Value(), at_least(0), "1/s",
-                   "with velocities, the rate at which points come to them; 1 when not given");
+                   "rate at which points reach the velocities, with mode = \"velocity\"; the default is 1");
     }
 
     void check() const

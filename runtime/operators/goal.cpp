@@ -29,26 +29,27 @@ struct Goal {
 
     static NodeType declare()
     {
-        return node<Goal>("goal", "Takes points to places of their own in a given time.")
+        return node<Goal>("goal", "Moves points to target positions in a given time.")
             .varies()  // with the time since its start
             .reads("P")
             .writes("v")
             .takes("mass")
             .param(&Goal::to, "to", Value(), any_number(), "",
-                   "a mesh, a shape or points, at rest or moving; or rapid.attr \"NAME\", a vec3 of each point's own")
+                   "targets: a mesh, a shape or points, which may move, or a vec3 attribute, rapid.attr \"NAME\"")
             .required()
             .param(&Goal::by, "by", "id", any_number(), "",
-                   "which place a point gets: by its id (a point's, or a mesh's vertex), at random, or the nearest: of "
-                   "points one that is free")
+                   "choice of the target: by the id of a point or vertex, at random, or the nearest (of points, the "
+                   "nearest that is free)")
             .choices({"id", "nearest", "random"})
             .constant()
-            .param(&Goal::start, "start", 0.0, any_number(), "s", "when the way begins")
-            .param(&Goal::time, "time", 1.0, at_least(1e-6), "s", "that each point takes")
-            .param(&Goal::stagger, "stagger", 0.0, at_least(0), "s", "each begins by up to this later, at random")
-            .param(&Goal::clock, "clock", "scene", any_number(), "", "what start is counted by")
+            .param(&Goal::start, "start", 0.0, any_number(), "s", "time at which points begin to move")
+            .param(&Goal::time, "time", 1.0, at_least(1e-6), "s", "time that each point takes")
+            .param(&Goal::stagger, "stagger", 0.0, at_least(0), "s", "maximum random delay of a point's start")
+            .param(&Goal::clock, "clock", "scene", any_number(), "",
+                   "clock of start: the time of the scene, or the age of the point")
             .choices({"scene", "age"})
             .constant()
-            .param(&Goal::hold, "hold", true, any_number(), "", "points stay at their places afterwards");
+            .param(&Goal::hold, "hold", true, any_number(), "", "keeps points at their targets after they arrive");
     }
 
     void uses(Uses& uses) const

@@ -12,7 +12,7 @@ struct Gravity {
 
     static NodeType declare()
     {
-        return node<Gravity>("gravity", "Accelerates all points alike.")
+        return node<Gravity>("gravity", "Accelerates all points equally.")
             .param(&Gravity::g, "g", Vec3d(0, -9.81, 0), any_number(), "m/s²", "acceleration");
     }
 

@@ -45,11 +45,11 @@ struct Group {
     static NodeType declare()
     {
         return node<Group>("group", "Puts the points for which `where` is true into a group, in each frame.")
-            .param(&Group::name, "name", Value(), any_number(), "", "name of the group that is made")
+            .param(&Group::name, "name", Value(), any_number(), "", "name of the group")
             .required()
             .constant()
             .param(&Group::where, "where", Value(), any_number(), "",
-                   "says of a point whether it is in the group; without it all points are")
+                   "function of a point that returns true for members; without it all points are members")
             .constant();
     }
 

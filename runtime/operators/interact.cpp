@@ -19,28 +19,29 @@ struct Interact {
     static NodeType declare()
     {
         return node<Interact>("interact",
-                              "Moves points by their neighbours: apart, together, in step, without haste, aside.")
+                              "Moves points by their neighbours: separation, cohesion, alignment, drag, avoidance.")
             .stage(Stage::Forces)
             .takes("mass")
-            .param(&Interact::radius, "radius", Value(), above(0), "m", "within which points are neighbours")
+            .param(&Interact::radius, "radius", Value(), above(0), "m", "distance within which points are neighbours")
             .required()
             .param(&Interact::separation, "separation", 0.0, at_least(0), "m/s²",
-                   "drives them apart, most where they touch")
+                   "acceleration that separates neighbours, largest where they touch")
             .param(&Interact::cohesion, "cohesion", 0.0, at_least(0), "m/s²",
-                   "draws them together, most at half the radius")
+                   "acceleration that draws neighbours together, largest at half the radius")
             .param(&Interact::alignment, "alignment", 0.0, at_least(0), "1/s",
-                   "rate at which their velocities become equal")
+                   "rate at which the velocities of neighbours become equal")
             .param(&Interact::drag, "drag", 0.0, at_least(0), "1/s",
-                   "rate at which they stop approaching and parting; what turns about them goes on")
+                   "rate at which neighbours stop approaching and separating; rotation about each other is not damped")
             .param(&Interact::avoidance, "avoidance", 0.0, at_least(0), "m/s²",
-                   "turns them aside from those that they would come too near to")
-            .param(&Interact::foresight, "foresight", 1.0, above(0), "s", "how far ahead they look for that")
+                   "acceleration that turns points aside from others that they would pass too closely")
+            .param(&Interact::foresight, "foresight", 1.0, above(0), "s",
+                   "time for which points look ahead to avoid others")
             .param(&Interact::clearance, "clearance", Value(), above(0), "m",
-                   "at which they pass each other; half the radius, where it is not given")
+                   "distance at which points pass each other; the default is half the radius")
             .param(&Interact::view, "view", 360.0, between(0, 360), "deg",
-                   "the angle about their velocity within which they see others")
+                   "angle about its velocity in which a point sees others")
             .param(&Interact::most, "most", 0.0, between(0, 1e9), "",
-                   "neighbours that each heeds, the nearest of those that it sees; 0: all");
+                   "number of nearest visible neighbours to which a point reacts; 0 for all");
     }
 
     std::string couples(const Plan&, const PlannedNode&) const { return "acts between neighbours"; }

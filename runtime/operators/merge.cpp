@@ -122,7 +122,8 @@ private:
 struct Merge {
     static NodeType declare()
     {
-        return node<Merge>("merge", "Joins the points of several chains; what comes by several is taken once.")
+        return node<Merge>("merge",
+                           "Joins the points of several chains; a point that arrives by several chains is taken once.")
             .kind(NodeKind::Merge)
             .reads("id")
             .writes("id");

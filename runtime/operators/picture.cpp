@@ -71,19 +71,20 @@ void PictureNode::uses(Uses& uses) const
 
 NodeType PictureNode::declare()
 {
-    return node<PictureNode>("picture", "Says how points look in pictures; they stay as they are.")
+    return node<PictureNode>("picture", "Sets how points and shapes look in pictures, without changing any point.")
         .takes("age")
         .param(&PictureNode::blend, "blend", std::string("over"), any_number(), "",
-               "\"add\": points shine, add their light, and cast no shadow")
+               "over: nearer points hide others; add: points add their light and cast no shadow")
         .choices({"over", "add"})
         .param(&PictureNode::shutter, "shutter", 0.0, between(0, 1), "",
-               "part of the frame for which the picture is exposed: what moves leaves a streak")
+               "fraction of the frame for which the picture is exposed, so that moving points leave streaks")
         .param(&PictureNode::camera, "camera", Value(), any_number(), "",
-               "rapid.camera, a function of the frame that returns one, or keys; without it, fitted to the scene")
-        .param(&PictureNode::emitters, "emitters", true, any_number(), "", "whether shapes that bear points are shown")
-        .param(&PictureNode::colliders, "colliders", true, any_number(), "", "whether colliders and planes are shown")
+               "rapid.camera, a function of the frame that returns one, or keys; by default fitted to the scene")
+        .param(&PictureNode::emitters, "emitters", true, any_number(), "", "shows the shapes that emit points")
+        .param(&PictureNode::colliders, "colliders", true, any_number(), "",
+               "shows the shapes that points collide with")
         .param(&PictureNode::grid, "grid", true, any_number(), "",
-               "whether lines are drawn on the ground, unless a plane is the ground");
+               "draws lines on the ground, unless a plane of the scene is the ground");
 }
 
 RAPID_NODE(PictureNode);

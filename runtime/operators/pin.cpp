@@ -386,17 +386,16 @@ struct PinNode {
 
     static NodeType declare()
     {
-        return node<PinNode>("pin", "Holds points where they are, at a place, or on a body that moves.")
+        return node<PinNode>("pin", "Holds points at their initial position, at a target, or on a moving body.")
             .kind(NodeKind::Dynamic)
             .stage(Stage::Constraints)
             .takes("mass")
             .param(&PinNode::target, "target", Value(), any_number(), "m",
-                   "a place, rapid.attr \"NAME\" for each point's own, or a shape or mesh that moves or deforms, and "
-                   "carries "
-                   "them; where not given, where each point is first pinned")
+                   "position, rapid.attr, or moving shape or mesh that carries the points; the default is where a "
+                   "point is first pinned")
             .param(&PinNode::transform, "transform", Value(), any_number(), "",
-                   "carries the points: a motion, a function of the frame that returns one, or keys by frame")
-            .param(&PinNode::compliance, "compliance", 0.0, at_least(0), "m/N", "give by force; 0: rigid")
+                   "motion that carries the points, a function of the frame that returns one, or keys by frame")
+            .param(&PinNode::compliance, "compliance", 0.0, at_least(0), "m/N", "displacement per force; 0 is rigid")
             .constant();
     }
 

@@ -18,23 +18,23 @@ namespace rapid {
 
 NodeType Rasterize::declare()
 {
-    return node<Rasterize>("rasterize", "Writes the points as they are here as volumes, and passes them on.")
+    return node<Rasterize>("rasterize", "Writes the points as volumes to .vdb files and passes them on.")
         .varies()
         .stage(Stage::Writing)
         .param(&Rasterize::file, "file", Value(), any_number(), "",
-               "pattern of the .vdb file: #### is the frame; it has the grid density, and one for each attribute")
+               "pattern of the files, with #### for the frame; a file has the grid density and one grid per attribute")
         .required()
         .constant()
         .param(&Rasterize::voxel, "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
         .constant()
         .param(&Rasterize::radius, "radius", Value(), above(0), "m",
-               "over which a point is spread, at least a voxel; 1.5 voxels when not given")
+               "radius over which a point is spread, at least a voxel; the default is 1.5 voxels")
         .constant()
         .param(&Rasterize::weight, "weight", 1.0, at_least(0), "",
-               "what a point counts: the sum of density times volume is that of the weights")
+               "weight of a point; the integral of the density is the sum of the weights")
         .constant()
         .param(&Rasterize::attributes, "attributes", Value(), any_number(), "",
-               "vectors of which a grid has the mean of the points around, by their weights; {\"v\"} when not given")
+               "vec3 attributes, each written as a grid of its weighted mean; the default is {\"v\"}")
         .constant();
 }
 

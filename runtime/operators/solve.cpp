@@ -32,7 +32,7 @@ struct Solve {
 
     static NodeType declare()
     {
-        return node<Solve>("solve", "Advances the points by one frame: forces, motion, collision.")
+        return node<Solve>("solve", "Advances the points by one frame: forces, motion, collisions, constraints.")
             .kind(NodeKind::Solve)
             .stage(Stage::Integration)
             .stage(Stage::ErrorEstimate)
@@ -41,15 +41,16 @@ struct Solve {
             .takes("life")
             .takes("airresist")
             .takes("targetv")
-            .param(&Solve::substeps, "substeps", 1.0, between(1, most_substeps), "", "steps a frame")
+            .param(&Solve::substeps, "substeps", 1.0, between(1, most_substeps), "", "number of substeps per frame")
             .param(&Solve::iterations, "iterations", 1.0, between(1, most_iterations), "",
-                   "of the constraints, a sub-step")
+                   "iterations of the constraints per substep")
             .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
-                   "at rest, after which points with constraints sleep until something acts on them; math.huge: never")
-            .param(&Solve::tolerance, "tolerance", Value(), above(0), "m a frame",
-                   "each point takes as many sub-steps, twice as many and so on, as its own estimated error needs")
+                   "time at rest after which points with constraints sleep until something acts on them; math.huge for "
+                   "never")
+            .param(&Solve::tolerance, "tolerance", Value(), above(0), "m per frame",
+                   "maximum error per frame; each point takes 1, 2, 4, ... substeps, as its estimated error needs")
             .param(&Solve::max_substeps, "max_substeps", 64.0, between(1, most_substeps), "",
-                   "the most, with a tolerance")
+                   "maximum number of substeps, with a tolerance")
             .writes("P")
             .writes("v");
     }

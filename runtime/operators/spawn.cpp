@@ -85,38 +85,38 @@ struct Spawn : Newborn {
 
     static NodeType declare()
     {
-        auto type = node<Spawn>("spawn", "Bears points from those of another node, all the time or at events.");
+        auto type = node<Spawn>("spawn", "Emits points from the points of another node, continuously or at events.");
         type.counted_as("emit");
         declare_births(type);
-        declare_newborn(type, "N: the normal at a hit, else the parent's attribute, else its way");
+        declare_newborn(type, "N (of a hit, else the parent's N, else its direction of motion)");
         type.param(&Spawn::inherit, "inherit", Value(), any_number(), "",
-                   "names of attributes that the newborn have of their parents")
+                   "names of attributes that newborn points copy from their parent")
             .param(&Spawn::inherit_velocity, "inherit_velocity", 1.0, any_number(), "",
-                   "fraction of the parent's velocity at the birth that is added")
+                   "fraction of the parent's velocity that is added")
             .param(&Spawn::split, "split", false, any_number(), "",
-                   "those that are born together share the parent's mass and volume")
+                   "divides the parent's mass and volume among points that are born together")
             .param(&Spawn::kill_parent, "kill_parent", false, any_number(), "",
-                   "with on: a point that has borne is removed");
+                   "removes a parent after it has emitted at an event");
         return type;
     }
 
     static void declare_births(Declaration<Spawn>& type)
     {
-        type.param(&Spawn::from, "from", Value(), any_number(), "", "the node whose points are parents")
+        type.param(&Spawn::from, "from", Value(), any_number(), "", "node whose points are the parents")
             .required()
             .constant()
-            .param(&Spawn::source_group, "source_group", Value(), any_number(), "", "only parents in this group bear")
+            .param(&Spawn::source_group, "source_group", Value(), any_number(), "", "group of the parents that emit")
             .constant()
             .param(&Spawn::on, "on", Value(), any_number(), "",
-                   "births at an event, count of each (1), not all the time: \"hit\", \"death\", \"birth\", when a "
-                   "comparison of an attribute with a number (\"age > 0.5\", \"P.y < 0\") begins to hold, or a "
-                   "function of a point begins to be true")
+                   "event: \"hit\", \"death\", \"birth\", a comparison (\"age > 0.5\"), or a function of a point; "
+                   "without it births are continuous")
             .constant()
             .param(&Spawn::min_speed, "min_speed", Value(), at_least(0), "m/s",
-                   "with on = \"hit\": the least speed of approach")
-            .param(&Spawn::rate, "rate", Value(), at_least(0), "1/s", "points born a second by each parent")
-            .param(&Spawn::count, "count", Value(), at_least(0), "", "points born by each parent, a frame or an event")
-            .param(&Spawn::limit, "limit", Value(), at_least(0), "", "the most births of one parent");
+                   "minimum speed of approach, with on = \"hit\"")
+            .param(&Spawn::rate, "rate", Value(), at_least(0), "1/s", "births per second of each parent")
+            .param(&Spawn::count, "count", Value(), at_least(0), "",
+                   "births of each parent per frame, or per event (1 by default)")
+            .param(&Spawn::limit, "limit", Value(), at_least(0), "", "maximum number of births of one parent");
     }
 
     void uses(Uses& uses) const

@@ -34,12 +34,12 @@ struct Spring {
 
     static NodeType declare()
     {
-        return node<Spring>("spring", "Holds points with a spring to a place or to a shape.")
+        return node<Spring>("spring", "Pulls points to a position or a shape with a spring.")
             .takes("mass")
             .param(&Spring::target, "target", Vec3d(0, 0, 0), any_number(), "m",
-                   "a place, rapid.attr \"NAME\" for each point's own, or a shape")
-            .param(&Spring::stiffness, "stiffness", 1.0, at_least(0), "N/m", "force a metre")
-            .param(&Spring::damping, "damping", 0.0, at_least(0), "N s/m", "force by speed");
+                   "position, rapid.attr, or shape to which the spring pulls")
+            .param(&Spring::stiffness, "stiffness", 1.0, at_least(0), "N/m", "force per metre of distance")
+            .param(&Spring::damping, "damping", 0.0, at_least(0), "N s/m", "force per unit of speed");
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

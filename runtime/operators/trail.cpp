@@ -43,9 +43,10 @@ struct Trail {
 
     static NodeType declare()
     {
-        return node<Trail>("trail", "Keeps the last places of each point: trail1 is that of a frame ago, and so on.")
+        return node<Trail>("trail", "Records the positions of each point in its last frames as trail1, trail2, ...")
             .varies()
-            .param(&Trail::places, "places", 12.0, between(1, most_trail_places), "", "frames that a trail is long")
+            .param(&Trail::places, "places", 12.0, between(1, most_trail_places), "",
+                   "number of frames that are recorded")
             .constant();
     }
 

@@ -40,16 +40,16 @@ struct Transfer {
 
     static NodeType declare()
     {
-        return node<Transfer>("transfer", "Gives points the attributes of the nearest place of a mesh.")
+        return node<Transfer>("transfer", "Gives points the attributes of the nearest position on a mesh.")
             .reads("P")
-            .param(&Transfer::source, "source", Value(), any_number(), "", "at rest, moving or deforming")
+            .param(&Transfer::source, "source", Value(), any_number(), "", "mesh, which may move or deform")
             .required()
             .constant()
             .param(&Transfer::attributes, "attributes", Value(), any_number(), "",
-                   "names of the mesh's attributes, of vertices, corners or faces; all of them where none are given")
+                   "names of attributes of the mesh's vertices, corners or faces; the default is all")
             .constant()
             .param(&Transfer::distance, "distance", std::numeric_limits<double>::infinity(), or_infinity(at_least(0)),
-                   "m", "points that are farther away keep what they have");
+                   "m", "distance beyond which points keep their values");
     }
 
     void uses(Uses& uses) const

@@ -43,14 +43,14 @@ struct Turbulence {
 
     static NodeType declare()
     {
-        return node<Turbulence>("turbulence", "Pushes points along the swirls of a random field.")
+        return node<Turbulence>("turbulence", "Accelerates points by a random field of eddies.")
             .stage(Stage::Forces)
             .param(&Turbulence::amplitude, "amplitude", 1.0, any_number(), "m/s²", "root mean square acceleration")
-            .param(&Turbulence::size, "size", 1.0, above(0), "m", "of the largest swirls")
-            .param(&Turbulence::speed, "speed", 0.0, at_least(0), "1/s", "how fast the field changes")
+            .param(&Turbulence::size, "size", 1.0, above(0), "m", "size of the largest eddies")
+            .param(&Turbulence::speed, "speed", 0.0, at_least(0), "1/s", "rate at which the field changes")
             .param(&Turbulence::octaves, "octaves", 3.0, between(1, NoiseOptions::most_octaves), "",
-                   "each with swirls half as large and half as strong")
-            .param(&Turbulence::seed, "seed", 0.0, at_least(0), "", "of the field")
+                   "number of scales, each with eddies half as large and half as strong")
+            .param(&Turbulence::seed, "seed", 0.0, at_least(0), "", "seed of the field")
             .varies();
     }
 

@@ -14,10 +14,12 @@ struct Vortex {
 
     static NodeType declare()
     {
-        return node<Vortex>("vortex", "Drives points around an axis.")
-            .param(&Vortex::center, "center", Vec3d(0, 0, 0), any_number(), "m", "a place on the axis")
-            .param(&Vortex::axis, "axis", Vec3d(0, 1, 0), any_number(), "", "its direction, any length but zero")
-            .param(&Vortex::strength, "strength", 1.0, any_number(), "m/s²", "acceleration, counterclockwise");
+        return node<Vortex>("vortex", "Accelerates points around an axis.")
+            .param(&Vortex::center, "center", Vec3d(0, 0, 0), any_number(), "m", "position on the axis")
+            .param(&Vortex::axis, "axis", Vec3d(0, 1, 0), any_number(), "",
+                   "direction of the axis, of any nonzero length")
+            .param(&Vortex::strength, "strength", 1.0, any_number(), "m/s²",
+                   "acceleration, counterclockwise about the axis");
     }
 
     void check() const

@@ -13,9 +13,9 @@ struct Wind {
 
     static NodeType declare()
     {
-        return node<Wind>("wind", "Takes points along with the air.")
-            .param(&Wind::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "of the air")
-            .param(&Wind::drag, "drag", 1.0, at_least(0), "1/s", "the rate at which points come to its velocity");
+        return node<Wind>("wind", "Drags points along with moving air.")
+            .param(&Wind::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "velocity of the air")
+            .param(&Wind::drag, "drag", 1.0, at_least(0), "1/s", "rate at which points reach the velocity of the air");
     }
 
     std::optional<Uniform> uniform() const

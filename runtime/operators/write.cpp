@@ -14,13 +14,13 @@ struct Write {
 
     static NodeType declare()
     {
-        return node<Write>("write", "Writes the points as they are here, and passes them on.")
+        return node<Write>("write", "Writes the points to files and passes them on.")
             .varies()
             .stage(Stage::Writing)
-            .param(&Write::file, "file", Value(), any_number(), "", "pattern of the file: #### is the frame")
+            .param(&Write::file, "file", Value(), any_number(), "", "pattern of the files, with #### for the frame")
             .required()
             .param(&Write::attributes, "attributes", Value(), any_number(), "",
-                   "those that are written besides P, v and id; without it all are")
+                   "attributes that are written besides P, v and id; the default is all")
             .constant();
     }
 

@@ -250,7 +250,7 @@ describe("a constructor with arguments that nothing can be made of", function()
         "it must be an integer",
       ["rapid.mesh.torus { radius = 1, tube = 2 }"] = "tube of a mesh torus = 2 is out of range; it must be below " ..
         "its radius, 1",
-      ["rapid.mesh.from {}"] = "rapid.mesh.from: points is missing: {{x, y, z}, ...}",
+      ["rapid.mesh.from {}"] = "rapid.mesh.from: points is missing: positions {{x, y, z}, ...}",
       ["rapid.mesh.from { points = {{0, 0, 0}}, faces = {{1, 2, 3}} }"] = "rapid.mesh.from: face 1 has the corner " ..
         "2; corners are whole, from 1 to 1",
       ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { h = {1} } }"] =

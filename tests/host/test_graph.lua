@@ -136,7 +136,8 @@ return %s]]
       ["rapid.create {} :points('k')"] = ":points takes a name and a function, or a table { name = ..., kernel = ... }",
       ["rapid.create {} :points(function() end)"] = ":points takes a name and a function, or a table " ..
         "{ name = ..., kernel = ... }",
-      ["rapid.create {} :points { name = 'k' }"] = 'node "k": kernel is missing: function(p, frame)',
+      ["rapid.create {} :points { name = 'k' }"] =
+        'node "k": kernel is missing: function of a point, function(p, frame)',
       ["rapid.create {} :points { name = 'k', kernel = 3 }"] = 'node "k": kernel = 3 has the wrong type; ' ..
         "it must be a function of a point",
       ["rapid.create {} :merge()"] = ":merge takes another node: a:merge(b)",

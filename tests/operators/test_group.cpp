@@ -63,7 +63,7 @@ TEST_CASE("a group of no points is a group", "[group][extreme]")
 
 TEST_CASE("a group needs a name", "[group]")
 {
-    CHECK(error_of([] { NodeTest("group", {}); }) == "name is missing: name of the group that is made");
+    CHECK(error_of([] { NodeTest("group", {}); }) == "name is missing: name of the group");
     CHECK(error_of([] {
               NodeTest("group", {{"name", ""}});
           }) == "name = \"\" names no group; give it at least one letter");

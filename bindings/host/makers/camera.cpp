@@ -12,13 +12,13 @@ struct MakeCamera {
 
     static Maker declare()
     {
-        return maker<MakeCamera>("camera", "From where pictures are taken; what it leaves open is fitted.")
-            .param(&MakeCamera::position, "position", Value(), any_number(), "m", "its place")
-            .param(&MakeCamera::target, "target", Value(), any_number(), "m", "where it looks")
+        return maker<MakeCamera>("camera", "Returns a camera; missing fields are fitted to the scene.")
+            .param(&MakeCamera::position, "position", Value(), any_number(), "m", "position of the camera")
+            .param(&MakeCamera::target, "target", Value(), any_number(), "m", "position at the centre of the view")
             .param(&MakeCamera::fov, "fov", Value(), between(1, 170), "",
-                   "vertical angle of view, degrees; 35 without it")
+                   "vertical angle of view in degrees; the default is 35")
             .param(&MakeCamera::group, "group", Value(), any_number(), "",
-                   "a group of points that it frames and follows, in place of the scene");
+                   "group of points that the camera frames and follows, instead of the scene");
     }
 
     ObjectPtr make(MakeContext&) const

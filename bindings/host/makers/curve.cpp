@@ -28,12 +28,12 @@ struct CurveFrom {
 
     static Maker declare()
     {
-        return maker<CurveFrom>("curve.from", "A curve through places, or one that deforms.")
+        return maker<CurveFrom>("curve.from", "Returns a curve through positions, which may deform.")
             .param(&CurveFrom::points, "points", Value(), any_number(), "m",
-                   "{{x, y, z}, ...} or points, in the order of the curve; or a function of the frame that returns "
-                   "either, always as many")
+                   "list of positions {{x, y, z}, ...}, points, or a function of the frame that returns either, always "
+                   "with the same number")
             .required()
-            .param(&CurveFrom::closed, "closed", false, any_number(), "", "from the last point to the first, too");
+            .param(&CurveFrom::closed, "closed", false, any_number(), "", "connects the last point to the first");
     }
     ObjectPtr make(MakeContext&) const { return points.curves(closed); }
 };
@@ -107,9 +107,9 @@ struct ReadCurve : SequenceOptions {
             maker<ReadCurve>("curve.read", "Reads curves from a file of points: the lines of an .obj, or all points.");
         declaration
             .param(&ReadCurve::path, "path", Value(), any_number(), "",
-                   "relative to the graph file; with #### or $F4 in it a file for each frame: a curve that deforms")
+                   "path, relative to the graph file; with #### or $F4 a file for each frame, for a curve that deforms")
             .required()
-            .param(&ReadCurve::closed, "closed", false, any_number(), "", "from the last point to the first, too");
+            .param(&ReadCurve::closed, "closed", false, any_number(), "", "connects the last point to the first");
         return SequenceOptions::declare(declaration);
     }
     ObjectPtr make(MakeContext& context) const

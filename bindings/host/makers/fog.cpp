@@ -10,8 +10,8 @@ struct ReadFog : GridFiles {
     static Maker declare()
     {
         auto declaration =
-            maker<ReadFog>("fog.read", "Reads a fog, in which points are born by density, from a .vdb file.");
-        return GridFiles::declare(declaration, "its name; the only fog of floats, when not given");
+            maker<ReadFog>("fog.read", "Reads a fog, which emits points by its density, from a .vdb file.");
+        return GridFiles::declare(declaration, "name of the grid; the default is the only grid of floats in the file");
     }
     ObjectPtr make(MakeContext& context) const { return make_with<DensityGrid>(context, read_density_grid); }
 };
@@ -20,7 +20,8 @@ RAPID_MAKER(ReadFog);
 struct FogFromPoints : PointsOfGrid {
     static Maker declare()
     {
-        auto declaration = maker<FogFromPoints>("fog.from_points", "The density of points: their weights by volume.");
+        auto declaration =
+            maker<FogFromPoints>("fog.from_points", "Returns the density of points: their weights per volume.");
         PointsOfGrid::declare(declaration);
         return declaration;
     }

@@ -15,7 +15,7 @@ struct ReadGrid : GridFiles {
     static Maker declare()
     {
         auto declaration = maker<ReadGrid>("grid.read", "Reads a grid of vectors from a .vdb file.");
-        return GridFiles::declare(declaration, "its name; the only grid of vectors, when not given");
+        return GridFiles::declare(declaration, "name of the grid; the default is the only grid of vectors in the file");
     }
     ObjectPtr make(MakeContext& context) const { return make_with<VectorGrid>(context, read_vector_grid); }
 };
@@ -26,9 +26,11 @@ struct GridFromPoints : PointsOfGrid {
 
     static Maker declare()
     {
-        auto declaration = maker<GridFromPoints>("grid.from_points", "The mean of a vec3 of points, by their weights.");
+        auto declaration = maker<GridFromPoints>("grid.from_points",
+                                                 "Returns a grid of the weighted mean of a vec3 attribute of points.");
         PointsOfGrid::declare(declaration);
-        declaration.param(&GridFromPoints::attribute, "attribute", std::string("v"), any_number(), "", "a vec3");
+        declaration.param(&GridFromPoints::attribute, "attribute", std::string("v"), any_number(), "",
+                          "vec3 attribute");
         return declaration;
     }
     ObjectPtr make(MakeContext&) const
@@ -58,10 +60,10 @@ struct WriteGrids {
     static Maker declare()
     {
         return maker<WriteGrids>("grid.write", "Writes fogs and grids of vectors to a .vdb file, in a run.")
-            .param(&WriteGrids::path, "path", Value(), any_number(), "", "relative to the current folder")
+            .param(&WriteGrids::path, "path", Value(), any_number(), "", "path, relative to the current folder")
             .required()
             .param(&WriteGrids::grids, "grids", Value(), any_number(), "",
-                   "{ density = fog, v = grid }: their names in the file")
+                   "grids by their name in the file, { density = fog, v = grid }")
             .required();
     }
     ObjectPtr make(MakeContext& context) const
@@ -102,15 +104,16 @@ struct GridFrom {
 
     static Maker declare()
     {
-        return maker<GridFrom>("grid.from", "A grid of vectors by a function of the place.")
-            .param(&GridFrom::at, "at", Value(), any_number(), "", "asked at each node of the lattice, once")
+        return maker<GridFrom>("grid.from", "Returns a grid of vectors from a function of the position.")
+            .param(&GridFrom::at, "at", Value(), any_number(), "",
+                   "function of the position, called once at each node of the lattice")
             .required()
             .param(&GridFrom::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
-            .param(&GridFrom::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle")
-            .param(&GridFrom::voxel, "voxel", 0.1, at_least(least_voxel), "m", "between nodes")
-            .param(&GridFrom::origin, "origin", Value(), any_number(), "m", "the lowest corner")
+            .param(&GridFrom::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre")
+            .param(&GridFrom::voxel, "voxel", 0.1, at_least(least_voxel), "m", "distance between nodes")
+            .param(&GridFrom::origin, "origin", Value(), any_number(), "m", "lowest corner")
             .internal()
-            .param(&GridFrom::nodes, "nodes", Value(), at_least(1), "", "along each axis")
+            .param(&GridFrom::nodes, "nodes", Value(), at_least(1), "", "number of nodes along each axis")
             .internal();
     }
     ObjectPtr make(MakeContext&) const

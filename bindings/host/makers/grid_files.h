@@ -17,8 +17,9 @@ struct GridFiles : SequenceOptions {
     static Maker declare(MakerDeclaration<T>& declaration, const std::string& grid_doc)
     {
         declaration
-            .param(static_cast<std::string T::*>(&T::path), "path", Value(), any_number(), "",
-                   "relative to the graph file; with #### or $F4 in it a sequence, a file for each frame or for some")
+            .param(
+                static_cast<std::string T::*>(&T::path), "path", Value(), any_number(), "",
+                "path, relative to the graph file; with #### or $F4 a sequence with a file for each frame or for some")
             .required();
         declaration.param(static_cast<std::string T::*>(&T::grid), "grid", Value(), any_number(), "", grid_doc);
         return SequenceOptions::declare(declaration);

@@ -32,7 +32,7 @@ struct Grid {
         declaration
             .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
             .param(static_cast<double T::*>(&T::half_width), "half_width", 3.0, at_least(1.5), "voxels",
-                   "of the band, on each side of the surface");
+                   "width of the band on each side of the surface");
     }
 };
 
@@ -62,8 +62,9 @@ struct FromMesh : Grid {
     static Maker declare()
     {
         auto declaration = maker<FromMesh>(
-            "levelset.from_mesh", "The distance to a closed mesh; where that moves or deforms, a collider that does.");
-        declaration.param(&FromMesh::mesh, "mesh", Value(), any_number(), "", "closed").required();
+            "levelset.from_mesh",
+            "Returns the level set of a closed mesh; a mesh that moves or deforms gives a shape that does.");
+        declaration.param(&FromMesh::mesh, "mesh", Value(), any_number(), "", "closed mesh").required();
         Grid::declare(declaration);
         return declaration;
     }
@@ -99,9 +100,9 @@ struct SphereLevelSet : Grid {
 
     static Maker declare()
     {
-        auto declaration = maker<SphereLevelSet>("levelset.sphere", "A sphere.");
-        declaration.param(&SphereLevelSet::radius, "radius", 1.0, above(0), "m", "of the sphere")
-            .param(&SphereLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        auto declaration = maker<SphereLevelSet>("levelset.sphere", "Returns a level set of a sphere.");
+        declaration.param(&SphereLevelSet::radius, "radius", 1.0, above(0), "m", "radius of the sphere")
+            .param(&SphereLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
         Grid::declare(declaration);
         return declaration;
     }
@@ -114,9 +115,9 @@ struct BoxLevelSet : Grid {
 
     static Maker declare()
     {
-        auto declaration = maker<BoxLevelSet>("levelset.box", "A box.");
+        auto declaration = maker<BoxLevelSet>("levelset.box", "Returns a level set of a box.");
         declaration.param(&BoxLevelSet::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
-            .param(&BoxLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+            .param(&BoxLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
         Grid::declare(declaration);
         return declaration;
     }
@@ -135,11 +136,12 @@ struct TorusLevelSet : Grid {
 
     static Maker declare()
     {
-        auto declaration = maker<TorusLevelSet>("levelset.torus", "A torus about the y axis.");
+        auto declaration = maker<TorusLevelSet>("levelset.torus", "Returns a level set of a torus about the y axis.");
         declaration
-            .param(&TorusLevelSet::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
+            .param(&TorusLevelSet::radius, "radius", 1.0, above(0), "m",
+                   "distance from the axis to the centre of the tube")
             .param(&TorusLevelSet::tube, "tube", 0.25, above(0), "m", "radius of the tube")
-            .param(&TorusLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+            .param(&TorusLevelSet::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
         Grid::declare(declaration);
         return declaration;
     }
@@ -153,10 +155,12 @@ struct FromPoints : Grid {
 
     static Maker declare()
     {
-        auto declaration = maker<FromPoints>("levelset.from_points", "The balls around points.");
-        declaration.param(&FromPoints::points, "points", Value(), any_number(), "", "their middles").required();
+        auto declaration =
+            maker<FromPoints>("levelset.from_points", "Returns the level set of the union of spheres around points.");
+        declaration.param(&FromPoints::points, "points", Value(), any_number(), "", "centres of the spheres")
+            .required();
         declaration.param(&FromPoints::radius, "radius", Value(), above(0), "m",
-                          "of the balls; the attribute pscale where the points have it");
+                          "radius of the spheres; the default is the attribute pscale");
         Grid::declare(declaration);
         return declaration;
     }
@@ -182,12 +186,14 @@ struct CombineLevelSets {
 
     static Maker declare()
     {
-        return maker<CombineLevelSets>("levelset.combine", "The union, intersection or difference of two level sets.")
-            .param(&CombineLevelSets::levelset, "levelset", Value(), any_number(), "", "whose voxels the result has")
+        return maker<CombineLevelSets>("levelset.combine",
+                                       "Returns the union, intersection or difference of two level sets.")
+            .param(&CombineLevelSets::levelset, "levelset", Value(), any_number(), "",
+                   "level set whose voxels the result has")
             .required()
-            .param(&CombineLevelSets::other, "other", Value(), any_number(), "", "the second")
+            .param(&CombineLevelSets::other, "other", Value(), any_number(), "", "second level set")
             .required()
-            .param(&CombineLevelSets::how, "how", Value(), any_number(), "", "which")
+            .param(&CombineLevelSets::how, "how", Value(), any_number(), "", "operation")
             .required();
     }
     ObjectPtr make(MakeContext& context) const
@@ -207,10 +213,11 @@ struct OffsetLevelSet {
 
     static Maker declare()
     {
-        return maker<OffsetLevelSet>("levelset.offset", "The surface moved along its normal.")
-            .param(&OffsetLevelSet::levelset, "levelset", Value(), any_number(), "", "what to grow")
+        return maker<OffsetLevelSet>("levelset.offset", "Moves the surface along its normal.")
+            .param(&OffsetLevelSet::levelset, "levelset", Value(), any_number(), "", "level set to grow")
             .required()
-            .param(&OffsetLevelSet::metres, "metres", Value(), any_number(), "m", "outwards; inwards where below 0")
+            .param(&OffsetLevelSet::metres, "metres", Value(), any_number(), "m",
+                   "distance outwards; a negative value moves the surface inwards")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return offset_level_set(levelset, metres); }
@@ -224,10 +231,11 @@ struct SmoothLevelSet {
     static Maker declare()
     {
         return maker<SmoothLevelSet>("levelset.smooth", "Rounds edges and fills creases.")
-            .param(&SmoothLevelSet::levelset, "levelset", Value(), any_number(), "", "what to smooth")
+            .param(&SmoothLevelSet::levelset, "levelset", Value(), any_number(), "", "level set to smooth")
             .required()
-            .param(&SmoothLevelSet::width, "width", 1.0, between(1, 64), "voxels", "of the filter")
-            .param(&SmoothLevelSet::iterations, "iterations", 1.0, between(1, 1000), "", "times that it is applied");
+            .param(&SmoothLevelSet::width, "width", 1.0, between(1, 64), "voxels", "width of the filter")
+            .param(&SmoothLevelSet::iterations, "iterations", 1.0, between(1, 1000), "",
+                   "number of times that the filter is applied");
     }
     ObjectPtr make(MakeContext&) const { return smooth_level_set(levelset, width, iterations); }
 };
@@ -239,8 +247,8 @@ struct ResampleLevelSet {
 
     static Maker declare()
     {
-        return maker<ResampleLevelSet>("levelset.resample", "The same surface on voxels of another size.")
-            .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "what to resample")
+        return maker<ResampleLevelSet>("levelset.resample", "Returns the same surface with voxels of another size.")
+            .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "level set to resample")
             .required()
             .param(&ResampleLevelSet::voxel, "voxel", Value(), at_least(least_voxel), "m", "edge of a voxel")
             .required();
@@ -252,8 +260,9 @@ RAPID_MAKER(ResampleLevelSet);
 struct ReadLevelSet : GridFiles {
     static Maker declare()
     {
-        auto declaration = maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file, or a sequence.");
-        return GridFiles::declare(declaration, "its name; the only level set, when not given");
+        auto declaration =
+            maker<ReadLevelSet>("levelset.read", "Reads a level set from a .vdb file, or a sequence of them.");
+        return GridFiles::declare(declaration, "name of the grid; the default is the only level set in the file");
     }
     ObjectPtr make(MakeContext& context) const
     {
@@ -276,10 +285,10 @@ struct LevelSetOfFrame {
 
     static Maker declare()
     {
-        return maker<LevelSetOfFrame>("levelset.at", "The file of a frame of a sequence of level sets.")
-            .param(&LevelSetOfFrame::levelset, "levelset", Value(), any_number(), "", "the sequence")
+        return maker<LevelSetOfFrame>("levelset.at", "Returns the level set of one frame of a sequence.")
+            .param(&LevelSetOfFrame::levelset, "levelset", Value(), any_number(), "", "sequence")
             .required()
-            .param(&LevelSetOfFrame::frame, "frame", Value(), any_number(), "", "its number")
+            .param(&LevelSetOfFrame::frame, "frame", Value(), any_number(), "", "number of the frame")
             .required();
     }
     // Returns null at a frame without a level set: a function of the frame then returns nil.
@@ -294,11 +303,11 @@ struct WriteLevelSet {
     static Maker declare()
     {
         return maker<WriteLevelSet>("levelset.write", "Writes a level set to a .vdb file, in a run.")
-            .param(&WriteLevelSet::levelset, "levelset", Value(), any_number(), "", "what to write")
+            .param(&WriteLevelSet::levelset, "levelset", Value(), any_number(), "", "level set to write")
             .required()
-            .param(&WriteLevelSet::path, "path", Value(), any_number(), "", "relative to the current folder")
+            .param(&WriteLevelSet::path, "path", Value(), any_number(), "", "path, relative to the current folder")
             .required()
-            .param(&WriteLevelSet::grid, "grid", std::string("surface"), any_number(), "", "its name in the file");
+            .param(&WriteLevelSet::grid, "grid", std::string("surface"), any_number(), "", "name in the file");
     }
     ObjectPtr make(MakeContext& context) const
     {

@@ -16,10 +16,11 @@ struct ReadMesh : SequenceOptions {
 
     static Maker declare()
     {
-        auto declaration = maker<ReadMesh>("mesh.read", "Reads OBJ, PLY, STL or glTF, or a sequence of such files.");
+        auto declaration =
+            maker<ReadMesh>("mesh.read", "Reads a mesh from OBJ, PLY, STL or glTF, or from a sequence of such files.");
         declaration
             .param(&ReadMesh::path, "path", Value(), any_number(), "",
-                   "relative to the graph file; with #### or $F4 in it a deforming mesh, a file for each frame")
+                   "path, relative to the graph file; with #### or $F4 a file for each frame, for a mesh that deforms")
             .required();
         return SequenceOptions::declare(declaration);
     }
@@ -59,10 +60,11 @@ struct SphereMesh {
 
     static Maker declare()
     {
-        return maker<SphereMesh>("mesh.sphere", "A sphere.")
-            .param(&SphereMesh::radius, "radius", 1.0, above(0), "m", "of the sphere")
-            .param(&SphereMesh::divisions, "divisions", 24.0, between(3, 4096), "", "around the equator")
-            .param(&SphereMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        return maker<SphereMesh>("mesh.sphere", "Returns a mesh of a sphere.")
+            .param(&SphereMesh::radius, "radius", 1.0, above(0), "m", "radius of the sphere")
+            .param(&SphereMesh::divisions, "divisions", 24.0, between(3, 4096), "",
+                   "number of divisions around the equator")
+            .param(&SphereMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
     }
     ObjectPtr make(MakeContext&) const { return make_sphere(radius, divisions, center); }
 };
@@ -78,9 +80,9 @@ struct BoxMesh {
 
     static Maker declare()
     {
-        return maker<BoxMesh>("mesh.box", "A box.")
+        return maker<BoxMesh>("mesh.box", "Returns a mesh of a box.")
             .param(&BoxMesh::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
-            .param(&BoxMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+            .param(&BoxMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
     }
     ObjectPtr make(MakeContext&) const
     {
@@ -97,10 +99,10 @@ struct GridMesh {
 
     static Maker declare()
     {
-        return maker<GridMesh>("mesh.grid", "A flat grid, facing up.")
-            .param(&GridMesh::size, "size", Value(), any_number(), "m", "edge lengths {x, z} (1, 1)")
-            .param(&GridMesh::divisions, "divisions", 10.0, between(1, 4096), "", "cells along each edge")
-            .param(&GridMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+        return maker<GridMesh>("mesh.grid", "Returns a flat grid that faces up.")
+            .param(&GridMesh::size, "size", Value(), any_number(), "m", "edge lengths {x, z}; the default is {1, 1}")
+            .param(&GridMesh::divisions, "divisions", 10.0, between(1, 4096), "", "number of cells along each edge")
+            .param(&GridMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
     }
     ObjectPtr make(MakeContext&) const
     {
@@ -118,12 +120,12 @@ struct TorusMesh {
 
     static Maker declare()
     {
-        return maker<TorusMesh>("mesh.torus", "A torus about the y axis.")
-            .param(&TorusMesh::radius, "radius", 1.0, above(0), "m", "from the axis to the middle of the tube")
+        return maker<TorusMesh>("mesh.torus", "Returns a mesh of a torus about the y axis.")
+            .param(&TorusMesh::radius, "radius", 1.0, above(0), "m", "distance from the axis to the centre of the tube")
             .param(&TorusMesh::tube, "tube", 0.25, above(0), "m", "radius of the tube")
             .param(&TorusMesh::divisions, "divisions", 24.0, between(3, 4096), "",
-                   "around the axis; around the tube as many as make edges of that length")
-            .param(&TorusMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+                   "number of divisions around the axis; those around the tube get edges of the same length")
+            .param(&TorusMesh::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
     }
     ObjectPtr make(MakeContext&) const { return make_torus(radius, tube, divisions, center); }
 };
@@ -165,13 +167,15 @@ struct MeshFrom {
 
     static Maker declare()
     {
-        return maker<MeshFrom>("mesh.from", "A mesh from a list of places and a list of faces.")
-            .param(&MeshFrom::points, "points", Value(), any_number(), "m", "{{x, y, z}, ...}")
+        return maker<MeshFrom>("mesh.from", "Returns a mesh from a list of positions and a list of faces.")
+            .param(&MeshFrom::points, "points", Value(), any_number(), "m", "positions {{x, y, z}, ...}")
             .required()
-            .param(&MeshFrom::faces, "faces", Value(), any_number(), "", "{{1, 2, 3}, ...}: places in `points`, from 1")
+            .param(&MeshFrom::faces, "faces", Value(), any_number(), "",
+                   "faces {{1, 2, 3}, ...} of indices in points, from 1")
             .required()
             .param(&MeshFrom::values, "values", Value(), any_number(), "",
-                   "{ Cd = {{r, g, b}, ...}, heat = {...} }: of each of `points`, for what is born on the mesh");
+                   "values at each of points, { Cd = {{r, g, b}, ...}, heat = {...} }, for points that are born on the "
+                   "mesh");
     }
     ObjectPtr make(MakeContext&) const
     {

@@ -19,8 +19,8 @@ struct Translate {
 
     static Maker declare()
     {
-        return maker<Translate>("motion.translate", "Moves along a vector.")
-            .param(&Translate::by, "by", Value(), any_number(), "m", "the way")
+        return maker<Translate>("motion.translate", "Returns a translation by a vector.")
+            .param(&Translate::by, "by", Value(), any_number(), "m", "translation")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return constant_motion({by}); }
@@ -33,10 +33,10 @@ struct Rotate {
 
     static Maker declare()
     {
-        return maker<Rotate>("motion.rotate", "Turns about an axis through the origin.")
-            .param(&Rotate::axis, "axis", Value(), any_number(), "", "any length but zero")
+        return maker<Rotate>("motion.rotate", "Returns a rotation about an axis through the origin.")
+            .param(&Rotate::axis, "axis", Value(), any_number(), "", "axis of any nonzero length")
             .required()
-            .param(&Rotate::angle, "degrees", Value(), any_number(), "deg", "the angle, by the right-hand rule")
+            .param(&Rotate::angle, "degrees", Value(), any_number(), "deg", "angle by the right-hand rule")
             .required();
     }
     ObjectPtr make(MakeContext&) const
@@ -53,8 +53,8 @@ struct Scale {
 
     static Maker declare()
     {
-        return maker<Scale>("motion.scale", "Scales about the origin.")
-            .param(&Scale::by, "factor", Value(), above(0), "", "of all lengths")
+        return maker<Scale>("motion.scale", "Returns a scaling about the origin.")
+            .param(&Scale::by, "factor", Value(), above(0), "", "factor of all lengths")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return constant_motion({Vec3d::Zero(), Eigen::Quaterniond::Identity(), by}); }
@@ -66,10 +66,10 @@ struct Product {
 
     static Maker declare()
     {
-        return maker<Product>("motion.product", "The right motion, then the left one.")
-            .param(&Product::first, "first", Value(), any_number(), "", "done last")
+        return maker<Product>("motion.product", "Returns the right motion followed by the left one.")
+            .param(&Product::first, "first", Value(), any_number(), "", "motion that is applied last")
             .required()
-            .param(&Product::second, "second", Value(), any_number(), "", "done first")
+            .param(&Product::second, "second", Value(), any_number(), "", "motion that is applied first")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return product(first, second); }
@@ -82,11 +82,12 @@ struct Transform {
 
     static Maker declare()
     {
-        return maker<Transform>("transform", "A mesh, a shape, a curve or points, moved.")
-            .param(&Transform::object, "object", Value(), any_number(), "", "a mesh, a shape, a curve or points")
+        return maker<Transform>("transform", "Moves a mesh, a shape, a curve or points.")
+            .param(&Transform::object, "object", Value(), any_number(), "", "mesh, shape, curve or points")
             .required()
             .param(&Transform::motion, "motion", Value(), any_number(), "",
-                   "rapid.translate, .rotate, .scale, or a product; a function of the frame that returns one; keys")
+                   "rapid.translate, .rotate, .scale or a product of them, a function of the frame that returns one, "
+                   "or keys")
             .required();
     }
 

@@ -29,14 +29,14 @@ struct ReadPoints : SequenceOptions {
 
     static Maker declare()
     {
-        auto declaration =
-            maker<ReadPoints>("points.read", "Reads points from a file that Rapid can write, or a sequence.");
+        auto declaration = maker<ReadPoints>(
+            "points.read", "Reads points from a file of any format that Rapid reads, or from a sequence.");
         declaration
             .param(&ReadPoints::path, "path", Value(), any_number(), "",
-                   "relative to the graph file; with #### or $F4 in it a file for each frame, and the result is a "
+                   "path, relative to the graph file; with #### or $F4 a file for each frame, and the result is a "
                    "function of the frame")
             .required();
-        declaration.param(&ReadPoints::frame, "frame", Value(), any_number(), "", "of a sequence").internal();
+        declaration.param(&ReadPoints::frame, "frame", Value(), any_number(), "", "frame of a sequence").internal();
         return SequenceOptions::declare(declaration);
     }
     ObjectPtr make(MakeContext& context) const
@@ -85,10 +85,10 @@ struct GridPoints {
 
     static Maker declare()
     {
-        return maker<GridPoints>("points.grid", "Points at the centres of the cells of a box.")
+        return maker<GridPoints>("points.grid", "Returns points at the centres of the cells of a box.")
             .param(&GridPoints::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
             .param(&GridPoints::spacing, "spacing", 0.1, above(0), "m", "edge of a cell")
-            .param(&GridPoints::center, "center", Vec3d(0, 0, 0), any_number(), "m", "its middle");
+            .param(&GridPoints::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre");
     }
     ObjectPtr make(MakeContext&) const
     {
@@ -123,8 +123,9 @@ struct PointsFrom {
 
     static Maker declare()
     {
-        return maker<PointsFrom>("points.from", "Points from lists of values by attribute.")
-            .param(&PointsFrom::columns, "columns", Value(), any_number(), "", "{ P = {{x, y, z}, ...}, ANY = {...} }")
+        return maker<PointsFrom>("points.from", "Returns points from lists of values by attribute.")
+            .param(&PointsFrom::columns, "columns", Value(), any_number(), "",
+                   "lists of values by attribute, { P = {{x, y, z}, ...}, ANY = {...} }")
             .required();
     }
 

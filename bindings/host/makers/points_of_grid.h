@@ -23,14 +23,14 @@ struct PointsOfGrid {
     {
         declaration
             .param(static_cast<std::shared_ptr<const PointsObject> T::*>(&T::points), "points", Value(), any_number(),
-                   "", "what is spread over the voxels")
+                   "", "points that are spread over the voxels")
             .required();
         declaration
             .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
             .param(static_cast<std::optional<PerPoint<float>> T::*>(&T::radius), "radius", Value(), above(0), "m",
-                   "over which a point is spread, at least a voxel; 1.5 voxels when not given")
+                   "radius over which a point is spread, at least a voxel; the default is 1.5 voxels")
             .param(static_cast<PerPoint<float> T::*>(&T::weight), "weight", 1.0, at_least(0), "",
-                   "what a point counts: the sum of density times volume is that of the weights");
+                   "weight of a point; the integral of the density is the sum of the weights");
     }
 
     // Returns a view that refers to this object, which must outlive it.

@@ -30,12 +30,12 @@ struct SequenceOptions {
         constexpr double most = 1e9;
         declaration
             .param(static_cast<std::string T::*>(&T::before), "before", Value(), any_number(), "",
-                   "what goes before the first file of a sequence: \"hold\" (that file), \"repeat\" (the last ones "
-                   "again), \"mirror\" (back and forth) or \"none\" (nothing)")
+                   "data before the first file of a sequence: that file, all files repeated, all files back and forth, "
+                   "or nothing")
             .param(static_cast<std::string T::*>(&T::after), "after", Value(), any_number(), "",
-                   "and behind the last one")
+                   "data after the last file of a sequence, as for before")
             .param(static_cast<std::optional<double> T::*>(&T::offset), "offset", Value(), between(-most, most),
-                   "frames", "by which the files of a sequence come later: frame f has the file f - offset");
+                   "frames", "delay of the files of a sequence: frame f uses the file f - offset");
         Maker maker = declaration;
         for (Param& param : maker.params)
             if (param.name == "before" || param.name == "after") param.choices = {"hold", "repeat", "mirror", "none"};

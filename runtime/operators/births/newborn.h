@@ -91,22 +91,22 @@ void Newborn::declare_newborn(Declaration<T>& type, const std::string& speed_alo
         .writes("v")
         .writes("id")
         .param(&T::birth, "birth", "random", any_number(), "",
-               "at the beginning of the frame's interval, its end, at random, or evenly spaced; or a function(p, "
-               "frame) that edits each newborn point once, which is born at random")
+               "time of birth in the frame: at random, at its beginning or end, or evenly spaced; or a function(p, "
+               "frame) of each newborn point")
         .choices({"random", "begin", "end", "even"})
         .constant()
-        .param(&T::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean direction and size")
+        .param(&T::velocity, "velocity", Vec3d(0, 0, 0), any_number(), "m/s", "mean initial velocity")
         .param(&T::speed, "speed", 0.0, any_number(), "m/s",
-               "along " + speed_along + ", added to velocity; a number or {min, max}")
+               "speed along " + speed_along + ", added to velocity; a number or {min, max}")
         .param(&T::spread, "spread", 0.0, between(0, 180), "deg",
-               "turns velocity and speed together, uniformly in a cone of this half angle")
+               "half angle of the cone in which velocity and speed are turned together, uniformly")
         .param(&T::life, "life", Value(), or_infinity(at_least(0)), "s",
-               "age at which points die: a number or {min, max}; without it they live for ever")
-        .param(&T::joins, "group", Value(), any_number(), "", "the newborn join this group")
+               "age at which points die: a number or {min, max}; without it points live for ever")
+        .param(&T::joins, "group", Value(), any_number(), "", "group that newborn points join")
         .constant()
         .param(&T::attributes, "attributes", Value(), any_number(), "",
-               "values of the newborn, {heat = 1, Cd = {1, 0.5, 0}}; at random between two, {heat = {1, 2}}, or on "
-               "a ramp, {Cd = {{0, {1, 0, 0}}, {1, {1, 1, 0}}}}; they replace inherited values");
+               "values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace "
+               "inherited values");
 }
 
 }  // namespace rapid

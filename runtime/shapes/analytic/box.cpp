@@ -110,9 +110,9 @@ struct BoxType {
 
     static ShapeType declare()
     {
-        return shape_type<BoxType>("box", "A box.")
+        return shape_type<BoxType>("box", "Returns a box.")
             .length(&BoxType::size, "size", Vec3d(1, 1, 1), "full edge lengths")
-            .param(&BoxType::center, "center", Vec3d(0, 0, 0), "m", "its middle");
+            .param(&BoxType::center, "center", Vec3d(0, 0, 0), "m", "centre");
     }
     ShapePtr make() const { return make_box_shape(size, center); }
 };

@@ -104,10 +104,10 @@ struct PlaneType {
 
     static ShapeType declare()
     {
-        return shape_type<PlaneType>("plane",
-                                     "The points with normal · x = offset; outside is where the normal points.")
-            .param(&PlaneType::normal, "normal", Vec3d(0, 1, 0), "", "out of the plane; any length but zero")
-            .param(&PlaneType::offset, "offset", 0.0, "m", "along the normal");
+        return shape_type<PlaneType>("plane", "Returns a plane, whose normal points outside.")
+            .param(&PlaneType::normal, "normal", Vec3d(0, 1, 0), "",
+                   "normal of any nonzero length, which points out of the solid half")
+            .param(&PlaneType::offset, "offset", 0.0, "m", "distance from the origin along the normal");
     }
     ShapePtr make() const { return make_plane(normal, offset); }
 };

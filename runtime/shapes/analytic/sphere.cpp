@@ -96,9 +96,9 @@ struct SphereType {
 
     static ShapeType declare()
     {
-        return shape_type<SphereType>("sphere", "A sphere.")
-            .length(&SphereType::radius, "radius", 1.0, "of the sphere")
-            .param(&SphereType::center, "center", Vec3d(0, 0, 0), "m", "its middle");
+        return shape_type<SphereType>("sphere", "Returns a sphere.")
+            .length(&SphereType::radius, "radius", 1.0, "radius of the sphere")
+            .param(&SphereType::center, "center", Vec3d(0, 0, 0), "m", "centre");
     }
     ShapePtr make() const { return make_sphere_shape(radius, center); }
 };

@@ -7,10 +7,10 @@
 --   reads, writes    names indexed on the point itself
 --   may              names indexed anywhere in helpers, and on values that may be the point; for a function of the
 --                    whole set also its strings, which may name attributes
---   joins, asks      groups that it joins or leaves, and that it queries, if constants name them; in helpers, calls of
+--   joins, queries   groups that it joins or leaves, and that it queries, if constants name them; in helpers, calls of
 --                    a method `join` of any object
 --   computes_names   true if it indexes the point, or a value that may be the point, by a computed name
---   asks_places      true if it may read a point's `index`: it uses this name, or indexes an unknown value by a
+--   reads_indices    true if it may read a point's `index`: it uses this name, or indexes an unknown value by a
 --                    computed name
 --   calls            names on the point itself that it calls like methods
 --   kills            true if `kill` is called or could be
@@ -158,14 +158,14 @@ end
 -- Records the line and file of the first mention of a name.
 function At:mention(map, name)
   map[name] = map[name] or self:line()
-  local places = self.found.places
-  places[name] = places[name] or { line = self:line(), source = util.funcinfo(self.f).source }
+  local locations = self.found.locations
+  locations[name] = locations[name] or { line = self:line(), source = util.funcinfo(self.f).source }
 end
 
 -- Reads object.key or object[key] with a constant key.
 function At:read_field(object, key)
   local found = self.found
-  if key == "index" then found.asks_places = true end
+  if key == "index" then found.reads_indices = true end
   if object == point then
     if found.methods[key] then
       if key == "kill" then found.kills = true end
@@ -236,7 +236,7 @@ end
 
 function effects.KSTR(at)
   local text = at:string_constant(at.d)
-  if text == "index" then at.found.asks_places = true end
+  if text == "index" then at.found.reads_indices = true end
   if at.found.of_the_set and text then at.found.may[text] = true end -- points:max "age"
   return { kind = "string", value = text }
 end
@@ -259,7 +259,7 @@ function effects.TGETV(at)
   if not object or object == point then
     at.found.computes_names = true
   elseif object.kind == "shared" and object.value == nil then
-    at.found.asks_places = true
+    at.found.reads_indices = true
   end
   return at:read_element(object)
 end
@@ -339,7 +339,11 @@ end
 group_calls.leave = group_calls.join
 
 function group_calls.within(at, _, group)
-  if group and group.kind == "string" then at.found.asks[group.value] = true else at.found.asks_any = true end
+  if group and group.kind == "string" then
+    at.found.queries[group.value] = true
+  else
+    at.found.queries_any_group = true
+  end
 end
 
 -- Follows a call of a shared function with these shared values. Returns its result if all points share it.
@@ -475,13 +479,13 @@ local function step(f, pc, regs, found, outer, following)
   return successors(name, pc, pc + at.d - 0x7fff)
 end
 
-local most_calls = 8 -- distinguished per helper by their shared values; further ones are merged
+local max_calls = 8 -- distinguished per helper by their shared values; further ones are merged
 
 -- Returns the call of f with these shared values, { given, returned }, and true if it is new.
 local function call_of(f, given, found)
   local calls = found.calls_of[f] or {}
   found.calls_of[f] = calls
-  if #calls == most_calls then
+  if #calls == max_calls then
     local any = {}
     for place in pairs(given) do any[place] = shared end
     given = any
@@ -558,9 +562,9 @@ end
 -- env: the environment of f's globals; remedy, subject: parts of messages.
 local function nothing_found(env, remedy, subject, methods)
   local found = {
-    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, asks = {}, calls = {}, stores = {}, calls_of = {},
+    reads = {}, writes = {}, may = {}, may_write = {}, joins = {}, queries = {}, calls = {}, stores = {}, calls_of = {},
     inside = {}, env = env, remedy = remedy, subject = subject, methods = {},
-    places = {}, vectors = {}, constructors = {},
+    locations = {}, vectors = {}, constructors = {},
   }
   for size, name in pairs { [3] = "vec3", [4] = "quat" } do
     local constructor = rawget(env, name)

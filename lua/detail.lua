@@ -22,8 +22,8 @@ local vec3, quat, istype = vector.type, vector.quat, ffi.istype
 local floor, huge = math.floor, math.huge
 local MAX = 3.4028234663852886e38
 
-local function wrong_type(name, wanted, value)
-  error(("attribute %q takes %s, not %s"):format(name, wanted, describe.value(value)), 0)
+local function wrong_type(name, expected, value)
+  error(("attribute %q takes %s, not %s"):format(name, expected, describe.value(value)), 0)
 end
 
 local function within_float(x)
@@ -86,11 +86,11 @@ local types = {
 }
 
 -- texts: the strings of attributes (lua/text.lua).
-local function string_type(texts)
+local function string_type(strings)
   return {
     pointer = "uint32_t*", scalars = 1,
-    load = function(data, k) return texts.text(data[k]) end,
-    store = function(data, k, x) data[k] = texts.number(x) end,
+    load = function(data, k) return strings.text(data[k]) end,
+    store = function(data, k, x) data[k] = strings.number(x) end,
     check = function(name, x)
       if type(x) ~= "string" then wrong_type(name, "a text", x) end
     end,
@@ -100,10 +100,10 @@ end
 local over = "points can't be used outside the :detail function that they were given to"
 
 -- native: the host's functions, which act on the set that the function runs on; rand: the random function of kernels;
--- point_names: the host's table of a point's names; texts: the strings of attributes (lua/text.lua). Returns run(f,
+-- point_names: the host's table of a point's names; strings: the strings of attributes (lua/text.lua). Returns run(f,
 -- frame, params, size, random, details), which returns the indices (from 0) of the killed points, and the details.
-local function make(native, rand, point_names, texts)
-  local of_texts = string_type(texts)
+local function make(native, rand, point_names, strings)
+  local of_string_type = string_type(strings)
   local read_only = point_names.read_only
   -- State of the current run. Only one runs at a time.
   local columns, groups, killed, added, size, frame, random, details
@@ -119,7 +119,7 @@ local function make(native, rand, point_names, texts)
     if column and (column.writable or not writable) then return column end
     if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe.value(name)), 0) end
     local data, stride, kind = native.column(name, writable) -- raises an error that lists the attributes
-    local about = kind == "string" and of_texts or types[kind]
+    local about = kind == "string" and of_string_type or types[kind]
     column = {
       data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
       load = about.load, store = about.store, check = about.check, kind = kind,
@@ -415,11 +415,11 @@ local function make(native, rand, point_names, texts)
     size, frame, random, details, happened = count, now, key, detail_values, nil
     f(set_view(serial[0]), now, params)
     append_added()
-    local places = {}
+    local indices = {}
     for i = 0, size - 1 do
-      if killed[i] then places[#places + 1] = i end
+      if killed[i] then indices[#indices + 1] = i end
     end
-    return places, details
+    return indices, details
   end
 end
 

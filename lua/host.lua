@@ -19,7 +19,7 @@ local ramp = require "ramp"
 local shape = require "shape"
 local shared_state = require "shared_state"
 local study = require "study"
-local attribute_texts = require "text"
+local attribute_strings = require "text"
 local vector = require "vec3"
 local ffi = require "ffi"
 
@@ -60,19 +60,19 @@ jit.opt.start("-narrow", "hotloop=4", "maxtrace=8000", "maxrecord=16000", "maxir
 
 ffi.cdef(native.chunk_header)
 local shapes = shape.make(native)
-local texts = attribute_texts.make(native)
-local engine = kernel.prepare(native.rand, shapes.pointer_of, native.point_names, texts)
+local strings = attribute_strings.make(native)
+local engine = kernel.prepare(native.rand, shapes.pointer_of, native.point_names, strings)
 
 local studies = study.make(native, vector)
 local rapid = language.make(native, load_node, numeric.make(native.noise, native.curl_noise), shapes, studies)
 loaded.rapid = rapid
 env.vec3, env.quat = vector.make, vector.make_quat
 
-local run_detail = detail.make(native.detail, engine.rand, native.point_names, texts)
+local run_detail = detail.make(native.detail, engine.rand, native.point_names, strings)
 
 local entry = {}
 
-local asked -- the definition of the study file that was run
+local definition -- the definition of the study file that was run
 
 -- Runs the graph and returns its result: a node, or a table of nodes by name. With knobs the file is a study,
 -- and the graph is that of its scene; with an empty table of knobs there is no graph.
@@ -82,11 +82,11 @@ function entry.run(text, name, knobs)
   -- Interpreted: a graph's body runs once, and compilation changes the bytecode that bytecode.lua reads.
   jit.off()
   local result = run(chunk, name)
-  asked = studies.definition_of(result)
-  if asked and not knobs then error("this is a study; run it with: rapid study " .. name:sub(2), 0) end
+  definition = studies.definition_of(result)
+  if definition and not knobs then error("this is a study; run it with: rapid study " .. name:sub(2), 0) end
   if not knobs then return result end
-  if not asked then error("the file returns no study; end it with: return rapid.study { ... }", 0) end
-  if next(knobs) then return run(asked.scene, name, knobs) end
+  if not definition then error("the file returns no study; end it with: return rapid.study { ... }", 0) end
+  if next(knobs) then return run(definition.scene, name, knobs) end
 end
 
 function entry.loaded()
@@ -157,16 +157,16 @@ function entry.detail(f, number, time, dt, params, size, random, details)
 end
 
 function entry.study()
-  return studies.describe(asked)
+  return studies.describe(definition)
 end
 
 -- Evaluates a study's closed form at a frame, for the knobs of a row.
 function entry.reference(number, time, dt, knobs)
-  return asked.reference(engine.frame(number, time, dt), knobs)
+  return definition.reference(engine.frame(number, time, dt), knobs)
 end
 
 function entry.study_error(points, reference)
-  return studies.error_of(asked, points, reference)
+  return studies.error_of(definition, points, reference)
 end
 
 -- Reports to the host each trace that the compiler gives up.

@@ -21,7 +21,7 @@ local getter_text = {
   int64 = "return (tonumber($C[$I]))",
   vec3 = "local a = $C[$I] return (vec3(a.x, a.y, a.z))",
   quat = "local a = $C[$I] return (quat(a.x, a.y, a.z, a.w))",
-  string = "return (texts.text($C[$I]))",
+  string = "return (strings.text($C[$I]))",
 }
 
 -- A sum of squares below MAX2 proves in one comparison that all are finite and in range; near MAX2, each is tested.
@@ -57,13 +57,13 @@ local setter_text = {
     a.x, a.y, a.z, a.w = x1, x2, x3, x4]],
   string = [[
     if type(x) ~= "string" then wrong_type($S, "a text", x) end
-    $C[i] = texts.number(x)]],
+    $C[i] = strings.number(x)]],
 }
 
 -- The form in which Solve stores P and v within a frame.
 getter_text.vec3d, setter_text.vec3d = getter_text.vec3, setter_text.vec3
 
-local most_names = 65000 -- approximate; each is one of the 65,536 constants that a function can have
+local max_names = 65000 -- approximate; each is one of the 65,536 constants that a function can have
 
 local operators = {
   "__add", "__sub", "__mul", "__div", "__mod", "__pow", "__unm", "__concat", "__len", "__lt", "__le", "__call",
@@ -93,13 +93,14 @@ local function refuse_operators(what, meta)
 end
 
 -- The host adds the position, the nearest line of graph code, and the point.
-local function wrong_type(name, wanted, value)
+local function wrong_type(name, expected, value)
   local remedy = ""
   if type(value) == "table" then
-    remedy = wanted == "a vec3" and "; vec3(x, y, z) makes one" or wanted == "a quat" and "; quat(x, y, z, w) makes one"
+    remedy = expected == "a vec3" and "; vec3(x, y, z) makes one"
+      or expected == "a quat" and "; quat(x, y, z, w) makes one"
       or ""
   end
-  error(("attribute %q takes %s, not %s%s"):format(name, wanted, describe.value(value), remedy), 0)
+  error(("attribute %q takes %s, not %s%s"):format(name, expected, describe.value(value), remedy), 0)
 end
 local function not_finite(name, value)
   error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe.value(value)), 0)
@@ -126,7 +127,7 @@ end
 -- table lookup would leave its checks. Upvalues that are never assigned, and are no longer than two pointers, are
 -- constants there too: the chunk's address, the view, the frame.
 local text_head = [[
-local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, texts, holder = ...
+local ffi, vec3, quat, kernel, memory, frame_type, draw, adopt, shown, refuse, names, flush, strings, holder = ...
 local istype, floor, type, tonumber, error = ffi.istype, math.floor, type, tonumber, error
 local wrong_type, not_finite, not_whole = refuse.wrong_type, refuse.not_finite, refuse.not_whole
 local missing, wrong_use = refuse.missing, refuse.use
@@ -353,25 +354,25 @@ return run, set_params
   function refuse.step(name)
     error(("the step has no %q; it has time, dt, index and detail"):format(describe.name(name)), 0)
   end
-  function refuse.use(wanted, value)
-    error(("p:rand takes %s, not %s"):format(wanted, describe.value(value)), 0)
+  function refuse.use(expected, value)
+    error(("p:rand takes %s, not %s"):format(expected, describe.value(value)), 0)
   end
   local make, message = loadstring(table.concat(text, "\n"), "=[rapid runner]")
   if not make then
     if not message:find("constants", 1, true) then error(message, 0) end -- out of memory
     error(("reads and writes %d attributes and groups; a kernel has at most about %d"):format(
-      #layout.columns + #layout.groups, most_names), 0)
+      #layout.columns + #layout.groups, max_names), 0)
   end
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
   local holder = { values = {}, details = {} }
   local run, set_params = make(ffi, vec3, quat, kernel, pointer, shared.frame_type, shared.draw, shared.adopt,
-    shared.shown, refuse, names, jit.flush, shared.texts, holder)
+    shared.shown, refuse, names, jit.flush, shared.strings, holder)
   return run, set_params, function() return lanes.translate(kernel, layout, holder) end
 end
 
 -- rand: a light userdata, the random function; adopt(object): makes a shape known to traces (lua/shape.lua);
--- point_names: the table of the host; texts: the strings of attributes (lua/text.lua).
-local function prepare(rand, adopt, point_names, texts)
+-- point_names: the table of the host; strings: the strings of attributes (lua/text.lua).
+local function prepare(rand, adopt, point_names, strings)
   -- Detail values that frame.detail and step.detail show: those of the running pass.
   local shown = { details = {} }
   shown.view = newproxy(true) -- not a table: table.insert would write into it
@@ -408,7 +409,7 @@ local function prepare(rand, adopt, point_names, texts)
   }))
   local shared = {
     frame_type = frame_type, draw = ffi.cast("rapid_rand", rand), adopt = adopt, shown = shown,
-    point_names = point_names, texts = texts,
+    point_names = point_names, strings = strings,
   }
   return {
     frame = function(number, time, dt, details)

@@ -5,7 +5,7 @@ local vector = require "vec3"
 
 jit.off(true, true) -- runs once per kernel
 
-local most_nodes = 4000
+local max_nodes = 4000
 
 -- Gives up: the kernel, or the rest of this path, cannot be a program. The reason is reported on request.
 local function give_up(reason)
@@ -57,7 +57,7 @@ function Program:emit(op, a, b, c, number, varies)
   local id = self.known[key]
   if id then return id end
   local nodes = self.nodes
-  if #nodes >= most_nodes then give_up "it is long" end
+  if #nodes >= max_nodes then give_up "it is long" end
   local node = { op = op, a = a, b = b, c = c, number = number }
   node.varies = varies or reads_lane[op] and varying or shared
   for _, operand in ipairs(operands(node)) do node.varies = math.max(node.varies, nodes[operand].varies) end

@@ -25,7 +25,7 @@ for op = 0, #vmdef.bcnames / 6 - 1 do
   names[op] = vmdef.bcnames:sub(op * 6 + 1, op * 6 + 6):gsub("%s", "")
 end
 
-local most_steps, most_depth = 20000, 30
+local max_steps, max_depth = 20000, 30
 
 local run -- follows a function; defined below
 
@@ -440,7 +440,7 @@ local loop_end = { FORL = true, IFORL = true, JFORL = true }
 function Activation:advance(pc)
   local program, path = self.program, self.path
   program.steps = program.steps + 1
-  if program.steps > most_steps then give_up "it is long" end
+  if program.steps > max_steps then give_up "it is long" end
   local ins = util.funcbc(self.f, pc)
   local at = setmetatable({
     pc = pc, state = path, name = names[band(ins, 0xff)], a = band(rshift(ins, 8), 0xff), b = rshift(ins, 24),
@@ -506,7 +506,7 @@ end
 -- Follows f, called with these values by the points of a state. Returns its results and the state after it, or nothing
 -- if no path returns.
 function run(program, f, args, state, depth)
-  if depth > most_depth then give_up "its calls are nested" end
+  if depth > max_depth then give_up "its calls are nested" end
   local info = util.funcinfo(f)
   local path = { regs = {}, memory = state.memory, mask = state.mask }
   for slot = 0, info.params - 1 do path.regs[slot] = args[slot + 1] or nothing end

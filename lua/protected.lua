@@ -10,12 +10,12 @@ local describe = require "describe"
 
 local out_of_memory = "not enough memory" -- LuaJIT's own message
 
-local most_nested = 100
+local max_nested = 100
 local nested = 0
 
 local function enter(what)
-  if nested == most_nested then
-    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, most_nested), 3)
+  if nested == max_nested then
+    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, max_nested), 3)
   end
   nested = nested + 1
 end

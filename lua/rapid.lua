@@ -49,11 +49,11 @@ local function make(native, load_node, numeric, shapes, studies)
     return function(...)
       local path, options = ...
       if type(path) ~= "string" or not native.names_frames(path) then return read(...) end
-      local asked = options_of("rapid." .. what, options)
-      asked.path = path
+      local requested = options_of("rapid." .. what, options)
+      requested.path = path
       return function(frame)
-        asked.frame = frame.number
-        return (native.make(what, asked))
+        requested.frame = frame.number
+        return (native.make(what, requested))
       end
     end
   end
@@ -151,28 +151,28 @@ local function make(native, load_node, numeric, shapes, studies)
     if type(closed) ~= "boolean" then
       error(("rapid.points.along: closed = %s; it must be true or false"):format(describe.value(closed)), 2)
     end
-    local places = {}
+    local positions = {}
     for k, place in ipairs(type(curve) == "table" and curve or {}) do
       if type(place) == "table" and #place == 3 then place = vector.make(place[1], place[2], place[3]) end
       if not ffi.istype(vector.type, place) then
         error(("rapid.points.along: point %d is %s; it must be a vec3 or {x, y, z}")
           :format(k, describe.value(place)), 2)
       end
-      places[k] = place
+      positions[k] = place
     end
-    if #places < 2 then error("rapid.points.along: a curve is a list of at least two points", 2) end
-    if closed then places[#places + 1] = places[1] end
+    if #positions < 2 then error("rapid.points.along: a curve is a list of at least two points", 2) end
+    if closed then positions[#positions + 1] = positions[1] end
     local from = { 0 } -- length up to each position
-    for k = 2, #places do from[k] = from[k - 1] + (places[k] - places[k - 1]):length() end
+    for k = 2, #positions do from[k] = from[k - 1] + (positions[k] - positions[k - 1]):length() end
     local whole = from[#from]
     if not (whole > 0 and whole < math.huge) then error("rapid.points.along: the curve has no length", 2) end
     local P, N, u, k = {}, {}, {}, 1
     for i = 1, count do
       local part = (i - 1) / (closed and count or count - 1)
-      while k < #places - 1 and (from[k + 1] <= part * whole or from[k + 1] == from[k]) do k = k + 1 end
-      local way = places[k + 1] - places[k]
-      P[i] = places[k] + way * ((part * whole - from[k]) / (from[k + 1] - from[k]))
-      N[i], u[i] = way:normalized(), part
+      while k < #positions - 1 and (from[k + 1] <= part * whole or from[k + 1] == from[k]) do k = k + 1 end
+      local segment = positions[k + 1] - positions[k]
+      P[i] = positions[k] + segment * ((part * whole - from[k]) / (from[k + 1] - from[k]))
+      N[i], u[i] = segment:normalized(), part
     end
     return native.make("points.from", { columns = { P = P, N = N, u = u } })
   end

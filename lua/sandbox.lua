@@ -136,9 +136,9 @@ local function make(native, run)
   end
   function env.print(...)
     if native.is_quiet then return end
-    local texts = {}
-    for place = 1, select("#", ...) do texts[place] = safe_tostring((select(place, ...))) end
-    native.print(table.concat(texts, "\t") .. "\n")
+    local printed = {}
+    for place = 1, select("#", ...) do printed[place] = safe_tostring((select(place, ...))) end
+    native.print(table.concat(printed, "\t") .. "\n")
   end
 
   -- Text only: bytecode can do more than Lua.

@@ -21,11 +21,11 @@ local vec3, istype = vector.type, ffi.istype
 -- the pointer changes later. native.vector_grid and native.fog do likewise. native.shape_distance,
 -- native.shape_velocity, native.vector_grid_sample and native.fog_sample are the query functions.
 local function make(native)
-  local ask = ffi.cast("rapid_shape_distance", native.shape_distance)
-  local ask_velocity = ffi.cast("rapid_shape_velocity", native.shape_velocity)
-  local ask_value = ffi.cast("rapid_mesh_value", native.mesh_value)
-  local ask_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
-  local ask_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
+  local query = ffi.cast("rapid_shape_distance", native.shape_distance)
+  local query_velocity = ffi.cast("rapid_shape_velocity", native.shape_velocity)
+  local query_value = ffi.cast("rapid_mesh_value", native.mesh_value)
+  local query_grid = ffi.cast("rapid_vector_grid_sample", native.vector_grid_sample)
+  local query_fog = ffi.cast("rapid_fog_sample", native.fog_sample)
   local gradient, value = ffi.new "double[3]", ffi.new "double[3]"
 
   -- Returns the pointer of an object that `find` knows, or false. The second function forgets those that move.
@@ -80,7 +80,7 @@ local function make(native)
     local shape, P = ...
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("distance", shape, P) end
-    local distance = ask(pointer, P.x, P.y, P.z, gradient)
+    local distance = query(pointer, P.x, P.y, P.z, gradient)
     return distance
   end
 
@@ -88,7 +88,7 @@ local function make(native)
     local shape, P = ...
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("gradient", shape, P) end
-    ask(pointer, P.x, P.y, P.z, gradient)
+    query(pointer, P.x, P.y, P.z, gradient)
     return (vec3(gradient[0], gradient[1], gradient[2]))
   end
 
@@ -96,7 +96,7 @@ local function make(native)
     local shape, P = ...
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("velocity", shape, P) end
-    ask_velocity(pointer, P.x, P.y, P.z, value)
+    query_velocity(pointer, P.x, P.y, P.z, value)
     return (vec3(value[0], value[1], value[2]))
   end
 
@@ -105,7 +105,7 @@ local function make(native)
     local pointer = type(shape) == "userdata" and pointer_of(shape)
     if not pointer or not istype(vec3, P) then refuse("closest", shape, P) end
     if name == nil then
-      local distance = ask(pointer, P.x, P.y, P.z, gradient)
+      local distance = query(pointer, P.x, P.y, P.z, gradient)
       return (vec3(P.x - distance * gradient[0], P.y - distance * gradient[1], P.z - distance * gradient[2]))
     end
     local mesh = mesh_of(shape)
@@ -113,7 +113,7 @@ local function make(native)
       error(("shape:closest(P, NAME) takes the name of an attribute, of a mesh, not %s"):format(
         describe.value(name)), 0)
     end
-    local numbers = ask_value(mesh, pointer, name, P.x, P.y, P.z, value)
+    local numbers = query_value(mesh, pointer, name, P.x, P.y, P.z, value)
     if numbers == 0 then error(("the mesh has no attribute %q"):format(describe.name(name)), 0) end
     if numbers == 1 then
       local number = value[0]
@@ -127,7 +127,7 @@ local function make(native)
     local pointer = type(grid) == "userdata" and grid_of(grid)
     if not pointer then error("grid:sample(P) is asked of a grid of vectors: with a colon, not a dot", 0) end
     if not istype(vec3, P) then error(("grid:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
-    ask_grid(pointer, P.x, P.y, P.z, value)
+    query_grid(pointer, P.x, P.y, P.z, value)
     return (vec3(value[0], value[1], value[2]))
   end
 
@@ -136,7 +136,7 @@ local function make(native)
     local pointer = type(fog) == "userdata" and fog_of(fog)
     if not pointer then error("fog:sample(P) is asked of a fog: with a colon, not a dot", 0) end
     if not istype(vec3, P) then error(("fog:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
-    local density = ask_fog(pointer, P.x, P.y, P.z)
+    local density = query_fog(pointer, P.x, P.y, P.z)
     return density
   end
 

@@ -5,7 +5,7 @@ local protected = require "protected"
 
 local getinfo, getlocal, getupvalue, getmeta = debug.getinfo, debug.getlocal, debug.getupvalue, debug.getmetatable
 
-local most_values = 10000 -- compared at most: the walk takes a fraction of a millisecond
+local max_values = 10000 -- compared at most: the walk takes a fraction of a millisecond
 
 -- The values reached, in a fixed order, each with the name that leads to it.
 local Walk = {}
@@ -23,7 +23,7 @@ end
 
 function Walk:table(map)
   for key, value in next, map do
-    if self.count > most_values then return end
+    if self.count > max_values then return end
     self:note(key)
     self:note(value, key)
   end
@@ -48,7 +48,7 @@ end
 
 function Walk:thread(thread)
   self:note(coroutine.status(thread), "a coroutine")
-  for level = 0, most_values do
+  for level = 0, max_values do
     local info = getinfo(thread, level, "fl")
     if not info then return end
     self:note(info.func, "a coroutine")
@@ -70,7 +70,7 @@ local function walk(f, env)
     local value = self.open[#self.open]
     self.open[#self.open] = nil -- not table.remove: LuaJIT would begin a trace in it
     self[type(value)](self, value)
-    if self.count > most_values then return nil end
+    if self.count > max_values then return nil end
   end
   return self
 end

@@ -6,22 +6,22 @@ local most = 65536 -- cached; the cache is cleared when full
 
 -- native.text(number), native.number(text)
 local function make(native)
-  local texts, numbers, count = {}, {}, 0
+  local strings, numbers, count = {}, {}, 0
   local function keep(...)
     local text, number = ...
     count = count + 1
     if count > most then
-      for known in next, texts do texts[known] = nil end
+      for known in next, strings do strings[known] = nil end
       for known in next, numbers do numbers[known] = nil end
       count = 1
     end
-    texts[number], numbers[text] = text, number
+    strings[number], numbers[text] = text, number
   end
   return {
-    texts = texts, numbers = numbers,
+    strings = strings, numbers = numbers,
     text = function(...)
       local number = ...
-      local text = texts[number]
+      local text = strings[number]
       if text == nil then
         text = native.text(number)
         keep(text, number)

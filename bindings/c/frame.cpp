@@ -17,7 +17,7 @@ int column_into(rapid_frame* frame, const char* name, rapid_column* column, rapi
 {
     return guarded(error, [&] {
         const auto open = open_frame(frame);
-        give(column, column_in_c(find(open->frame, &not_null(name, "name")).value()), "column");
+        store(column, column_in_c(find(open->frame, &not_null(name, "name")).value()), "column");
     });
 }
 
@@ -37,7 +37,7 @@ int text_into(rapid_frame* frame, const char* kind, const char** text, const cha
         std::string made = make(std::as_const(open->frame));
         const std::lock_guard lock(open->mutex);
         // A text returned before stays valid if it is the same.
-        std::string& kept = open->texts[kind];
+        std::string& kept = open->strings[kind];
         if (kept != made) kept = std::move(made);
         *text = kept.c_str();
     });
@@ -51,7 +51,7 @@ int picture_into(rapid_frame* frame, const void** png, size_t* bytes, rapid_erro
         const auto open = open_frame(frame);
         std::string picture = draw(std::as_const(open->frame));
         const std::lock_guard lock(open->mutex);
-        std::string& kept = open->texts["picture"];
+        std::string& kept = open->strings["picture"];
         kept = std::move(picture);
         *png = kept.data();
         *bytes = kept.size();
@@ -60,7 +60,7 @@ int picture_into(rapid_frame* frame, const void** png, size_t* bytes, rapid_erro
 
 }  // namespace
 
-int tell(rapid_error** to, SceneError error) noexcept
+int report_error(rapid_error** to, SceneError error) noexcept
 {
     const int status = error.kind;
     if (to) try {
@@ -78,13 +78,13 @@ PictureCamera camera_of(const rapid_camera* given)
 {
     PictureCamera camera;
     if (!given) return camera;
-    const auto place_of = [](const double* from) {
-        std::array<double, 3> place{};
-        std::copy_n(from, 3, place.begin());
-        return place;
+    const auto vector_of = [](const double* from) {
+        std::array<double, 3> position{};
+        std::copy_n(from, 3, position.begin());
+        return position;
     };
-    if (given->position) camera.position = place_of(given->position);
-    if (given->target) camera.target = place_of(given->target);
+    if (given->position) camera.position = vector_of(given->position);
+    if (given->target) camera.target = vector_of(given->target);
     if (given->fov != 0) camera.fov = given->fov;
     return camera;
 }
@@ -175,30 +175,30 @@ int rapid_frame_warnings(rapid_frame* frame, const char** lines, rapid_error** e
 
 int64_t rapid_frame_number(rapid_frame* frame)
 {
-    return gotten([&] { return open_frame(frame)->frame.number(); });
+    return value_or_default([&] { return open_frame(frame)->frame.number(); });
 }
 double rapid_frame_time(rapid_frame* frame)
 {
-    return gotten([&] { return open_frame(frame)->frame.time(); });
+    return value_or_default([&] { return open_frame(frame)->frame.time(); });
 }
 double rapid_frame_fps(rapid_frame* frame)
 {
-    return gotten([&] { return open_frame(frame)->frame.fps(); });
+    return value_or_default([&] { return open_frame(frame)->frame.fps(); });
 }
 size_t rapid_frame_size(rapid_frame* frame)
 {
-    return gotten([&] { return open_frame(frame)->frame.size(); });
+    return value_or_default([&] { return open_frame(frame)->frame.size(); });
 }
 
 int rapid_frame_statistics(rapid_frame* frame, rapid_statistics* statistics, rapid_error** error)
 {
     return guarded(error, [&] {
         const FrameStatisticsSummary all = open_frame(frame)->frame.statistics();
-        give(statistics,
-             {0, all.points, all.born, all.died, all.collisions, all.substeps, all.has_errors, all.error_p50,
-              all.error_p95, all.error_max, all.penetration_max, all.constraint_residual_max, all.seconds,
-              all.script_seconds, all.solve_seconds},
-             "statistics");
+        store(statistics,
+              {0, all.points, all.born, all.died, all.collisions, all.substeps, all.has_errors, all.error_p50,
+               all.error_p95, all.error_max, all.penetration_max, all.constraint_residual_max, all.seconds,
+               all.script_seconds, all.solve_seconds},
+              "statistics");
     });
 }
 
@@ -252,15 +252,15 @@ int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value,
     });
 }
 
-int rapid_frame_places(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* places, rapid_error** error)
+int rapid_frame_indices(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* indices, rapid_error** error)
 {
     return guarded(error, [&] {
         const auto open = open_frame(frame);
         if (count == 0) return;
         not_null(ids, "ids");
-        not_null(places, "places");
-        const std::vector<std::uint32_t> found = open->frame.places({ids, ids + count}).value();
-        std::copy(found.begin(), found.end(), places);
+        not_null(indices, "places");
+        const std::vector<std::uint32_t> found = open->frame.indices({ids, ids + count}).value();
+        std::copy(found.begin(), found.end(), indices);
     });
 }
 
@@ -332,38 +332,38 @@ int rapid_scene_shapes(rapid_scene* scene, int64_t number, rapid_shapes** shapes
 
 size_t rapid_shapes_mesh_count(rapid_shapes* shapes)
 {
-    return gotten([&] { return open_shapes(shapes)->meshes.size(); });
+    return value_or_default([&] { return open_shapes(shapes)->meshes.size(); });
 }
 
-int rapid_shapes_mesh(rapid_shapes* shapes, size_t place, rapid_mesh* mesh, rapid_error** error)
+int rapid_shapes_mesh(rapid_shapes* shapes, size_t index, rapid_mesh* mesh, rapid_error** error)
 {
     return guarded(error, [&] {
         const auto open = open_shapes(shapes);
-        const ShapeMesh& found = at_place(open->meshes, place, "the shapes have", "meshes");
-        give(mesh,
-             {0, static_cast<int>(found.role), found.corner_count, found.positions, found.triangle_count,
-              found.triangles},
-             "mesh");
+        const ShapeMesh& found = at_index(open->meshes, index, "the shapes have", "meshes");
+        store(mesh,
+              {0, static_cast<int>(found.role), found.corner_count, found.positions, found.triangle_count,
+               found.triangles},
+              "mesh");
     });
 }
 
 size_t rapid_shapes_plane_count(rapid_shapes* shapes)
 {
-    return gotten([&] { return open_shapes(shapes)->planes.size(); });
+    return value_or_default([&] { return open_shapes(shapes)->planes.size(); });
 }
 
-int rapid_shapes_plane(rapid_shapes* shapes, size_t place, rapid_plane* plane, rapid_error** error)
+int rapid_shapes_plane(rapid_shapes* shapes, size_t index, rapid_plane* plane, rapid_error** error)
 {
     return guarded(error, [&] {
         const auto open = open_shapes(shapes);
-        const ShapePlane& found = at_place(open->planes, place, "the shapes have", "planes");
-        give(plane, {0, {found.normal[0], found.normal[1], found.normal[2]}, found.offset}, "plane");
+        const ShapePlane& found = at_index(open->planes, index, "the shapes have", "planes");
+        store(plane, {0, {found.normal[0], found.normal[1], found.normal[2]}, found.offset}, "plane");
     });
 }
 
 int rapid_shapes_has_camera(rapid_shapes* shapes)
 {
-    return gotten([&] { return static_cast<int>(open_shapes(shapes)->shapes.has_camera()); });
+    return value_or_default([&] { return static_cast<int>(open_shapes(shapes)->shapes.has_camera()); });
 }
 
 int rapid_shapes_warnings(rapid_shapes* shapes, const char** lines, rapid_error** error)

@@ -30,17 +30,17 @@ public:
     {
         Table& all = table();
         const std::lock_guard lock(all.mutex);
-        if (all.free_places.empty()) {
-            all.free_places.reserve(all.entries.size() + 1);  // so that remove() does not allocate
+        if (all.free_slots.empty()) {
+            all.free_slots.reserve(all.entries.size() + 1);  // so that remove() does not allocate
             all.entries.emplace_back();
-            all.free_places.push_back(static_cast<std::uint32_t>(all.entries.size() - 1));
+            all.free_slots.push_back(static_cast<std::uint32_t>(all.entries.size() - 1));
         }
-        const std::uint32_t place = all.free_places.back();
-        all.free_places.pop_back();
-        Entry& entry = all.entries[place];
+        const std::uint32_t slot = all.free_slots.back();
+        all.free_slots.pop_back();
+        Entry& entry = all.entries[slot];
         entry.object = std::move(object);
         ++entry.use;
-        const std::uint64_t bits = std::uint64_t{entry.use} << 32 | std::uint64_t{place} << 4 | type << 1 | 1;
+        const std::uint64_t bits = std::uint64_t{entry.use} << 32 | std::uint64_t{slot} << 4 | type << 1 | 1;
         return reinterpret_cast<void*>(static_cast<std::uintptr_t>(bits));
     }
 
@@ -51,7 +51,7 @@ public:
         const std::lock_guard lock(all.mutex);
         Entry* entry = all.find(handle);
         if (!entry) return nullptr;
-        all.free_places.push_back(static_cast<std::uint32_t>(entry - all.entries.data()));
+        all.free_slots.push_back(static_cast<std::uint32_t>(entry - all.entries.data()));
         return std::exchange(entry->object, nullptr);
     }
 
@@ -65,14 +65,14 @@ private:
     struct Table {
         std::mutex mutex;
         std::vector<Entry> entries;
-        std::vector<std::uint32_t> free_places;
+        std::vector<std::uint32_t> free_slots;
 
         Entry* find(const void* handle)
         {
             const auto bits = static_cast<std::uint64_t>(reinterpret_cast<std::uintptr_t>(handle));
-            const std::size_t place = (bits & 0xffffffff) >> 4;
-            if ((bits & 15) != (type << 1 | 1) || place >= entries.size()) return nullptr;
-            Entry& entry = entries[place];
+            const std::size_t slot = (bits & 0xffffffff) >> 4;
+            if ((bits & 15) != (type << 1 | 1) || slot >= entries.size()) return nullptr;
+            Entry& entry = entries[slot];
             return entry.object && entry.use == bits >> 32 ? &entry : nullptr;
         }
     };

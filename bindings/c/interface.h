@@ -26,8 +26,8 @@ struct OpenScene {
 };
 struct OpenFrame {
     SceneFrame frame;
-    std::mutex mutex;                          // guards the texts
-    std::map<std::string, std::string> texts;  // by subject
+    std::mutex mutex;                            // guards the texts
+    std::map<std::string, std::string> strings;  // by subject
     std::map<std::string, SceneValue> details;
 };
 struct OpenShapes {
@@ -72,7 +72,7 @@ using AllOffers = Handles<OpenOffers, 5>;
 using AllShapes = Handles<OpenShapes, 6>;
 
 // Stores the error in *to, and returns its status.
-int tell(rapid_error** to, SceneError error) noexcept;
+int report_error(rapid_error** to, SceneError error) noexcept;
 
 // Runs f, the body of a function.
 template <class F>
@@ -84,7 +84,7 @@ int guarded(rapid_error** error, const F& f) noexcept
         return RAPID_OK;
     } catch (...) {
         try {
-            return tell(error, caught_error(SceneError::Unexpected));
+            return report_error(error, caught_error(SceneError::Unexpected));
         } catch (...) {
             return RAPID_OUT_OF_MEMORY;  // not even the text fits into memory
         }
@@ -93,7 +93,7 @@ int guarded(rapid_error** error, const F& f) noexcept
 
 // Runs a getter: f(), or an empty value if the handle is not open or the scene is in another call.
 template <class F>
-auto gotten(const F& f) noexcept -> decltype(f())
+auto value_or_default(const F& f) noexcept -> decltype(f())
 {
     try {
         return f();
@@ -161,7 +161,7 @@ T known_part(const T* given, const char* name, T known = {})
 
 // Fills a caller's struct as far as its size allows. least: the size of the struct's first version.
 template <class T>
-void give(T* to, T from, const char* name)
+void store(T* to, T from, const char* name)
 {
     const std::size_t size = not_null(to, name).size;
     if (size < sizeof(std::size_t) || size > (std::size_t{1} << 16))
@@ -172,10 +172,10 @@ void give(T* to, T from, const char* name)
 }
 
 template <class T>
-const T& at_place(const std::vector<T>& all, std::size_t place, const char* whose, const char* what)
+const T& at_index(const std::vector<T>& all, std::size_t index, const char* whose, const char* what)
 {
-    if (place >= all.size()) refuse(fmt::format("place = {}; {} {} {}", place, whose, all.size(), what));
-    return all[place];
+    if (index >= all.size()) refuse(fmt::format("place = {}; {} {} {}", index, whose, all.size(), what));
+    return all[index];
 }
 
 // Returns one line each.

@@ -111,10 +111,10 @@ int add(rapid_offers* offers, const char* name, rapid_error** error, const auto&
 {
     return guarded(error, [&] {
         const auto open = open_offers(offers);
-        const std::string wanted = &not_null(name, "name");
+        const std::string key = &not_null(name, "name");
         HostObject object = make(*open);
         const std::lock_guard lock(open->mutex);
-        open->objects.emplace_back(wanted, std::move(object));
+        open->objects.emplace_back(key, std::move(object));
     });
 }
 
@@ -173,7 +173,7 @@ int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, co
 {
     return guarded(error, [&] {
         const auto open = open_offers(offers);
-        const std::string wanted = &not_null(name, "name");
+        const std::string key = &not_null(name, "name");
         check_count(count, "count");
         if (column_count > 0) not_null(columns, "columns");
         HostPoints points;
@@ -186,7 +186,7 @@ int rapid_offers_points(rapid_offers* offers, const char* name, size_t count, co
             points.columns.push_back({column, type, copy->data(), 0, copy});
         }
         const std::lock_guard lock(open->mutex);
-        open->objects.emplace_back(wanted, std::move(points));
+        open->objects.emplace_back(key, std::move(points));
     });
 }
 

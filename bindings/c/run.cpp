@@ -17,10 +17,10 @@ using Runs = Handles<OpenRun, 7>;
 
 auto open_run(rapid_run* handle) { return open<Runs>(handle, "run"); }
 
-void take_texts(std::vector<std::string>& to, const char* const* texts, std::size_t count, const char* name)
+void take_strings(std::vector<std::string>& to, const char* const* strings, std::size_t count, const char* name)
 {
-    if (count > 0) not_null(texts, name);
-    for (std::size_t i = 0; i < count; ++i) to.emplace_back(&not_null(texts[i], name));
+    if (count > 0) not_null(strings, name);
+    for (std::size_t i = 0; i < count; ++i) to.emplace_back(&not_null(strings[i], name));
 }
 
 std::string text_or_none(const char* text) { return text ? text : ""; }
@@ -30,7 +30,7 @@ RunOptions run_options_of(const rapid_run_options& given)
     RunOptions options;
     if (given.text) options.text = given.text;
     if (given.frames) options.frames = RunFrames{given.frames->first, given.frames->last, given.frames->step};
-    take_texts(options.files.outputs, given.outputs, given.output_count, "options->outputs");
+    take_strings(options.files.outputs, given.outputs, given.output_count, "options->outputs");
     options.files.pictures = {{given.width, given.height}, camera_of(&given.camera)};
     options.statistics = text_or_none(given.statistics);
     options.profile = text_or_none(given.profile);
@@ -83,7 +83,7 @@ int rapid_run_prepare(rapid_run* run, rapid_error** error)
 
 int64_t rapid_run_first_frame(rapid_run* run)
 {
-    return gotten([&] { return open_run(run)->run.first_frame(); });
+    return value_or_default([&] { return open_run(run)->run.first_frame(); });
 }
 
 int rapid_run_frames(rapid_run* run, rapid_frames* frames, rapid_error** error)
@@ -103,8 +103,8 @@ int rapid_run_run(rapid_run* run, rapid_outcome* outcome, rapid_error** error)
         open->unwritten = joined(open->outcome.unwritten);
         const RunOutcome& of = open->outcome;
         if (outcome)
-            give(outcome, {0, static_cast<int>(of.ending), of.last_frame, open->unwritten.c_str(), of.summary.c_str()},
-                 "outcome");
+            store(outcome, {0, static_cast<int>(of.ending), of.last_frame, open->unwritten.c_str(), of.summary.c_str()},
+                  "outcome");
         if (of.error) throw SceneException(*of.error);
     });
 }
@@ -133,12 +133,12 @@ int rapid_merge_files(const char* const* parts, size_t count, const char* output
 {
     return guarded(error, [&] {
         std::vector<std::string> patterns;
-        take_texts(patterns, parts, count, "parts");
-        std::function<bool(std::int64_t, std::uint64_t)> told;
+        take_strings(patterns, parts, count, "parts");
+        std::function<bool(std::int64_t, std::uint64_t)> callback;
         if (progress)
-            told = [&](std::int64_t frame, std::uint64_t points) { return progress(user, frame, points) != 0; };
-        const MergedFiles all = merge_files(patterns, &not_null(output, "output"), told).value();
-        if (merged) give(merged, {0, all.parts, all.frames, all.points}, "merged");
+            callback = [&](std::int64_t frame, std::uint64_t points) { return progress(user, frame, points) != 0; };
+        const MergedFiles all = merge_files(patterns, &not_null(output, "output"), callback).value();
+        if (merged) store(merged, {0, all.parts, all.frames, all.points}, "merged");
     });
 }
 

@@ -167,16 +167,17 @@ int rapid_scene_release(rapid_scene* scene, rapid_error** error)
 
 size_t rapid_scene_parameter_count(rapid_scene* scene)
 {
-    return gotten([&] { return SceneCall(scene).scene().parameters().size(); });
+    return value_or_default([&] { return SceneCall(scene).scene().parameters().size(); });
 }
 
-int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error)
+int rapid_scene_parameter(rapid_scene* scene, size_t index, rapid_parameter* parameter, rapid_error** error)
 {
     return guarded(error, [&] {
         const SceneCall open(scene);
-        const SceneParameter& found = at_place(open.scene().parameters(), place, "the scene has", "parameters");
-        give(parameter, {0, found.name.c_str(), found.doc.c_str(), value_in_c(found.value), value_in_c(found.fallback)},
-             "parameter");
+        const SceneParameter& found = at_index(open.scene().parameters(), index, "the scene has", "parameters");
+        store(parameter,
+              {0, found.name.c_str(), found.doc.c_str(), value_in_c(found.value), value_in_c(found.fallback)},
+              "parameter");
     });
 }
 
@@ -187,15 +188,15 @@ int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t co
 
 size_t rapid_scene_node_count(rapid_scene* scene)
 {
-    return gotten([&] { return SceneCall(scene).scene().nodes().size(); });
+    return value_or_default([&] { return SceneCall(scene).scene().nodes().size(); });
 }
 
-int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error)
+int rapid_scene_node(rapid_scene* scene, size_t index, rapid_node* node, rapid_error** error)
 {
     return guarded(error, [&] {
         const SceneCall open(scene);
-        const SceneNode& found = at_place(open.scene().nodes(), place, "the scene has", "nodes");
-        give(node, {0, found.name.c_str(), found.type.c_str(), found.file.c_str(), found.line}, "node");
+        const SceneNode& found = at_index(open.scene().nodes(), index, "the scene has", "nodes");
+        store(node, {0, found.name.c_str(), found.type.c_str(), found.file.c_str(), found.line}, "node");
     });
 }
 
@@ -231,12 +232,12 @@ int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** err
     });
 }
 
-int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
-                              rapid_error** error)
+int rapid_scene_points_after(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
+                             rapid_error** error)
 {
     return guarded(error, [&] {
         not_null(frame, "frame") = nullptr;
-        *frame = new_frame(SceneCall(scene).scene().points_behind(&not_null(node, "node"), number).value());
+        *frame = new_frame(SceneCall(scene).scene().points_after(&not_null(node, "node"), number).value());
     });
 }
 
@@ -284,17 +285,17 @@ int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** er
 
 double rapid_scene_fps(rapid_scene* scene)
 {
-    return gotten([&] { return SceneCall(scene).scene().fps(); });
+    return value_or_default([&] { return SceneCall(scene).scene().fps(); });
 }
 
 int64_t rapid_scene_first_frame(rapid_scene* scene)
 {
-    return gotten([&] { return SceneCall(scene).scene().first_frame(); });
+    return value_or_default([&] { return SceneCall(scene).scene().first_frame(); });
 }
 
 int64_t rapid_scene_next_frame(rapid_scene* scene)
 {
-    return gotten([&] { return SceneCall(scene).scene().next_frame(); });
+    return value_or_default([&] { return SceneCall(scene).scene().next_frame(); });
 }
 
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error)
@@ -333,12 +334,12 @@ int rapid_scene_restore(rapid_scene* scene, rapid_snapshot* snapshot, rapid_erro
 
 int64_t rapid_snapshot_frame(rapid_snapshot* snapshot)
 {
-    return gotten([&] { return open_snapshot(snapshot)->frame(); });
+    return value_or_default([&] { return open_snapshot(snapshot)->frame(); });
 }
 
 uint64_t rapid_snapshot_size(rapid_snapshot* snapshot)
 {
-    return gotten([&] { return std::uint64_t{open_snapshot(snapshot)->size()}; });
+    return value_or_default([&] { return std::uint64_t{open_snapshot(snapshot)->size()}; });
 }
 
 int rapid_snapshot_write(rapid_snapshot* snapshot, const char* path, rapid_error** error)

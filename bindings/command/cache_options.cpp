@@ -20,7 +20,7 @@ void CacheOptions::declare(Options& options, const std::string& doc_of_folder, c
 
 void CacheOptions::check() const
 {
-    if (!asked() && every_) throw Error("--cache-every says how often a --cache is written; give one");
+    if (!requested() && every_) throw Error("--cache-every says how often a --cache is written; give one");
 }
 
 }  // namespace rapid

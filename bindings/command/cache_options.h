@@ -16,7 +16,7 @@ public:
     // Throws Error if --cache-every is given without --cache.
     void check() const;
 
-    bool asked() const { return !folder_.empty(); }
+    bool requested() const { return !folder_.empty(); }
     const std::string& folder() const { return folder_; }
     const std::optional<std::int64_t>& every() const { return every_; }
     bool again() const { return again_; }

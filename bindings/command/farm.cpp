@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 // Slurm's commands: sbatch, squeue, scancel.
 
 // Returns its standard output. Throws Error with its message if it fails.
-std::string said_by(const std::vector<std::string>& words)
+std::string standard_output_of(const std::vector<std::string>& words)
 {
     const ProgramOutput output = output_of(words);
     if (output.status == 0) return output.out;
@@ -36,7 +36,7 @@ std::int64_t submit(const FarmJob& job, const fs::path& script, std::vector<std:
     words.insert(words.begin(), {"sbatch", "--parsable"});
     words.insert(words.end(), job.options.begin(), job.options.end());
     words.push_back(script.string());
-    const std::string said = said_by(words);  // "17", or "17;CLUSTER"
+    const std::string said = standard_output_of(words);  // "17", or "17;CLUSTER"
     std::int64_t id = 0;
     const auto parsed = std::from_chars(said.data(), said.data() + said.size(), id);
     if (parsed.ec != std::errc() || id <= 0) throw Error(fmt::format("sbatch told no id of a job but \"{}\"", said));
@@ -129,7 +129,7 @@ void cancel(const std::set<std::int64_t>& jobs)
 {
     std::vector<std::string> words = {"scancel"};
     for (const std::int64_t job : jobs) words.push_back(fmt::format("{}", job));
-    if (words.size() > 1) said_by(words);
+    if (words.size() > 1) standard_output_of(words);
 }
 
 // Splits a text into words as a shell does at spaces; a part in quotes is one word.
@@ -216,7 +216,7 @@ public:
         SubmittedJob submitted = SubmittedJob::read(file_);
         require_slurm();
         const std::vector<TaskState> states = states_of(submitted);
-        if (action_ == "status") return tell(submitted, states);
+        if (action_ == "status") return report(submitted, states);
         return action_ == "cancel" ? cancel_all(submitted, states) : retry(submitted, states);
     }
 
@@ -235,7 +235,7 @@ private:
     static bool is_open(const TaskState& task) { return task.state == Stage::Running || task.state == Stage::Waiting; }
 
     // Returns status 1 if a task has failed or is lost.
-    int tell(const SubmittedJob& submitted, const std::vector<TaskState>& states) const
+    int report(const SubmittedJob& submitted, const std::vector<TaskState>& states) const
     {
         const FarmJob& job = submitted.job;
         const std::size_t count = job.tasks.size() + !job.last.empty();
@@ -330,8 +330,8 @@ void FarmOptions::declare(Options& options)
     options
         .add_repeated(
             "--farm-options",
-            [this](const std::vector<std::string>& texts) {
-                for (const std::string& text : texts)
+            [this](const std::vector<std::string>& strings) {
+                for (const std::string& text : strings)
                     for (std::string& word : split_words(text)) options_.push_back(std::move(word));
             },
             "options of sbatch, untouched: \"-p fx -t 2:00:00\"")
@@ -342,7 +342,7 @@ void FarmOptions::declare(Options& options)
 
 void FarmOptions::check() const
 {
-    if (asked()) return;
+    if (requested()) return;
     if (!options_.empty()) throw Error("--farm-options are for --farm; give --farm slurm, too");
     if (dry_run_) throw Error("--dry-run is for --farm; give --farm slurm, too");
 }

@@ -16,7 +16,7 @@ public:
 
     // Throws Error if an option that needs --farm is given without it.
     void check() const;
-    bool asked() const { return !farm_.empty(); }
+    bool requested() const { return !farm_.empty(); }
 
     // Returns the arguments of the command as given, without those above, without --threads, and without `others`.
     std::vector<std::string> words(const Options& options, const std::vector<std::string>& others) const;

@@ -72,9 +72,9 @@ void FileOptions::declare(Options& options)
     options
         .add_repeated(
             "-o,--output",
-            [this](const std::vector<std::string>& texts) {
-                for (const std::string& text : texts) parse_output_target(text);
-                files_.outputs = texts;
+            [this](const std::vector<std::string>& strings) {
+                for (const std::string& text : strings) parse_output_target(text);
+                files_.outputs = strings;
             },
             fmt::format("writes each frame: #### is its number, the extension chooses the format ({}, films: {}); "
                         "attributes behind a colon are written besides P, v and id, without them all are",

@@ -5,8 +5,8 @@
 
 namespace rapid {
 
-GracefulEnd::GracefulEnd(double grace, std::function<void(int signal)> too_late)
-    : grace_(grace), too_late_(std::move(too_late))
+GracefulEnd::GracefulEnd(double grace, std::function<void(int signal)> end_now)
+    : grace_(grace), end_now_(std::move(end_now))
 {
 }
 
@@ -27,7 +27,7 @@ void GracefulEnd::allow()
     is_allowed_ = true;
 }
 
-bool GracefulEnd::ask(int signal)
+bool GracefulEnd::request(int signal)
 {
     const std::lock_guard lock(mutex_);
     if (!is_allowed_ || signal_ != 0) return false;
@@ -48,7 +48,7 @@ void GracefulEnd::wait()
     if (changed_.wait_for(lock, std::chrono::duration<double>(grace_), [&] { return is_over_; })) return;
     const int signal = signal_;
     lock.unlock();
-    too_late_(signal);
+    end_now_(signal);
 }
 
 }  // namespace rapid

@@ -10,8 +10,8 @@ namespace rapid {
 
 class GracefulEnd {
 public:
-    // too_late: called with the signal from another thread when the grace period is over; it must not return.
-    GracefulEnd(double grace, std::function<void(int signal)> too_late);
+    // end_now: called with the signal from another thread when the grace period is over; it must not return.
+    GracefulEnd(double grace, std::function<void(int signal)> end_now);
     ~GracefulEnd();
     GracefulEnd(const GracefulEnd&) = delete;
     GracefulEnd& operator=(const GracefulEnd&) = delete;
@@ -20,7 +20,7 @@ public:
     void allow();
     // Called from the signals' thread. Returns false for the second signal, and if there is nothing to save: the run
     // must end now.
-    bool ask(int signal);
+    bool request(int signal);
     // Returns the received signal; 0: none.
     int signal() const;
 
@@ -28,7 +28,7 @@ private:
     void wait();
 
     const double grace_;
-    const std::function<void(int signal)> too_late_;
+    const std::function<void(int signal)> end_now_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     bool is_allowed_ = false, is_over_ = false;

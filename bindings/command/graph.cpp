@@ -38,7 +38,7 @@ public:
         const std::string extension = std::filesystem::path(file_).extension();
         if (!file_.empty() && extension != ".svg" && extension != ".dot" && extension != ".json")
             throw Error(fmt::format("-o {}: it must be a file of .svg, .dot or .json", file_));
-        if (untrusted_.asked() && !file_.empty() && extension != ".dot")
+        if (untrusted_.requested() && !file_.empty() && extension != ".dot")
             throw Error(fmt::format(
                 "-o {}: dot, a program of its own, lays it out, which --untrusted forbids; write .dot", file_));
         Threads threads(common.threads);

@@ -12,7 +12,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_of_warning = 4000;  // bytes printed at most
+constexpr std::size_t max_warning_bytes = 4000;  // bytes printed at most
 
 class Info : public Command, public Confined {
 public:
@@ -50,7 +50,7 @@ public:
                 if (!json_ && cache.sequence) print(path.string() + '\n');
                 if (!json_) print(report.text);
                 for (const std::string& what : points.warnings())
-                    if (!json_) print(fmt::format("left out    {}\n", shortened(what, most_of_warning)));
+                    if (!json_) print(fmt::format("left out    {}\n", shortened(what, max_warning_bytes)));
                 if (cache.sequence) json.member("frame", frame);
                 json.add_members(CheckedJson::parse(report.json));
                 json.member("left_out", points.warnings());

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-std::optional<int> whole(std::string_view text)
+std::optional<int> parse_integer(std::string_view text)
 {
     int number = 0;
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -20,11 +20,11 @@ std::optional<int> whole(std::string_view text)
 RunPart read_part(const std::string& text)
 {
     const std::size_t slash = text.find('/');
-    const std::optional<int> number = whole(text.substr(0, slash));
-    const std::optional<int> count = slash == std::string::npos ? std::nullopt : whole(text.substr(slash + 1));
-    if (!number || !count || *count < 1 || *count > most_parts || *number < 1 || *number > *count)
+    const std::optional<int> number = parse_integer(text.substr(0, slash));
+    const std::optional<int> count = slash == std::string::npos ? std::nullopt : parse_integer(text.substr(slash + 1));
+    if (!number || !count || *count < 1 || *count > max_parts || *number < 1 || *number > *count)
         throw Error(
-            fmt::format("--part = \"{}\"; it must be K/N, with K from 1 to N, and N at most {}", text, most_parts));
+            fmt::format("--part = \"{}\"; it must be K/N, with K from 1 to N, and N at most {}", text, max_parts));
     return {*number, *count};
 }
 

@@ -168,8 +168,8 @@ int run_processes(std::size_t count, int jobs, const std::function<std::vector<s
     return ended_by == 0 ? 0 : 128 + ended_by;
 }
 
-std::string run_in_child(const std::function<void(const TellParent& tell)>& work,
-                         const std::function<void(const json& event)>& hear)
+std::string run_in_child(const std::function<void(const ReportToParent& report)>& work,
+                         const std::function<void(const json& event)>& on_event)
 {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) throw file_error("no pipe", errno);
@@ -191,7 +191,7 @@ std::string run_in_child(const std::function<void(const TellParent& tell)>& work
     while (getline(&text, &capacity, pipe.get()) > 0) {
         const json event = json::parse(text, nullptr, false);
         if (event.is_discarded()) break;  // truncated when the process ended
-        hear(event);
+        on_event(event);
     }
     std::free(text);
     return ending_of(wait_for(child));

@@ -24,7 +24,7 @@ struct EndedProcess {
 int run_processes(std::size_t count, int jobs, const std::function<std::vector<std::string>(std::size_t)>& words,
                   const std::function<void(std::size_t, const EndedProcess&)>& ended);
 
-using TellParent = std::function<void(const CheckedJson& event)>;
+using ReportToParent = std::function<void(const CheckedJson& event)>;
 
 // Forks. The child does `work`, reports events and ends; this process hears each as it arrives. Returns an empty text,
 // or how the child ended abnormally: "signal 11 (Segmentation fault)", "status 1".
@@ -32,8 +32,8 @@ using TellParent = std::function<void(const CheckedJson& event)>;
 // This process must have no other threads (a child would inherit locks that are never freed), so sessions and the
 // runtime, which start threads, belong in children. A child's standard output goes to standard error, so that output of
 // scripts does not mix with the parent's results.
-std::string run_in_child(const std::function<void(const TellParent& tell)>& work,
-                         const std::function<void(const CheckedJson& event)>& hear);
+std::string run_in_child(const std::function<void(const ReportToParent& report)>& work,
+                         const std::function<void(const CheckedJson& event)>& on_event);
 
 // Makes this process end when its parent does, however the parent ends.
 void end_with_parent(int parent);

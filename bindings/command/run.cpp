@@ -72,19 +72,19 @@ public:
                 "--parts", [this](const std::string& text) { parts_ = read_whole("--parts", text, 1); },
                 "with --farm: tasks, each of one part of the points, which are then merged [default 1]")
             .type_name("N");
-        options.add_flag(Watch::tell_option, tell_).internal();  // a run of --watch
+        options.add_flag(Watch::report_option, reports_files_).internal();  // a run of --watch
     }
 
     void confine(const CommonOptions& common) override
     {
-        if (watch_ && untrusted_.asked())
+        if (watch_ && untrusted_.requested())
             throw Error("--watch starts processes, which --untrusted forbids; give one of them");
-        if (watch_ && cache_.asked())
+        if (watch_ && cache_.requested())
             throw Error("--watch runs a graph that changes, of which --cache holds nothing; give one of them");
-        if (!farm_.asked()) cache_.check();  // on a farm each task has its own
-        if (cache_.again() && !cache_.asked())
+        if (!farm_.requested()) cache_.check();  // on a farm each task has its own
+        if (cache_.again() && !cache_.requested())
             throw Error("--again says what to do with a --cache; give one, or leave it out");
-        if (untrusted_.asked() && files_.makes_films())
+        if (untrusted_.requested() && files_.makes_films())
             throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
         check_farm();
         options_.frames = frames_;
@@ -97,11 +97,11 @@ public:
         untrusted_.confine([&] { return access(); }, common);
     }
     // --watch runs the graph in separate processes.
-    bool takes_plugins() const override { return !watch_ || tell_; }
+    bool takes_plugins() const override { return !watch_ || reports_files_; }
 
     int run(const CommonOptions& common) override
     {
-        if (watch_ && !tell_) return Watch(graph_.file(), quiet_).run();
+        if (watch_ && !reports_files_) return Watch(graph_.file(), quiet_).run();
         if (durable_) make_files_durable();
         std::signal(SIGPIPE, SIG_IGN);  // the reader of its output may close the pipe
         Threads threads(common.threads);
@@ -116,7 +116,7 @@ public:
             abandon(128 + signal, "interrupted; the frame took longer than the --grace, and is dropped");
         });
         const SignalThread signals([&](int signal) {
-            if (end.ask(signal))
+            if (end.request(signal))
                 run->end_after_frame();
             else
                 abandon(128 + signal, "interrupted");
@@ -131,7 +131,7 @@ public:
                 const MemoryLimit limit(graph_.file(), fail);
                 run->prepare().value();
             }
-            if (farm_.asked()) return submit(*run);
+            if (farm_.requested()) return submit(*run);
             terminal.begin(run->first_frame(), run->frames().last);
             const RunOutcome outcome = run->run().value();
             return terminal.end(outcome, end.signal());
@@ -161,8 +161,8 @@ private:
         scene.keep_all = keep_all_;
         scene.estimate_errors = !quiet_ || !options_.statistics.empty();
         SceneHooks hooks;
-        hooks.late = hooks.beyond_memory = end;
-        if (tell_) hooks.reads = [](const std::string& file) { Watch::tell(file); };
+        hooks.on_script_timeout = hooks.on_memory_exceeded = end;
+        if (reports_files_) hooks.on_file_read = [](const std::string& file) { Watch::report(file); };
         return SceneInside::make(graph_.file(), std::move(scene), std::move(hooks), options_, std::move(listener))
             .value();
     }
@@ -170,11 +170,11 @@ private:
     void check_farm() const
     {
         farm_.check();
-        if (!farm_.asked() && parts_ > 1) throw Error("--parts is for --farm; give --farm slurm, or --part K/N");
-        if (parts_ > most_parts) throw Error(fmt::format("--parts = {}; it must be at most {}", parts_, most_parts));
-        if (!farm_.asked()) return;
+        if (!farm_.requested() && parts_ > 1) throw Error("--parts is for --farm; give --farm slurm, or --part K/N");
+        if (parts_ > max_parts) throw Error(fmt::format("--parts = {}; it must be at most {}", parts_, max_parts));
+        if (!farm_.requested()) return;
         if (watch_) throw Error("--watch runs here, and --farm elsewhere; give one of them");
-        if (untrusted_.asked())
+        if (untrusted_.requested())
             throw Error("--farm starts programs, which --untrusted forbids; submit `rapid run --untrusted` by sbatch");
         if (parts_ > 1 && part_.part()) throw Error("--parts and --part are given together; keep one of them");
     }
@@ -232,7 +232,7 @@ private:
     FarmOptions farm_;
     std::int64_t parts_ = 1;
     UntrustedOptions untrusted_;
-    bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, tell_ = false;
+    bool durable_ = false, keep_all_ = false, quiet_ = false, watch_ = false, reports_files_ = false;
 };
 RAPID_COMMAND(Run);
 

@@ -59,11 +59,11 @@ int RunTerminal::end(const RunOutcome& outcome, int signal)
 void RunTerminal::abandon(SceneRun& run, int status, const std::string& why)
 {
     // The run's own thread holds the lock only briefly, unless its terminal is stopped; then proceed without it.
-    if (const auto told = SceneInside::abandon(run); told && mutex_.try_lock_for(std::chrono::seconds(1))) {
+    if (const auto abandoned = SceneInside::abandon(run); abandoned && mutex_.try_lock_for(std::chrono::seconds(1))) {
         erase_progress();
-        for (const std::string& warning : told->warnings) print_warning(warning);
+        for (const std::string& warning : abandoned->warnings) print_warning(warning);
         print_error(Error(why), false);
-        print_unwritten(told->unwritten);
+        print_unwritten(abandoned->unwritten);
     }
     remove_unfinished_files();
     _exit(status);

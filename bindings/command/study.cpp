@@ -140,23 +140,23 @@ json json_of(const Study& study)
             {"repeat_runs", study.repeat_runs}};
 }
 
-Study study_of(const json& told)
+Study study_of(const json& fields)
 {
     Study study;
-    study.file = told.at("file");
-    study.name = told.at("name");
-    study.lines = told.at("lines").get<std::vector<std::string>>();
-    for (const auto& [knob, values] : told.at("sweep").items())
+    study.file = fields.at("file");
+    study.name = fields.at("name");
+    study.lines = fields.at("lines").get<std::vector<std::string>>();
+    for (const auto& [knob, values] : fields.at("sweep").items())
         for (const json& value : values) study.sweep[knob].push_back(value_of(value));
-    study.first = told.at("frames")[0];
-    study.last = told.at("frames")[1];
-    study.error = told.at("error");
-    study.last_frame_only = told.at("last_frame_only");
-    if (!told.at("reference").is_null()) {
+    study.first = fields.at("frames")[0];
+    study.last = fields.at("frames")[1];
+    study.error = fields.at("error");
+    study.last_frame_only = fields.at("last_frame_only");
+    if (!fields.at("reference").is_null()) {
         study.reference.emplace();
-        for (const auto& [knob, value] : told.at("reference").items()) (*study.reference)[knob] = value_of(value);
+        for (const auto& [knob, value] : fields.at("reference").items()) (*study.reference)[knob] = value_of(value);
     }
-    study.repeat_runs = told.at("repeat_runs");
+    study.repeat_runs = fields.at("repeat_runs");
     return study;
 }
 
@@ -169,14 +169,14 @@ json json_of(const StudyRow& row)
             {"missing", row.missing}};
 }
 
-StudyRow row_of(const json& told, const Knobs& knobs)
+StudyRow row_of(const json& fields, const Knobs& knobs)
 {
     return {knobs,
-            told.at("error"),
-            told.at("rounding"),
-            told.at("seconds").get<std::vector<double>>(),
-            told.at("compared"),
-            told.at("missing"),
+            fields.at("error"),
+            fields.at("rounding"),
+            fields.at("seconds").get<std::vector<double>>(),
+            fields.at("compared"),
+            fields.at("missing"),
             ""};
 }
 
@@ -193,10 +193,10 @@ using ChildWork = std::function<json(const StudySource& source, const StudyScene
 
 // Does the work in the child. Reports {"run": number of completed runs} to the parent after each run, and at the end
 // {"result": ...} or {"failed": why, "refused": true if no frame was computed}.
-void do_work(StudySource source, int threads, const ChildWork& work, const TellParent& tell)
+void do_work(StudySource source, int threads, const ChildWork& work, const ReportToParent& report)
 {
     bool started = false;
-    const auto fail = [&](const std::string& why, bool refused) { tell({{"failed", why}, {"refused", refused}}); };
+    const auto fail = [&](const std::string& why, bool refused) { report({{"failed", why}, {"refused", refused}}); };
     const auto end = [&](const std::string& message) {
         fail(message, false);
         _exit(status_done);
@@ -204,13 +204,13 @@ void do_work(StudySource source, int threads, const ChildWork& work, const TellP
     source.session.on_timeout = end;
     const auto progress = [&](int runs) {
         started = true;
-        if (runs > 0) tell({{"run", runs}});
+        if (runs > 0) report({{"run", runs}});
     };
     Threads all(threads);
     try {
         all.run([&] {
             const MemoryLimit limit(source.file, end);
-            tell({{"result", work(source, progress)}});
+            report({{"result", work(source, progress)}});
         });
     } catch (const std::bad_alloc&) {
         fail("out of memory", !started);
@@ -227,8 +227,9 @@ public:
     void declare(Options& options) override
     {
         graph_.declare(options);
-        const auto list = [&](const char* option, std::vector<std::string>& texts, const char* type, const char* doc) {
-            options.add_option(option, texts, doc).type_name(type).one_value();
+        const auto list = [&](const char* option, std::vector<std::string>& strings, const char* type,
+                              const char* doc) {
+            options.add_option(option, strings, doc).type_name(type).one_value();
         };
         list("--sweep", sweep_, "NODE.PARAM=A,B,...",
              "of a graph: the values that a node's parameter takes; NODE is its name, or its type where one node has "
@@ -300,7 +301,7 @@ public:
 
 private:
     // Returns the study of a graph that the options describe.
-    Study asked() const
+    Study requested() const
     {
         Study study;
         study.file = graph_.file();
@@ -350,7 +351,7 @@ private:
         Outcome outcome;
         json last;
         const std::string ending =
-            run_in_child([&](const TellParent& tell) { do_work(std::move(source), threads_, work, tell); },
+            run_in_child([&](const ReportToParent& report) { do_work(std::move(source), threads_, work, report); },
                          [&](const json& event) {
                              if (!event.contains("run"))
                                  last = event;
@@ -376,7 +377,7 @@ private:
                                                 {error_.has_value(), "--error"},
                                                 {error_frames_.has_value(), "--error-frames"}})
                 if (given) throw Error(fmt::format("{} goes with --sweep; a study file says it itself", option));
-        const Study study = is_scene() ? asked() : Study();
+        const Study study = is_scene() ? requested() : Study();
         const Outcome outcome = in_child([&](const StudySource& source, const StudyScene::Progress&) -> json {
             if (!source.is_scene) return json_of(read_study(source));
             const std::int64_t first = StudyScene(study, source, study.rows().front()).first_frame();
@@ -434,15 +435,15 @@ private:
     // Rows of one line share a reference, which is cached until another one is needed.
     const Reference& reference_of(const Study& study, const Knobs& knobs, RowProgress& progress)
     {
-        const Knobs wanted = study.reference ? study.reference_of(knobs) : Knobs();
-        const std::string label = study.label(wanted);
+        const Knobs reference_knobs = study.reference ? study.reference_of(knobs) : Knobs();
+        const std::string label = study.label(reference_knobs);
         if (kept_ && kept_->label == label) return *kept_;
         kept_.emplace().label = label;
         if (!study.reference) return *kept_;
         progress.now("reference: " + label);
         RecordLog& frames = kept_->frames.emplace(RecordLog::in_memory());
         kept_->outcome = in_child([&](const StudySource& source, const StudyScene::Progress& runs) {
-            StudyScene(study, source, wanted).keep_frames(frames, runs);
+            StudyScene(study, source, reference_knobs).keep_frames(frames, runs);
             return json();
         });
         return *kept_;

@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int tell_descriptor = 3;  // in the child
-constexpr int settle_time = 100;    // ms without a change: editors and exporters write several files in a row
+constexpr int report_descriptor = 3;  // in the child
+constexpr int settle_time = 100;      // ms without a change: editors and exporters write several files in a row
 
 sigset_t watched_signals()
 {
@@ -40,13 +40,13 @@ int checked(int descriptor, const char* what)
     return descriptor;
 }
 
-// This process's command line with tell_option added: a run that has it does not watch.
+// This process's command line with report_option added: a run that has it does not watch.
 std::vector<std::string> arguments_of_run()
 {
     std::ifstream file("/proc/self/cmdline", std::ios::binary);
     std::vector<std::string> words;
     for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
-    words.insert(words.begin() + 1, Watch::tell_option);
+    words.insert(words.begin() + 1, Watch::report_option);
     return words;
 }
 
@@ -54,10 +54,10 @@ fs::path whole_path(const fs::path& path) { return fs::absolute(path).lexically_
 
 }  // namespace
 
-void Watch::tell(const fs::path& file)
+void Watch::report(const fs::path& file)
 {
     const std::string line = whole_path(file).string() + '\n';
-    [[maybe_unused]] const ssize_t ignored = write(tell_descriptor, line.data(), line.size());  // it may have gone
+    [[maybe_unused]] const ssize_t ignored = write(report_descriptor, line.data(), line.size());  // it may have gone
 }
 
 Watch::Watch(fs::path graph, bool quiet)
@@ -76,7 +76,7 @@ Watch::~Watch()
 {
     close(notify_);
     close(signals_);
-    if (told_ >= 0) close(told_);
+    if (reports_ >= 0) close(reports_);
 }
 
 int Watch::run()
@@ -84,12 +84,12 @@ int Watch::run()
     start();
     bool running = true;
     while (true) {
-        std::array<pollfd, 3> ready = {{{notify_, POLLIN, 0}, {signals_, POLLIN, 0}, {told_, POLLIN, 0}}};
+        std::array<pollfd, 3> ready = {{{notify_, POLLIN, 0}, {signals_, POLLIN, 0}, {reports_, POLLIN, 0}}};
         // Waits first for the stopped run to end, then for the changes to settle.
         const bool settling = !changed_.empty() && child_ == 0;
         const int events = poll(ready.data(), ready.size(), settling ? settle_time : -1);
         if (events < 0 && errno != EINTR) throw Error(fmt::format("--watch: {}", std::strerror(errno)));
-        read_told();
+        read_reports();
         read_events();
         read_signals();
         collect(running);
@@ -115,7 +115,7 @@ void Watch::collect(bool& running)
     if (child_ != 0 && waitpid(child_, nullptr, WNOHANG) == child_) child_ = 0;
     if (child_ != 0 || !running) return;
     running = false;
-    read_told();
+    read_reports();
     if (changed_.empty() && ended_by_ == 0)
         say(fmt::format("watching {} {}; Ctrl-C ends it", files_.size(), files_.size() == 1 ? "file" : "files"));
 }
@@ -126,15 +126,15 @@ void Watch::start()
     files_.clear();
     for (const auto& [number, folder] : folders_) inotify_rm_watch(notify_, number);
     folders_.clear();
-    if (told_ >= 0) close(told_);
-    told_text_.clear();
+    if (reports_ >= 0) close(reports_);
+    partial_report_.clear();
     started_ = fs::file_time_type::clock::now();
     add(whole_path(graph_));
 
     int ends[2];
     checked(pipe2(ends, O_CLOEXEC), "pipe");
-    told_ = ends[0];
-    fcntl(told_, F_SETFL, O_NONBLOCK);
+    reports_ = ends[0];
+    fcntl(reports_, F_SETFL, O_NONBLOCK);
     std::vector<std::string> words = arguments_of_run();
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
@@ -142,7 +142,7 @@ void Watch::start()
 
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], tell_descriptor);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], report_descriptor);
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     sigset_t none;
@@ -174,18 +174,19 @@ void Watch::add(const fs::path& file)
     }
 }
 
-void Watch::read_told()
+void Watch::read_reports()
 {
     std::array<char, 4096> buffer;
     ssize_t size = 0;
-    while (told_ >= 0 && (size = read(told_, buffer.data(), buffer.size())) > 0)
-        told_text_.append(buffer.data(), static_cast<std::size_t>(size));
-    if (size == 0 && told_ >= 0) {  // the run has closed it
-        close(told_);
-        told_ = -1;
+    while (reports_ >= 0 && (size = read(reports_, buffer.data(), buffer.size())) > 0)
+        partial_report_.append(buffer.data(), static_cast<std::size_t>(size));
+    if (size == 0 && reports_ >= 0) {  // the run has closed it
+        close(reports_);
+        reports_ = -1;
     }
-    for (std::size_t end = 0; (end = told_text_.find('\n')) != std::string::npos; told_text_.erase(0, end + 1))
-        add(told_text_.substr(0, end));
+    for (std::size_t end = 0; (end = partial_report_.find('\n')) != std::string::npos;
+         partial_report_.erase(0, end + 1))
+        add(partial_report_.substr(0, end));
 }
 
 void Watch::read_events()

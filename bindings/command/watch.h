@@ -15,8 +15,8 @@ namespace rapid {
 class Watch {
 public:
     // The hidden option of a run that is watched; it calls tell() with each file.
-    static constexpr const char* tell_option = "--tell-files";
-    static void tell(const std::filesystem::path& file);
+    static constexpr const char* report_option = "--tell-files";
+    static void report(const std::filesystem::path& file);
 
     Watch(std::filesystem::path graph, bool quiet);
     ~Watch();
@@ -30,7 +30,7 @@ private:
     void start();
     void stop();
     void add(const std::filesystem::path& file);
-    void read_told();
+    void read_reports();
     void read_events();
     void read_signals();
     void collect(bool& running);
@@ -39,8 +39,8 @@ private:
     const std::filesystem::path graph_;
     const bool quiet_;
     const int notify_, signals_;  // descriptors: inotify, signalfd
-    int told_ = -1;               // the pipe from the run
-    std::string told_text_;       // of it, the part that is not yet a whole line
+    int reports_ = -1;            // the pipe from the run
+    std::string partial_report_;  // of it, the part that is not yet a whole line
     int child_ = 0;               // 0: no run
     int ended_by_ = 0;            // a signal that ends the watch
     std::filesystem::file_time_type started_;

@@ -318,8 +318,8 @@ public:
         options
             .add_repeated(
                 "--vary",
-                [this](const std::vector<std::string>& texts) {
-                    for (const std::string& text : texts)
+                [this](const std::vector<std::string>& strings) {
+                    for (const std::string& text : strings)
                         settings_.push_back(read_swept_setting("--vary", text, "NAME"));
                 },
                 "the values of a rapid.param, or of a node's parameter: solve.substeps=1,4")
@@ -357,7 +357,7 @@ public:
         farm_.check();
         if (!collect_.empty()) return collect();
         check(common);
-        if (farm_.asked()) return submit(common);
+        if (farm_.requested()) return submit(common);
         const TemporaryFolder statistics("wedge");
         const int signal = run_processes(
             rows_.size(), static_cast<int>(std::min(jobs_, static_cast<std::int64_t>(rows_.size()))),
@@ -488,10 +488,10 @@ private:
                                           fmt::format("--threads={}", std::max<std::int64_t>(1, threads / jobs_))};
         for (const std::string& frames : given_->values_of("--frames")) words.push_back("--frames=" + frames);
         // A row's journal records its work: one with the same fingerprint is not run again.
-        const fs::path of_rows = cache_.asked() ? fs::path(cache_.folder()) : folder_ / "wedge.cache";
+        const fs::path of_rows = cache_.requested() ? fs::path(cache_.folder()) : folder_ / "wedge.cache";
         words.push_back("--cache=" + (of_rows / hash_text(content_hash(row.label()))).string());
         words.push_back("--cache-replace");
-        if (const std::int64_t every = cache_.asked() ? cache_.every().value_or(-1) : 0; every >= 0)
+        if (const std::int64_t every = cache_.requested() ? cache_.every().value_or(-1) : 0; every >= 0)
             words.push_back(fmt::format("--cache-every={}", every));
         if (cache_.again()) words.push_back("--again");
         add_shared(words, row, common);

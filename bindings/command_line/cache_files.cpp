@@ -23,11 +23,11 @@ CacheFiles find_cache(const std::string& text)
     return found;
 }
 
-SandboxAccess access_to_caches(const std::vector<std::string>& texts)
+SandboxAccess access_to_caches(const std::vector<std::string>& strings)
 {
     SandboxAccess access;
     std::error_code none;
-    for (const std::string& text : texts) {
+    for (const std::string& text : strings) {
         const std::filesystem::path path =
             std::filesystem::exists(text, none) ? std::filesystem::path(text) : folder_of(text);
         if (std::filesystem::exists(path, none)) access.readable.push_back(path);

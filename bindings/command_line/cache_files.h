@@ -21,6 +21,6 @@ CacheFiles find_cache(const std::string& text);
 
 // Returns the files that a sandboxed process reads: a file, or the folder of a sequence. Missing names are left to
 // find_cache().
-SandboxAccess access_to_caches(const std::vector<std::string>& texts);
+SandboxAccess access_to_caches(const std::vector<std::string>& strings);
 
 }  // namespace rapid

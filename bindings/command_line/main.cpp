@@ -134,12 +134,12 @@ std::optional<int> read_arguments(CLI::App& app, Arguments arguments)
 {
     std::string who = "rapid";
     try {
-        const std::size_t place = find_command(app, arguments);
-        CLI::App* chosen = place < arguments.size() ? app.get_subcommand(arguments[place]) : nullptr;
+        const std::size_t index = find_command(app, arguments);
+        CLI::App* chosen = index < arguments.size() ? app.get_subcommand(arguments[index]) : nullptr;
         if (chosen) {
             who += " " + chosen->get_name();
-            std::rotate(arguments.begin(), arguments.begin() + static_cast<std::ptrdiff_t>(place),
-                        arguments.begin() + static_cast<std::ptrdiff_t>(place) + 1);
+            std::rotate(arguments.begin(), arguments.begin() + static_cast<std::ptrdiff_t>(index),
+                        arguments.begin() + static_cast<std::ptrdiff_t>(index) + 1);
         } else if (arguments.front() != "--help" && arguments.front() != "-h" && arguments.front() != "--version") {
             throw no_command(app, arguments);
         }
@@ -248,8 +248,8 @@ int run(const Arguments& arguments)
         print(app.help());
         return finish(status_done);
     }
-    const std::size_t place = find_command(app, arguments);
-    if (place < arguments.size() && !all.at(arguments[place])) return become(program(arguments[place]), arguments);
+    const std::size_t index = find_command(app, arguments);
+    if (index < arguments.size() && !all.at(arguments[index])) return become(program(arguments[index]), arguments);
     if (const std::optional<int> status = read_arguments(app, arguments)) return *status;
     for (const auto& command : commands)
         if (app.got_subcommand(command->name())) return run_command(*command, common);

@@ -67,12 +67,12 @@ Option Options::add_repeated(const std::string& names,
 
 std::vector<std::string> Options::values_of(const std::string& name) const { return app_->get_option(name)->results(); }
 
-std::vector<std::string> Options::words(const std::vector<std::string>& left_out) const
+std::vector<std::string> Options::words(const std::vector<std::string>& excluded) const
 {
     std::vector<std::string> words = {app_->get_name()};
     for (const CLI::Option* option : static_cast<const CLI::App*>(app_)->get_options()) {
         const std::string name = option->get_name(false, false);
-        if (option->count() == 0 || std::find(left_out.begin(), left_out.end(), name) != left_out.end()) continue;
+        if (option->count() == 0 || std::find(excluded.begin(), excluded.end(), name) != excluded.end()) continue;
         const bool is_flag = option->get_items_expected_max() == 0;
         for (const std::string& value : option->results())
             words.push_back(is_flag ? name : name.starts_with('-') ? fmt::format("{}={}", name, value) : value);

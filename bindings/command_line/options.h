@@ -50,8 +50,8 @@ public:
     // Returns the values given to an option.
     std::vector<std::string> values_of(const std::string& name) const;
 
-    // Returns the command with its arguments as given, without the options `left_out`.
-    std::vector<std::string> words(const std::vector<std::string>& left_out) const;
+    // Returns the command with its arguments as given, without the options `excluded`.
+    std::vector<std::string> words(const std::vector<std::string>& excluded) const;
 
 private:
     CLI::App* app_;

@@ -19,7 +19,7 @@
 
 #include "bindings/scene/installation.h"
 #include "runtime/base/error.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 
 namespace rapid {
 namespace {

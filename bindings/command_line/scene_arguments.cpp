@@ -14,7 +14,7 @@ namespace {
 // The memory limit applies to opening; the scene itself watches frames, since it knows the node.
 Scene opened(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
-    const MemoryLimit limit(file, hooks.late);
+    const MemoryLimit limit(file, hooks.on_script_timeout);
     return SceneInside::open(file, std::move(options), std::move(hooks)).value();
 }
 
@@ -26,8 +26,8 @@ void SceneArguments::declare(Options& options)
     options
         .add_repeated(
             "--set",
-            [this](const std::vector<std::string>& texts) {
-                for (const std::string& text : texts) {
+            [this](const std::vector<std::string>& strings) {
+                for (const std::string& text : strings) {
                     const std::size_t equals = text.find('=');
                     if (equals == std::string::npos || equals == 0)
                         throw Error(fmt::format("--set \"{}\"; it must be NAME=VALUE", text));
@@ -75,8 +75,8 @@ SceneOptions SceneArguments::scene_options() const
 Scene SceneArguments::open(const CommonOptions& common, AtLimit frame) const
 {
     SceneHooks hooks;
-    hooks.late = end_at_limit(common);
-    if (frame == AtLimit::EndsProcess) hooks.beyond_memory = hooks.late;
+    hooks.on_script_timeout = end_at_limit(common);
+    if (frame == AtLimit::EndsProcess) hooks.on_memory_exceeded = hooks.on_script_timeout;
     return opened(file_, scene_options(), std::move(hooks));
 }
 
@@ -85,7 +85,7 @@ Scene SceneArguments::open_other(const std::string& file, const CommonOptions& c
     SceneOptions options = scene_options();
     options.set.clear();
     SceneHooks hooks;
-    hooks.late = end_at_limit(common);
+    hooks.on_script_timeout = end_at_limit(common);
     return opened(file, std::move(options), std::move(hooks));
 }
 

@@ -25,10 +25,10 @@ public:
     // Returns options with the settings; output of scripts and warnings are printed.
     SceneOptions scene_options() const;
     // Action for a frame that does not end at the memory limit when requested.
-    enum class AtLimit { GoesOn, EndsProcess };
+    enum class AtLimit { Continues, EndsProcess };
     // Opens the scene of a command that writes none of its files. A script that exceeds its timeout ends the process,
     // now or in a later frame. Throws Error if the file or a --set is wrong.
-    Scene open(const CommonOptions& common, AtLimit frame = AtLimit::GoesOn) const;
+    Scene open(const CommonOptions& common, AtLimit frame = AtLimit::Continues) const;
     // Opens another scene with the same limits; --set applies only to the first one.
     Scene open_other(const std::string& file, const CommonOptions& common) const;
 

@@ -25,7 +25,7 @@ class UntrustedOptions {
 public:
     // whose: the subject of --allow-read, "graph" or "file".
     void declare(Options& options, const std::string& whose);
-    bool asked() const { return untrusted_; }
+    bool requested() const { return untrusted_; }
 
     // Sandboxes the process if requested. access: the files that the command itself reads and writes, besides
     // --allow-read and plugins. Call it before plugins are loaded: their initialisation runs in the sandbox, too.

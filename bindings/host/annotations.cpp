@@ -194,7 +194,7 @@ std::string maker_of(const Maker& maker)
                               tool ? "LevelSet:" + own : "rapid." + called, arguments);
 }
 
-std::string makers_but(const std::set<std::string>& excepted)
+std::string makers_except(const std::set<std::string>& excepted)
 {
     std::string text;
     for (const Maker* maker : all_makers())
@@ -224,7 +224,7 @@ std::string annotations_of(const Registry& registry)
     text->erase(0, text->find("---@meta"));
     std::string nodes;
     for (const NodeType* type : registry.types()) nodes += annotated(*type);
-    fill_in(*text, "makers", [](const std::set<std::string>& excepted) { return makers_but(excepted); });
+    fill_in(*text, "makers", [](const std::set<std::string>& excepted) { return makers_except(excepted); });
     fill_in(*text, "point_fields", [](const auto&) { return point_fields(); });
     fill_in(*text, "nodes", [&](const auto&) { return nodes; });
     return *text;

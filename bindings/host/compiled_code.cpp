@@ -32,7 +32,7 @@ _Unwind_Reason_Code visit(_Unwind_Context* frame, void* data)
 
 }  // namespace
 
-bool is_asked_by_compiled_code()
+bool is_called_by_compiled_code()
 {
     dl_find_object luajit;
     if (_dl_find_object(reinterpret_cast<void*>(&lua_gettop), &luajit) != 0) return false;

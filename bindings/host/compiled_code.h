@@ -8,6 +8,6 @@
 namespace rapid {
 
 // Returns true if compiled code made the current request. Call it below LuaJIT's allocator. It allocates nothing.
-bool is_asked_by_compiled_code();
+bool is_called_by_compiled_code();
 
 }  // namespace rapid

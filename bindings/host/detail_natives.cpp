@@ -84,21 +84,21 @@ int neighbours(State& state)
 {
     lua_State* L = state.lua();
     DetailRun& detail = detail_run_of(state);
-    const auto place = static_cast<std::uint32_t>(lua_tonumber(L, 1));
+    const auto index = static_cast<std::uint32_t>(lua_tonumber(L, 1));
     const double radius = lua_tonumber(L, 2);
     const Strided<Vec3f> P = std::as_const(detail.points).P().read();
     auto grid = detail.neighbours.find(radius);
     if (grid == detail.neighbours.end()) {
-        std::vector<Vec3f> places(detail.points.size());
-        for (std::size_t i = 0; i < places.size(); ++i) places[i] = P[i];
-        grid = detail.neighbours.try_emplace(radius, places, radius).first;
+        std::vector<Vec3f> positions(detail.points.size());
+        for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = P[i];
+        grid = detail.neighbours.try_emplace(radius, positions, radius).first;
     }
     std::vector<std::uint32_t> found;
-    grid->second.find(P[place].cast<double>(), found);
+    grid->second.find(P[index].cast<double>(), found);
     lua_createtable(L, static_cast<int>(found.size()), 0);
     int n = 0;
     for (const std::uint32_t i : found) {
-        if (i == place) continue;
+        if (i == index) continue;
         lua_pushnumber(L, i + 1.0);
         lua_rawseti(L, -2, ++n);
     }

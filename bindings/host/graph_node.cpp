@@ -7,7 +7,7 @@
 #include "bindings/host/construct.h"
 #include "bindings/host/lua_text.h"
 #include "bindings/host/objects.h"
-#include "bindings/host/script_place.h"
+#include "bindings/host/script_location.h"
 #include "bindings/host/script_type.h"
 #include "runtime/base/at_node.h"
 #include "runtime/graph/registry.h"
@@ -48,7 +48,7 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
             continue;
         }
         KernelSource source;
-        source.location = place_of_function(L, -1);
+        source.location = location_of_function(L, -1);
         source.number = state.add_kernel();
         source.of_the_set = of_the_set;
         source.may_compute_groups = param.internal && names_groups(type);
@@ -118,7 +118,7 @@ std::string written(const Value& value)
 
 // Refuses `:emit { source = chain }` and shows how :spawn takes the arguments, which follow the type on the stack. Also
 // refuses `inherit`, which is not similar enough to inherit_velocity to be suggested.
-void refuse_former_words(State& state)
+void refuse_former_names(State& state)
 {
     lua_State* L = state.lua();
     lua_getfield(L, 2, "source");
@@ -132,20 +132,20 @@ void refuse_former_words(State& state)
         if (is_given) throw Error("unknown parameter \"inherit\"; did you mean \"inherit_velocity\"?");
         return;
     }
-    std::map<std::string, std::string> texts;
+    std::map<std::string, std::string> strings;
     for (lua_pushnil(L); lua_next(L, 2); lua_pop(L, 1)) {
         if (lua_type(L, -2) != LUA_TSTRING) continue;
         const std::string name = text_at(L, -2);
         const bool is_share = name == "inherit" && !lua_istable(L, -1) && lua_type(L, -1) != LUA_TSTRING;
         const bool is_function = lua_isfunction(L, -1);
         const std::string variable = is_function || lua_isuserdata(L, -1) ? variable_of(L, lua_gettop(L)) : "";
-        texts[is_share ? "inherit_velocity" : name] = !variable.empty() ? variable
-                                                      : is_function     ? "function(...) ... end"
-                                                                        : written(to_value(state, -1));
+        strings[is_share ? "inherit_velocity" : name] = !variable.empty() ? variable
+                                                        : is_function     ? "function(...) ... end"
+                                                                          : written(to_value(state, -1));
     }
-    texts.erase("source");
+    strings.erase("source");
     std::string call = fmt::format(":spawn {{ from = {}", chain.empty() ? "chain" : chain);
-    for (const auto& [name, text] : texts) call += fmt::format(", {} = {}", name, text);
+    for (const auto& [name, text] : strings) call += fmt::format(", {} = {}", name, text);
     Error error(fmt::format("source is a node, whose points :spawn takes; write {} }}", call));
     lua_getfield(L, 2, "name");
     if (lua_type(L, -1) == LUA_TSTRING) error.in_node(text_at(L, -1));
@@ -194,7 +194,7 @@ int make_node(State& state)
     const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
     const std::string number_name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);
     copy_table(state.lua(), 2);
-    if (type.name == "emit") name_errors(number_name, where(state), [&] { refuse_former_words(state); });
+    if (type.name == "emit") name_errors(number_name, where(state), [&] { refuse_former_names(state); });
     const std::map<std::string, ObjectPtr> kernels = take_kernels(state, type, 2);
     return construct(state, [&]() -> ObjectPtr {
         auto node = make_node();

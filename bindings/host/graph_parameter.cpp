@@ -33,9 +33,9 @@ std::vector<double> numbers_in(std::string text)
 // Returns a text such as "5000" as a value of the default's type. Throws Error if it is not one.
 Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
 {
-    const auto refuse = [&](const char* wanted) -> Value {
+    const auto refuse = [&](const char* expected) -> Value {
         throw Error(fmt::format("{} {}={}: the parameter is {}, as its default {} is", name_of(Setting::Value), name,
-                                text, wanted, describe(fallback)));
+                                text, expected, describe(fallback)));
     };
     if (fallback.get<std::string>()) return Value(text);
     if (fallback.get<bool>()) {
@@ -66,9 +66,9 @@ int declare_parameter(State& state)
     ScriptHost& host = state.host();
     if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
     const std::string name = text_at(state.lua(), 1);
-    const auto place = host.parameter_places.find(name);
+    const auto index = host.parameter_indices.find(name);
     const Session::Parameter* const known =
-        place == host.parameter_places.end() ? nullptr : &host.parameters[place->second];
+        index == host.parameter_indices.end() ? nullptr : &host.parameters[index->second];
     if (known && !state.is_main()) {
         push(state, known->value);
         return 1;
@@ -97,7 +97,7 @@ int declare_parameter(State& state)
     }
     const auto setting = host.options().set.find(name);
     const Value value = setting == host.options().set.end() ? fallback : parse_setting(name, setting->second, fallback);
-    host.parameter_places.emplace(name, host.parameters.size());
+    host.parameter_indices.emplace(name, host.parameters.size());
     host.parameters.push_back({name, text_at(state.lua(), 3), value, fallback});
     push(state, value);
     return 1;

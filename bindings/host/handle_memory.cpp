@@ -20,12 +20,12 @@ namespace {
 
 constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
 
-constexpr std::size_t least_held = std::size_t{16} << 20;  // bytes below which a collection is not worthwhile
+constexpr std::size_t min_held = std::size_t{16} << 20;  // bytes below which a collection is not worthwhile
 
 constexpr std::size_t piece = std::size_t{64} << 20;  // bytes per request
 
 struct Counts {
-    std::size_t held = 0, most = least_held;
+    std::size_t held = 0, most = min_held;
     std::size_t left = piece;  // bytes left of the last request; the first piece is not requested
 };
 
@@ -48,11 +48,11 @@ std::size_t weight_of(const Object& object)
     if (dynamic_cast<const NodeHandle*>(&object)) return bytes_of_node;
     // A level set is two grids of floats: one for queries, whose blocks are about half full, and OpenVDB's, which some
     // get later but all are charged for.
-    constexpr std::size_t bytes_a_voxel = 2 * 2 * sizeof(float);
+    constexpr std::size_t bytes_per_voxel = 2 * 2 * sizeof(float);
     constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // for grids that do not report their size
     if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // the level set's owner is charged
     if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
-        return bytes_of_upper_nodes + static_cast<std::size_t>(level_set->active_voxels()) * bytes_a_voxel;
+        return bytes_of_upper_nodes + static_cast<std::size_t>(level_set->active_voxels()) * bytes_per_voxel;
     if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
         return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
     if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
@@ -81,12 +81,12 @@ void hold(lua_State* L, const Object& object)
     counts.left = asks ? piece : counts.left - bytes;
     if (!full && counts.held <= counts.most) return;
     lua_gc(L, LUA_GCCOLLECT, 0);
-    counts.most = std::max(least_held, 2 * counts.held);
+    counts.most = std::max(min_held, 2 * counts.held);
     if (!full) return;
     malloc_trim(0);  // memory released by the collector
     if (!fits_in_memory(piece))
-        throw beyond_memory("a further 64 MiB of nodes, level sets, meshes and points", piece,
-                            "let the scene make fewer");
+        throw memory_exceeded("a further 64 MiB of nodes, level sets, meshes and points", piece,
+                              "let the scene make fewer");
 }
 
 void release(lua_State* L, const Object& object)

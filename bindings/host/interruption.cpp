@@ -30,11 +30,11 @@ struct CodeRanges {
     std::array<Range, 1024> ranges;
     std::atomic<std::size_t> size = 0;
 
-    bool contains(std::uintptr_t place) const
+    bool contains(std::uintptr_t address) const
     {
         const std::size_t count = size.load(std::memory_order_acquire);
         for (std::size_t i = 0; i < count; ++i)
-            if (ranges[i].begin <= place && place < ranges[i].end) return true;
+            if (ranges[i].begin <= address && address < ranges[i].end) return true;
         return false;
     }
 
@@ -124,7 +124,7 @@ void Interruption::Call::end()
     if (slot_.owner_.is_requested()) const std::lock_guard lock(slot_.owner_.mutex_);
 }
 
-void Interruption::Call::has_left() const
+void Interruption::Call::after_jump() const
 {
     sigset_t ours;
     sigemptyset(&ours);
@@ -139,7 +139,7 @@ void Interruption::Call::try_to_leave(const Slot& slot)
 
 void Interruption::Call::leave(const Slot& slot)
 {
-    if (innermost && &innermost->slot_ == &slot) siglongjmp(innermost->place, 1);
+    if (innermost && &innermost->slot_ == &slot) siglongjmp(innermost->jump_target, 1);
 }
 
 Interruption::InNative::InNative() : call_(innermost)
@@ -176,8 +176,8 @@ void Interruption::on_signal(int signal, siginfo_t* info, void* context)
     }
     lua_sethook(call->lua_, stop, LUA_MASKCOUNT, 1);
     if (!call->slot_.owner_.jumps_ || call->natives_.load(std::memory_order_relaxed) > 0) return;
-    const auto place = static_cast<const ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP];
-    if (code_ranges().contains(static_cast<std::uintptr_t>(place))) siglongjmp(call->place, 1);
+    const auto address = static_cast<const ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP];
+    if (code_ranges().contains(static_cast<std::uintptr_t>(address))) siglongjmp(call->jump_target, 1);
 }
 
 // The hook stays set, so that code that catches the error is stopped, too.

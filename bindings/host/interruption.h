@@ -52,7 +52,7 @@ public:
         std::atomic<int> calls_ = 0;  // nested calls of that thread
     };
 
-    // A call of Lua: `if (sigsetjmp(call.place, 0) == 0) lua_pcall(...) else call.has_left()`. Takes no lock.
+    // A call of Lua: `if (sigsetjmp(call.jump_target, 0) == 0) lua_pcall(...) else call.after_jump()`. Takes no lock.
     class Call {
     public:
         // Throws if an interruption has been requested.
@@ -62,13 +62,13 @@ public:
         Call& operator=(const Call&) = delete;
 
         // Called after the jump.
-        void has_left() const;
+        void after_jump() const;
         // Jumps out of this thread's innermost call if it belongs to the slot and no C++ frame lies in between.
         static void try_to_leave(const Slot& slot);
         // Does the same from a C++ function whose objects are already destroyed, if the call belongs to the slot.
         static void leave(const Slot& slot);
 
-        sigjmp_buf place;
+        sigjmp_buf jump_target;
 
     private:
         friend class Interruption;

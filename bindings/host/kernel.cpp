@@ -53,9 +53,9 @@ void Kernel::uses(Uses& uses) const
     add_attributes(analysis_.may, uses.may);
     add(analysis_.joins, uses.makes_groups);
     add(analysis_.joins, uses.joins_groups);
-    add(analysis_.asks, uses.takes_groups);
+    add(analysis_.queries, uses.takes_groups);
     // The bytecode does not show which attributes a function of all points reads by a method's argument.
-    if (source.of_the_set || analysis_.asks_any) uses.reads_all = true;
+    if (source.of_the_set || analysis_.queries_any_group) uses.reads_all = true;
 }
 
 KernelLayout Kernel::layout_for(const PointSet& points, const KernelArguments& arguments, bool predicate) const
@@ -72,7 +72,8 @@ KernelLayout Kernel::layout_for(const PointSet& points, const KernelArguments& a
     }
     for (const auto& [name, members] : points.groups()) {
         const bool written = !predicate && (analysis_.joins.count(name) || arguments.joins.count(name));
-        if (written || analysis_.asks_any || analysis_.asks.count(name)) layout.groups.push_back({name, "", written});
+        if (written || analysis_.queries_any_group || analysis_.queries.count(name))
+            layout.groups.push_back({name, "", written});
     }
     return layout;
 }

@@ -11,7 +11,7 @@
 
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/kernel_layout.h"
-#include "runtime/graph/attribute_places.h"
+#include "runtime/graph/attribute_locations.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_editor.h"
 #include "runtime/graph/point_function.h"
@@ -30,7 +30,7 @@ struct KernelArguments {
     std::set<std::string> reads, writes, joins;
 };
 
-class Kernel : public PointFunction, public PointEditor, public StepShapeUser, public AttributePlaces {
+class Kernel : public PointFunction, public PointEditor, public StepShapeUser, public AttributeLocations {
 public:
     Kernel(ScriptHost& host, KernelSource of) : source(std::move(of)), host_(host) {}
 
@@ -41,7 +41,7 @@ public:
     void analyse();
 
     void uses(Uses& uses) const override;
-    bool asks_places() const override { return analysis_.asks_places; }
+    bool reads_indices() const override { return analysis_.reads_indices; }
     void edit(PointSet& points, std::size_t first, const Evaluation& now) const override;
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const override;
 
@@ -65,15 +65,15 @@ public:
         const auto known = analysis_.vectors.find(attribute);
         return known == analysis_.vectors.end() ? 0 : known->second;
     }
-    Location place_of(const std::string& attribute) const override
+    Location location_of(const std::string& attribute) const override
     {
-        const auto found = analysis_.places.find(attribute);
-        return found == analysis_.places.end() ? Location() : found->second;
+        const auto found = analysis_.locations.find(attribute);
+        return found == analysis_.locations.end() ? Location() : found->second;
     }
 
     // Returns true if it queries shapes that move or are meshes, found among the objects that it reaches.
-    bool asks_moving_shapes() const override { return !moving_.empty(); }
-    bool varies() const override { return asks_moving_shapes(); }
+    bool queries_moving_shapes() const override { return !moving_.empty(); }
+    bool varies() const override { return queries_moving_shapes(); }
     void begin_step(const FrameClock& clock, const Frame& frame) const override;
     // Shapes as they are in this step.
     using StepShapes = std::vector<std::pair<const Object*, std::shared_ptr<const StepShape>>>;

@@ -91,20 +91,20 @@ void check_groups(lua_State* L, const KernelSource& kernel)
             .at({kernel.location.file, line});
 }
 
-std::map<std::string, Location> places_in(lua_State* L)
+std::map<std::string, Location> locations_in(lua_State* L)
 {
-    std::map<std::string, Location> places;
-    lua_getfield(L, -1, "places");
+    std::map<std::string, Location> locations;
+    lua_getfield(L, -1, "locations");
     lua_pushnil(L);
     while (lua_next(L, -2)) {
         lua_getfield(L, -1, "source");
         const std::string source = text_at(L, -1);
         lua_pop(L, 1);
-        places[text_at(L, -2)] = {source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")};
+        locations[text_at(L, -2)] = {source.substr(source.starts_with('@') ? 1 : 0), number_of(L, "line")};
         lua_pop(L, 1);
     }
     lua_pop(L, 1);
-    return places;
+    return locations;
 }
 
 }  // namespace
@@ -149,18 +149,18 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     KernelAnalysis found;
     found.reads = keys_of(L, "reads");
     found.writes = keys_of(L, "writes");
-    found.places = places_in(L);
+    found.locations = locations_in(L);
     for (const std::string& name : keys_of(L, "vectors")) found.vectors[name] = number_under(L, "vectors", name);
     found.may = keys_of(L, "may");
     found.may_write = keys_of(L, "may_write");
     found.joins = keys_of(L, "joins");
-    found.asks = keys_of(L, "asks");
-    found.asks_any = flag_of(L, "asks_any");
+    found.queries = keys_of(L, "queries");
+    found.queries_any_group = flag_of(L, "queries_any_group");
     found.kills = flag_of(L, "kills");
     for (std::set<std::string>* names : {&found.reads, &found.may})
         if (names->count("nage")) names->insert({"age", "life"});
-    found.asks_places =
-        kernel.of_the_set ? flag_of(L, "reads_points") : flag_of(L, "asks_places") || flag_of(L, "computes_names");
+    found.reads_indices =
+        kernel.of_the_set ? flag_of(L, "reads_points") : flag_of(L, "reads_indices") || flag_of(L, "computes_names");
     return found;
 }
 

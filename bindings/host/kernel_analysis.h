@@ -31,13 +31,13 @@ private:
 };
 
 struct KernelAnalysis {
-    std::set<std::string> reads, writes;      // of the point itself
-    std::set<std::string> may, may_write;     // of values that may be the point
-    std::map<std::string, Location> places;   // first mention of each attribute of the point itself
-    std::map<std::string, int> vectors;       // components assigned to an attribute: 3 or 4
-    std::set<std::string> joins, asks;        // groups that it joins or leaves, and groups that it queries
-    bool asks_any = false;                    // queries groups by computed names
-    bool kills = false, asks_places = false;  // it may; of a whole set: it reads points
+    std::set<std::string> reads, writes;        // of the point itself
+    std::set<std::string> may, may_write;       // of values that may be the point
+    std::map<std::string, Location> locations;  // first mention of each attribute of the point itself
+    std::map<std::string, int> vectors;         // components assigned to an attribute: 3 or 4
+    std::set<std::string> joins, queries;       // groups that it joins or leaves, and groups that it queries
+    bool queries_any_group = false;             // queries groups by computed names
+    bool kills = false, reads_indices = false;  // it may; of a whole set: it reads points
 };
 
 struct KernelSource {

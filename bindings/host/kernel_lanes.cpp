@@ -14,13 +14,13 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_inputs = 200;
+constexpr std::size_t max_inputs = 200;
 
 // The functions below read fields of the table at the top of the stack.
 
-double number_at(lua_State* L, int place)
+double number_at(lua_State* L, int index)
 {
-    lua_rawgeti(L, -1, place);
+    lua_rawgeti(L, -1, index);
     const double number = lua_tonumber(L, -1);
     lua_pop(L, 1);
     return number;
@@ -64,7 +64,7 @@ std::vector<LaneInstruction> instructions_of(lua_State* L, const char* field)
         lua_getfield(L, -1, "op");
         const LaneOperation operation = lane_operation(text_at(L, -1));
         lua_pop(L, 1);
-        const auto operand = [&](int place) { return static_cast<std::uint16_t>(number_at(L, place)); };
+        const auto operand = [&](int index) { return static_cast<std::uint16_t>(number_at(L, index)); };
         if (!operation) throw Error("lua/lanes.lua has an operation that is none");
         code.push_back({operation, operand(1), operand(2), operand(3), operand(4), operand(5)});
     });
@@ -98,15 +98,15 @@ KernelLanes::KernelLanes(State& state, const KernelLayout& layout, const Locatio
     lua_State* const L = state.lua();
     const std::string reason = lua_isstring(L, -1) ? text_at(L, -1) : "it uses many numbers that all points share";
     lua_pop(L, 1);
-    if (lua_istable(L, -1) && size_of(L, "inputs") <= most_inputs) {
+    if (lua_istable(L, -1) && size_of(L, "inputs") <= max_inputs) {
         program_ = program_of(L);
         lua_getfield(L, -1, "kills");
         kills_ = lua_toboolean(L, -1) != 0;
         lua_pop(L, 1);
         lua_getfield(L, -1, "inputs_now");
         inputs_now_ = luaL_ref(L, LUA_REGISTRYINDEX);
-    } else if (const auto& tell = state.host().options().on_no_lanes) {
-        tell(fmt::format("{}:{}: {}", location.file, location.line, reason));
+    } else if (const auto& callback = state.host().options().on_no_lanes) {
+        callback(fmt::format("{}:{}: {}", location.file, location.line, reason));
     }
     lua_pop(L, 1);
 }

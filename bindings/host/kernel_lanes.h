@@ -18,7 +18,7 @@ namespace rapid {
 class KernelLanes {
 public:
     // Smaller sets are not worth a program.
-    static constexpr std::size_t least_points = 32;
+    static constexpr std::size_t min_points = 32;
 
     // Takes the translating function off the top of the stack.
     KernelLanes(State& state, const KernelLayout& layout, const Location& location);

@@ -76,8 +76,8 @@ void KernelLayout::make_writable(PointSet& points) const
     for (const Entry& entry : groups)
         if (entry.writable) add(points.group(entry.name));
     if (!fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("{} attributes and groups of {} points", expanded, points.size()), bytes,
-                            "let the kernel write fewer");
+        throw memory_exceeded(fmt::format("{} attributes and groups of {} points", expanded, points.size()), bytes,
+                              "let the kernel write fewer");
     for (const Entry& entry : columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     for (const Entry& entry : groups)

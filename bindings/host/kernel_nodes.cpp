@@ -53,7 +53,7 @@ struct Points {
     void check() const { check_writable(writes); }
     void uses(Uses& uses) const { kernel->uses(uses, declared(reads, writes)); }
     bool removes_points() const { return kernel->kills(); }
-    bool asks_places() const { return kernel->asks_places(); }
+    bool reads_indices() const { return kernel->reads_indices(); }
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {
         return kernel->prepare(points, group, now, declared(reads, writes), before);

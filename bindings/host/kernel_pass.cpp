@@ -110,7 +110,7 @@ KernelPass::Call KernelPass::part_of(const Call& call, std::int32_t begin, std::
 
 void KernelPass::call_lanes(State& state, const Call& call) const
 {
-    if (points_.size() < KernelLanes::least_points) return call_runner(state, call);
+    if (points_.size() < KernelLanes::min_points) return call_runner(state, call);
     State::Runner& runner = runner_for(state, kernel_.source.number, layout_);
     set_params(state, runner);
     if (!runner.lanes) {

@@ -49,7 +49,7 @@ public:
     // columns: pointers to the first point's values in the layout's columns; those to groups are added here.
     void run(const rapid_chunk& chunk, std::vector<void*> columns) const;
 
-    void* column(std::size_t place, std::size_t point) const { return columns_[place].at(point); }
+    void* column(std::size_t index, std::size_t point) const { return columns_[index].at(point); }
 
     // Returns a moving object's shape in the step of the pass that runs on this thread, or null if it has none.
     static const Shape* shape_now(const Object* object);

@@ -19,7 +19,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_of_text = std::size_t{64} << 20;  // bytes; more is no program but a device or sparse file
+constexpr std::size_t max_text_bytes = std::size_t{64} << 20;  // bytes; more is no program but a device or sparse file
 
 Error too_long(const std::filesystem::path& path)
 {
@@ -30,7 +30,7 @@ Error too_long(const std::filesystem::path& path)
 std::optional<std::string> read_module(const std::filesystem::path& path)
 {
     try {
-        if (check_readable(path) > most_of_text) throw too_long(path);
+        if (check_readable(path) > max_text_bytes) throw too_long(path);
         return std::string(InputFile(path).text());
     } catch (const Error& error) {
         if (error.location().file.empty()) return std::nullopt;  // it does not exist
@@ -86,7 +86,7 @@ std::optional<std::string> read_lua_file(const std::filesystem::path& path)
     for (char block[1 << 16]; file;) {
         file.read(block, sizeof block);
         text.append(block, static_cast<std::size_t>(file.gcount()));
-        if (text.size() > most_of_text) throw too_long(path);
+        if (text.size() > max_text_bytes) throw too_long(path);
     }
     return text;
 }
@@ -106,7 +106,7 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
     }
     std::replace(relative.begin(), relative.end(), '.', '/');
 
-    const auto& [graph, on_read, further, text_of] = places_;
+    const auto& [graph, on_read, further, text_of] = paths_;
     if (text_of)
         if (std::optional<std::string> text = text_of(std::string(name)))
             return Source{std::move(*text), std::string(name)};

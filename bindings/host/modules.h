@@ -26,13 +26,13 @@ std::vector<std::filesystem::path> rapid_path();
 
 class Modules {
 public:
-    struct Places {
+    struct SearchPaths {
         std::filesystem::path graph;                                     // modules are looked up next to it
         std::function<void(const std::filesystem::path& file)> on_read;  // receives each file looked for; may be empty
         std::vector<std::filesystem::path> folders = {};                 // searched before those of RAPID_PATH
         std::function<std::optional<std::string>(const std::string& name)> text = {};  // tried first; may be empty
     };
-    explicit Modules(Places places) : places_(std::move(places)) {}
+    explicit Modules(SearchPaths paths) : paths_(std::move(paths)) {}
 
     struct Source {
         std::string text, name;  // name: as shown in messages
@@ -41,7 +41,7 @@ public:
     std::optional<Source> find(std::string_view name, bool node, std::string& looked_in) const;
 
 private:
-    const Places places_;
+    const SearchPaths paths_;
 };
 
 // Returns the names of Rapid's own nodes written in Lua.

@@ -14,7 +14,7 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/maker.h"
 #include "bindings/host/script_error.h"
-#include "bindings/host/script_place.h"
+#include "bindings/host/script_location.h"
 #include "bindings/host/script_type.h"
 #include "runtime/base/memory_budget.h"
 #include "runtime/base/printable.h"
@@ -42,7 +42,7 @@ int outside_kernels(State& state)
 // native.print(text): prints to the program that opened the scene, or to standard output in a form safe for terminals.
 int print_text(State& state)
 {
-    if (const auto& tell = state.host().options().on_print) return tell(text_at(state.lua(), 1)), 0;
+    if (const auto& callback = state.host().options().on_print) return callback(text_at(state.lua(), 1)), 0;
     const std::string text = printable(text_at(state.lua(), 1));
     std::fwrite(text.data(), 1, text.size(), stdout);
     return 0;
@@ -74,7 +74,7 @@ int require_memory(State& state)
         throw Error(fmt::format("{} would take about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set {}", what,
                                 bytes / 0x1p20, most / 0x1p20, remedy, name_of(Setting::ScriptMemory)),
                     ErrorKind::OutOfMemory);
-    if (!fits_in_memory(bytes)) throw beyond_memory(what, bytes, remedy);
+    if (!fits_in_memory(bytes)) throw memory_exceeded(what, bytes, remedy);
     return 0;
 }
 

@@ -73,12 +73,13 @@ PictureScene::Body::Role body_role_of(const PlannedNode& planned)
 
 }  // namespace
 
-void SceneOfPlan::add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& place, const Argument& given_by)
+void SceneOfPlan::add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& placement,
+                      const Argument& given_by)
 {
-    const bool moved = !place.matrix().isIdentity(0);
+    const bool moved = !placement.matrix().isIdentity(0);
     const PictureScene::Body::Role role = body_role_of(plan_.nodes[given_by.first]);
     const auto add_body = [&](const MeshPtr& mesh) {
-        to.scene->bodies.push_back({moved ? transformed(mesh, place) : mesh, role});
+        to.scene->bodies.push_back({moved ? transformed(mesh, placement) : mesh, role});
         to.given_by.push_back(given_by);
     };
     if (const auto mesh = std::dynamic_pointer_cast<const Mesh>(object)) return add_body(mesh);
@@ -92,8 +93,8 @@ void SceneOfPlan::add(Described& to, const ObjectPtr& object, const Eigen::Affin
     if (entry->second) {
         add_body(entry->second);
     } else if (std::optional<PictureScene::Plane> plane = plane_of(*shape)) {
-        const Vec3d on = place * (plane->offset * plane->normal);
-        plane->normal = (place.linear() * plane->normal).normalized();
+        const Vec3d on = placement * (plane->offset * plane->normal);
+        plane->normal = (placement.linear() * plane->normal).normalized();
         plane->offset = plane->normal.dot(on);
         to.scene->planes.push_back(*plane);
     }
@@ -176,11 +177,11 @@ SceneOfPlan::Described SceneOfPlan::describe(std::int64_t frame)
             add_look(result, node, now, simulation.fps);
             continue;
         }
-        Eigen::Affine3d place = Eigen::Affine3d::Identity();
+        Eigen::Affine3d placement = Eigen::Affine3d::Identity();
         if (const auto transform = node.arguments.find("transform"); transform != node.arguments.end()) {
             MotionPtr motion;
             read_value(*node.type->find("transform"), transform->second, motion);
-            if (motion) place = motion->at(now).affine();
+            if (motion) placement = motion->at(now).affine();
             result.moves = result.moves || (motion && motion->varies());
         }
         for (const auto& [name, value] : node.arguments) {
@@ -191,19 +192,19 @@ SceneOfPlan::Described SceneOfPlan::describe(std::int64_t frame)
             const Argument argument{n, name};
             if (const auto body = given.object<AnimatedMesh>()) {
                 result.moves = true;
-                add(result, body->at(clock, frame), place, argument);
+                add(result, body->at(clock, frame), placement, argument);
             } else if (const auto shape = given.object<AnimatedShape>()) {
                 result.moves = true;
-                add(result, shape->rest(), place * shape->motion()->at(now).affine(), argument);
+                add(result, shape->rest(), placement * shape->motion()->at(now).affine(), argument);
             } else if (const auto deforming = given.object<DeformingLevelSet>()) {
                 result.moves = true;
-                add(result, deforming->mesh().at(clock, frame), place, argument);
+                add(result, deforming->mesh().at(clock, frame), placement, argument);
             } else if (const auto sequence = given.object<LevelSetSequence>()) {
                 result.moves = true;
                 const auto number = static_cast<double>(frame);
-                add(result, sequence->over({clock.fps, clock.start}, number, number), place, argument);
+                add(result, sequence->over({clock.fps, clock.start}, number, number), placement, argument);
             } else if (const ObjectPtr* object = given.get<ObjectPtr>()) {
-                add(result, *object, place, argument);
+                add(result, *object, placement, argument);
             }
         }
     }

@@ -35,7 +35,7 @@ private:
     Described describe(std::int64_t frame);
     std::set<Argument> find_vessels();
     static void add_look(Described& to, const Node& node, const Frame& now, double fps);
-    void add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& place, const Argument& given_by);
+    void add(Described& to, const ObjectPtr& object, const Eigen::Affine3d& placement, const Argument& given_by);
 
     const Plan& plan_;
     std::map<ObjectPtr, MeshPtr> surfaces_, surfaces_before_;  // of this frame, and of the previous one

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "bindings/host/lua_text.h"
-#include "bindings/host/script_place.h"
+#include "bindings/host/script_location.h"
 #include "bindings/host/state.h"
 
 namespace rapid {
@@ -18,7 +18,7 @@ constexpr int levels_searched = 50;  // for an error's own line, which `error(te
 constexpr char engine_errors[] = "rapid.engine_errors";  // in the registry
 
 // Fields of the table that describe_error() makes.
-enum Description { message_field = 1, place_field, trace_field, is_memory_field };
+enum Description { message_field = 1, location_field, trace_field, is_memory_field };
 
 struct EngineError {
     std::string message;
@@ -76,27 +76,27 @@ std::string message_of(lua_State* L, int index)
     return fmt::format("error raised with a {} instead of a message", luaL_typename(L, index));
 }
 
-std::string shown(const Location& place) { return fmt::format("{}:{}", place.file, place.line); }
+std::string shown(const Location& location) { return fmt::format("{}:{}", location.file, location.line); }
 
 // Returns the line of the error itself if it is graph code, else the nearest line of graph code that led there; empty
 // if there is none. Removes the position that Lua's `error` prepends to the message.
-std::string find_place(lua_State* L, std::string& message)
+std::string find_location(lua_State* L, std::string& message)
 {
     const Location& tail_call = State::of(L).tail_call;
-    std::string place;
+    std::string location;
     lua_Debug info;
     for (int level = 1; lua_getstack(L, level, &info); ++level) {
         lua_getinfo(L, "Sl", &info);
-        if (place.empty() && is_run_body(L, info) && tail_call.line > 0) place = shown(tail_call);
+        if (location.empty() && is_run_body(L, info) && tail_call.line > 0) location = shown(tail_call);
         if (info.currentline < 0) continue;
         const std::string prefix = fmt::format("{}:{}: ", info.short_src, info.currentline);
         const bool own = message.starts_with(prefix);
         if (own) message.erase(0, prefix.size());
-        if (is_graph_code(info) && (place.empty() || own)) place = shown({info.source + 1, info.currentline});
+        if (is_graph_code(info) && (location.empty() || own)) location = shown({info.source + 1, info.currentline});
         if (own && is_graph_code(info)) break;
-        if (!place.empty() && level > levels_searched) break;
+        if (!location.empty() && level > levels_searched) break;
     }
-    return place.empty() && tail_call.line > 0 ? shown(tail_call) : place;
+    return location.empty() && tail_call.line > 0 ? shown(tail_call) : location;
 }
 
 void set_field(lua_State* L, int table, Description field, const std::string& text)
@@ -114,22 +114,22 @@ std::string get_field(lua_State* L, int table, Description field)
 }
 
 // Parses "file:12" into a Location.
-Location parse_place(const std::string& place)
+Location parse_place(const std::string& location)
 {
-    const std::size_t colon = place.rfind(':');
+    const std::size_t colon = location.rfind(':');
     if (colon == std::string::npos) return {};
-    return {place.substr(0, colon), std::atoi(place.c_str() + colon + 1)};
+    return {location.substr(0, colon), std::atoi(location.c_str() + colon + 1)};
 }
 
 // Returns the error at its position. Lua has positions only as the beginning of a message, "file:12: text": such a
-// position, as in messages of the compiler and of nodes, takes precedence over `place`.
-Error with_place(const std::string& message, const std::string& place, ErrorKind kind)
+// position, as in messages of the compiler and of nodes, takes precedence over `location`.
+Error with_location(const std::string& message, const std::string& location, ErrorKind kind)
 {
     const std::size_t end = message.find(": ");
     const std::size_t colon = end == std::string::npos ? end : message.rfind(':', end - 1);
     if (colon != std::string::npos && colon + 1 < end && message.find_first_not_of("0123456789", colon + 1) == end)
         return Error(message.substr(end + 2), kind).at(parse_place(message.substr(0, end)));
-    if (!place.empty()) return Error(message, kind).at(parse_place(place));
+    if (!location.empty()) return Error(message, kind).at(parse_place(location));
     return Error(message, kind);
 }
 
@@ -138,7 +138,7 @@ Error with_place(const std::string& message, const std::string& place, ErrorKind
 int describe_error(lua_State* L)
 {
     std::string message = message_of(L, 1);
-    const std::string place = find_place(L, message);
+    const std::string location = find_location(L, message);
     const std::optional<EngineError> of_engine = engine_error(L, message);
     message = of_engine ? of_engine->message : message + remedy_of(L, message);
     std::string trace;
@@ -149,7 +149,7 @@ int describe_error(lua_State* L)
     lua_settop(L, 0);
     lua_createtable(L, 4, 0);
     set_field(L, 1, message_field, message);
-    set_field(L, 1, place_field, place);
+    set_field(L, 1, location_field, location);
     set_field(L, 1, trace_field, trace);
     lua_pushboolean(L, of_engine && of_engine->is_memory);
     lua_rawseti(L, 1, is_memory_field);
@@ -159,11 +159,11 @@ int describe_error(lua_State* L)
 Error take_error(lua_State* L, int status)
 {
     const int top = lua_gettop(L);
-    std::string message, place, trace;
+    std::string message, location, trace;
     bool is_memory = status == LUA_ERRMEM;
     if (lua_istable(L, top)) {
         message = get_field(L, top, message_field);
-        place = get_field(L, top, place_field);
+        location = get_field(L, top, location_field);
         trace = get_field(L, top, trace_field);
         lua_rawgeti(L, top, is_memory_field);
         is_memory = is_memory || lua_toboolean(L, -1) != 0;
@@ -176,7 +176,7 @@ Error take_error(lua_State* L, int status)
     }
     lua_settop(L, top - 1);
     const ErrorKind kind = is_memory ? ErrorKind::OutOfMemory : State::of(L).kind_of(message);
-    return with_place(message, place, kind).with_trace(trace);
+    return with_location(message, location, kind).with_trace(trace);
 }
 
 void set_engine_errors(lua_State* L) { lua_setfield(L, LUA_REGISTRYINDEX, engine_errors); }

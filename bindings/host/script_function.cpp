@@ -7,7 +7,7 @@
 
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/script_host.h"
-#include "bindings/host/script_place.h"
+#include "bindings/host/script_location.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/located.h"
@@ -17,7 +17,7 @@ namespace {
 
 class ScriptFunction : public FrameFunction, public Located {
 public:
-    ScriptFunction(State& state, int index) : state_(state), location_(place_of_function(state.lua(), index))
+    ScriptFunction(State& state, int index) : state_(state), location_(location_of_function(state.lua(), index))
     {
         if (location_.file.empty()) location_ = {};
         lua_pushvalue(state.lua(), index);

@@ -20,16 +20,16 @@
 namespace rapid {
 
 // Returns the watchdog's callback. An interruptible script is stopped, and the process continues.
-Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
+Watchdog::OnTimeout ScriptHost::timeout_callback(const SessionOptions& options)
 {
     if (options.interruptible)
-        return [this, tell = options.on_timeout](const std::string& message) {
-            if (tell) tell(message);
+        return [this, callback = options.on_timeout](const std::string& message) {
+            if (callback) callback(message);
             interruption.request(Error(message, ErrorKind::TooLong));
-            return Watchdog::GoOn;
+            return Watchdog::Continue;
         };
-    return [tell = options.on_timeout](const std::string& message) {
-        if (tell) tell(message);
+    return [callback = options.on_timeout](const std::string& message) {
+        if (callback) callback(message);
         return Watchdog::EndProcess;
     };
 }
@@ -37,7 +37,7 @@ Watchdog::Late ScriptHost::when_late(const SessionOptions& options)
 ScriptHost::ScriptHost(const std::filesystem::path& file, SessionOptions options)
     : shared_interruption(options.interruption ? options.interruption : std::make_shared<Interruption>()),
       interruption(*shared_interruption),
-      watchdog(options.script_timeout, when_late(options)),
+      watchdog(options.script_timeout, timeout_callback(options)),
       modules({file, options.on_read, options.paths, options.find_module}),
       file_(file),
       options_(std::move(options)),
@@ -74,7 +74,7 @@ void ScriptHost::run_graph()
     else
         collect_outputs(*main_);
     // A function that makes several chains gives all of them kernels of the same name.
-    graph = with_names_apart(graph, [](const Node& node) {
+    graph = with_unique_names(graph, [](const Node& node) {
         const Param* kernel = node.type->find("kernel");
         return kernel && !kernel->internal;
     });

@@ -30,7 +30,7 @@ public:
     Graph graph;
     Registry registry;
     std::vector<Session::Parameter> parameters;
-    std::map<std::string, std::size_t> parameter_places;  // by name
+    std::map<std::string, std::size_t> parameter_indices;  // by name
     std::vector<std::string> warnings;
     const std::shared_ptr<Interruption> shared_interruption;
     Interruption& interruption;
@@ -65,7 +65,7 @@ public:
     void load_shipped_nodes();
 
 private:
-    Watchdog::Late when_late(const SessionOptions& options);
+    Watchdog::OnTimeout timeout_callback(const SessionOptions& options);
     std::string read_graph() const;
     void run_graph();
     void apply_arguments();

@@ -26,7 +26,7 @@ struct ScriptFields {
     // Adds the uses of an edit of the points, one by one.
     void uses(Uses& uses) const { kernel->uses(uses, arguments); }
     bool removes_points() const { return kernel->kills(); }
-    bool asks_places() const { return kernel->asks_places(); }
+    bool reads_indices() const { return kernel->reads_indices(); }
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {
         add_attributes(points, now);

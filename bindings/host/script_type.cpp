@@ -7,9 +7,9 @@
 
 #include "bindings/host/lua_text.h"
 #include "bindings/host/script_host.h"
+#include "bindings/host/script_location.h"
 #include "bindings/host/script_operator.h"
 #include "bindings/host/script_param.h"
-#include "bindings/host/script_place.h"
 #include "bindings/host/values.h"
 #include "runtime/graph/registry.h"
 

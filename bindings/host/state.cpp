@@ -102,9 +102,9 @@ State::State(ScriptHost& host, bool main) : host_(host), main_(main), slot_(host
 // kilobytes, is leaked.
 void State::make()
 {
-    std::jmp_buf place;
-    making_ = &place;
-    if (setjmp(place) == 0) L_ = lua_newstate(allocate, this);
+    std::jmp_buf jump_target;
+    making_ = &jump_target;
+    if (setjmp(jump_target) == 0) L_ = lua_newstate(allocate, this);
     making_ = nullptr;
 }
 
@@ -115,10 +115,10 @@ std::exception_ptr State::set_up()
     struct SetUp {
         State& state;
         std::exception_ptr error;
-        sigjmp_buf place;
+        sigjmp_buf jump_target;
     } now{*this, nullptr, {}};
     const Protected inside(*this);
-    if (sigsetjmp(now.place, 0) != 0) return now.error;
+    if (sigsetjmp(now.jump_target, 0) != 0) return now.error;
     const int status = lua_cpcall(
         L_,
         [](lua_State* L) {
@@ -132,7 +132,7 @@ std::exception_ptr State::set_up()
             } catch (const std::exception&) {
                 here.error = std::current_exception();
             }
-            if (here.state.is_broken_) siglongjmp(here.place, 1);
+            if (here.state.is_broken_) siglongjmp(here.jump_target, 1);
             return 0;
         },
         &now);
@@ -186,7 +186,7 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
         std::longjmp(*state.making_, 1);
     else if (state.L_ && !state.protected_)
         throw std::bad_alloc();
-    else if (state.protected_ && is_asked_by_compiled_code())
+    else if (state.protected_ && is_called_by_compiled_code())
         Interruption::Call::try_to_leave(state.slot_);
     return nullptr;
 }
@@ -245,8 +245,8 @@ int State::protected_call(int arguments, int results, int handler)
 {
     if (is_broken_) fail_broken();
     Interruption::Call call(slot_, L_);
-    if (sigsetjmp(call.place, 0) == 0) return lua_pcall(L_, arguments, results, handler);
-    call.has_left();
+    if (sigsetjmp(call.jump_target, 0) == 0) return lua_pcall(L_, arguments, results, handler);
+    call.after_jump();
     is_broken_ = true;
     fail_broken();
 }

@@ -14,30 +14,30 @@ namespace rapid {
 namespace {
 
 // Appends the numbers of one value, as lua/study.lua takes them.
-void append(lua_State* L, int& place, float value)
+void append(lua_State* L, int& index, float value)
 {
     lua_pushnumber(L, static_cast<double>(value));
-    lua_rawseti(L, -2, ++place);
+    lua_rawseti(L, -2, ++index);
 }
 template <class T>
-void append(lua_State* L, int& place, T value) requires std::is_integral_v<T>
+void append(lua_State* L, int& index, T value) requires std::is_integral_v<T>
 {
     lua_pushnumber(L, static_cast<double>(value));
-    lua_rawseti(L, -2, ++place);
+    lua_rawseti(L, -2, ++index);
 }
-void append(lua_State* L, int& place, const Vec3f& v)
+void append(lua_State* L, int& index, const Vec3f& v)
 {
-    for (int k = 0; k < 3; ++k) append(L, place, v[k]);
+    for (int k = 0; k < 3; ++k) append(L, index, v[k]);
 }
-void append(lua_State* L, int& place, const Quatf& q)
+void append(lua_State* L, int& index, const Quatf& q)
 {
-    for (const float number : {q.x(), q.y(), q.z(), q.w()}) append(L, place, number);
+    for (const float number : {q.x(), q.y(), q.z(), q.w()}) append(L, index, number);
 }
 
-void append(lua_State* L, int& place, Token text)
+void append(lua_State* L, int& index, Token text)
 {
     push_text(L, text.text());
-    lua_rawseti(L, -2, ++place);
+    lua_rawseti(L, -2, ++index);
 }
 
 // Pushes { { name, numbers per value, flat numbers }, ... }.
@@ -55,8 +55,8 @@ void push_columns(lua_State* L, const PointSet& points)
                 lua_pushinteger(L, static_cast<lua_Integer>(components_of<T>));
                 lua_rawseti(L, -2, 2);
                 lua_newtable(L);
-                int place = 0;
-                for (std::size_t i = 0; i < column.size(); ++i) append(L, place, column[i]);
+                int index = 0;
+                for (std::size_t i = 0; i < column.size(); ++i) append(L, index, column[i]);
             },
             any);
         lua_rawseti(L, -2, 3);
@@ -65,21 +65,22 @@ void push_columns(lua_State* L, const PointSet& points)
 }
 
 // Returns the study. lua/study.lua has checked that the fields exist and have the right types.
-Study study_of(const Table& asked)
+Study study_of(const Table& definition)
 {
-    const auto table = [&](const char* name) { return asked.named.at(name).table(); };
+    const auto table = [&](const char* name) { return definition.named.at(name).table(); };
     const auto number = [](const Value& value) { return static_cast<std::int64_t>(*value.get<double>()); };
     Study study;
-    study.name = *asked.named.at("name").get<std::string>();
+    study.name = *definition.named.at("name").get<std::string>();
     for (const auto& [knob, values] : table("sweep")->named) study.sweep[knob] = values.table()->list;
     for (const Value& line : table("lines")->list) study.lines.push_back(knob_text(line));
     study.first = number(table("frames")->list[0]);
     study.last = number(table("frames")->list[1]);
-    if (asked.named.count("error")) study.error = *asked.named.at("error").get<std::string>();
-    if (asked.named.count("error_frames"))
-        study.last_frame_only = *asked.named.at("error_frames").get<std::string>() == "last";
-    if (asked.named.count("reference")) study.reference = table("reference")->named;
-    if (asked.named.count("repeat_runs")) study.repeat_runs = static_cast<int>(number(asked.named.at("repeat_runs")));
+    if (definition.named.count("error")) study.error = *definition.named.at("error").get<std::string>();
+    if (definition.named.count("error_frames"))
+        study.last_frame_only = *definition.named.at("error_frames").get<std::string>() == "last";
+    if (definition.named.count("reference")) study.reference = table("reference")->named;
+    if (definition.named.count("repeat_runs"))
+        study.repeat_runs = static_cast<int>(number(definition.named.at("repeat_runs")));
     study.complete();
     return study;
 }
@@ -91,10 +92,10 @@ Study Session::study() const
     State& state = host_->main();
     state.push_entry("study");
     state.call(0, 1);
-    const Value asked = to_value(state, -1);
+    const Value definition = to_value(state, -1);
     lua_pop(state.lua(), 1);
     try {
-        Study study = study_of(*asked.table());
+        Study study = study_of(*definition.table());
         study.file = host_->graph.file;
         return study;
     } catch (Error& error) {

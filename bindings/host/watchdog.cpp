@@ -19,8 +19,8 @@ std::chrono::steady_clock::duration duration_of(double seconds)
 
 }  // namespace
 
-Watchdog::Watchdog(double limit, Late on_late)
-    : limit_(limit), on_late_(std::move(on_late)), thread_([this] { watch(); })
+Watchdog::Watchdog(double limit, OnTimeout on_timeout)
+    : limit_(limit), on_timeout_(std::move(on_timeout)), thread_([this] { watch(); })
 {
 }
 
@@ -62,12 +62,13 @@ void Watchdog::watch()
         if (running_.empty() || now < deadline_) {
             const auto then = running_.empty() ? now + step : std::min(deadline_, now + step);
             wake_.wait_until(lock, then);
-            if (const auto late = std::chrono::steady_clock::now() - then; late > step) deadline_ += late;
+            if (const auto overslept = std::chrono::steady_clock::now() - then; overslept > step)
+                deadline_ += overslept;
             continue;
         }
         const std::string message = fmt::format("{}: the script runs for more than {:g} s; {} sets the limit",
                                                 fmt::join(running_, ", "), limit_, name_of(Setting::ScriptSeconds));
-        if (on_late_(message) == EndProcess) {
+        if (on_timeout_(message) == EndProcess) {
             std::fprintf(stderr, "%s\n", message.c_str());
             std::_Exit(1);
         }

@@ -13,12 +13,12 @@ namespace rapid {
 
 class Watchdog {
 public:
-    enum Then { EndProcess, GoOn };
-    using Late = std::function<Then(const std::string& message)>;
+    enum Reaction { EndProcess, Continue };
+    using OnTimeout = std::function<Reaction(const std::string& message)>;
 
-    // limit: seconds that a section may take. on_late: called from the watchdog's thread, repeatedly while a late
+    // limit: seconds that a section may take. on_timeout: called from the watchdog's thread, repeatedly while a late
     // section lasts. If it returns EndProcess, the process ends with the message on standard error.
-    Watchdog(double limit, Late on_late);
+    Watchdog(double limit, OnTimeout on_timeout);
     ~Watchdog();
 
     // A stretch of script whose time counts. Concurrent sections each get as much time as if they ran alone.
@@ -35,7 +35,7 @@ private:
     void watch();
 
     const double limit_;
-    const Late on_late_;
+    const OnTimeout on_timeout_;
     std::mutex mutex_;
     std::condition_variable wake_;
     std::vector<std::string> running_;

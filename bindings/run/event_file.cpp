@@ -101,7 +101,7 @@ PointSet points_of_record(std::string_view record)
     return points_of(events, frame);
 }
 
-bool holds_events(const Format& format) { return format.read && !format.places_alone; }
+bool holds_events(const Format& format) { return format.read && !format.positions_only; }
 
 }  // namespace
 
@@ -161,8 +161,8 @@ template <class F>
 void EventFile::read_log(std::uint64_t bytes, const F& f) const
 {
     std::string record;
-    for (std::uint64_t place = 0; place < bytes;) {
-        if (!log_->read(place, record) || place > bytes) throw Error("it is damaged");
+    for (std::uint64_t offset = 0; offset < bytes;) {
+        if (!log_->read(offset, record) || offset > bytes) throw Error("it is damaged");
         f(points_of_record(record));
     }
 }
@@ -177,11 +177,11 @@ void EventFile::check_log(std::uint64_t bytes) const
     }
 }
 
-void EventFile::go_on_behind(std::uint64_t bytes)
+void EventFile::continue_after(std::uint64_t bytes)
 {
     if (!log_) return;
     read_log(bytes, [this](const PointSet& points) { file_->append(points); });
-    log_->go_on_at(bytes);
+    log_->continue_at(bytes);
 }
 
 void EventFile::finish()

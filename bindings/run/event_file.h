@@ -36,7 +36,7 @@ public:
     // Throws Error if the log is not complete up to there.
     void check_log(std::uint64_t bytes) const;
     // Takes the events from the log up to there, and continues after them.
-    void go_on_behind(std::uint64_t bytes);
+    void continue_after(std::uint64_t bytes);
 
 private:
     void check() const;

@@ -178,7 +178,7 @@ std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& 
 void InputContents::add(const fs::path& file)
 {
     std::error_code ignored;
-    if (code_ == Code::LeftOut && file.extension() == ".lua") return;
+    if (code_ == Code::Excluded && file.extension() == ".lua") return;
     if (!fs::is_regular_file(file, ignored)) return;
     const std::string name = content + name_of(file, folder_);
     {

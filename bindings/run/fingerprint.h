@@ -27,7 +27,7 @@ std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& 
 class InputContents {
 public:
     // Code is left out if its effects are known otherwise.
-    enum class Code { Included, LeftOut };
+    enum class Code { Included, Excluded };
 
     // folder: of the graph, to which names are relative.
     InputContents(std::filesystem::path folder, Code code) : folder_(std::move(folder)), code_(code) {}

@@ -82,11 +82,11 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
         if (has_part(pattern))
             throw Error(fmt::format("{} {}: names the whole, where {} is given; leave {{part}} out",
                                     name_of(Setting::Output), target.text, name_of(Setting::Parts)));
-        if (const Format& format = format_of(pattern); !format.read || format.film || format.places_alone)
+        if (const Format& format = format_of(pattern); !format.read || format.film || format.positions_only)
             throw Error(fmt::format("{} {}: a {} file of parts can't be put together; write points, or leave {} out",
                                     name_of(Setting::Output), target.text, format.extension, name_of(Setting::Parts)));
         for (const std::string& output : target.outputs) {
-            const std::string whole = FramePattern(pattern).of_output(output);
+            const std::string whole = FramePattern(pattern).for_output(output);
             merges.emplace_back(whole, with_part(whole, "{part}"));
         }
     }
@@ -157,7 +157,7 @@ void FrameFiles::check_film(const Format& format, const std::string& pattern) co
 void FrameFiles::resolve(const Plan& plan, bool several_frames)
 {
     scene_ = std::make_unique<SceneOfPlan>(plan);
-    for (const auto& [name, node] : plan.outputs) unasked_[name] = plan.unasked_columns(node);
+    for (const auto& [name, node] : plan.outputs) unrequested_[name] = plan.unrequested_columns(node);
     std::set<std::string> patterns;
     std::size_t of_pictures = 0;
     const auto check = [&](const std::string& pattern) {
@@ -231,7 +231,7 @@ void FrameFiles::claim(WrittenNames& names, const RunFrames& frames) const
 void FrameFiles::claim(const std::filesystem::path& folder, const std::string& who) const
 {
     for (const auto& [pattern, node, location] : of_nodes_) try {
-            claim_among_processes(folder, who, FramePattern(pattern).of_output("main"));
+            claim_among_processes(folder, who, FramePattern(pattern).for_output("main"));
         } catch (const Error& error) {
             throw Error(fmt::format("file = \"{}\": {}", pattern, error.message()), error.kind())
                 .in_node(node)
@@ -297,7 +297,7 @@ std::vector<FrameFiles::FrameFile> FrameFiles::files_of(std::int64_t frame, cons
     return files;
 }
 
-void FrameFiles::go_on_behind(WholeFiles whole, const RunFrames& frames)
+void FrameFiles::continue_after(WholeFiles whole, const RunFrames& frames)
 {
     whole_ = std::move(whole);
     selection_ = frames;
@@ -325,7 +325,7 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
         if (const auto* file = whole_file(last, pattern.expand(frame_number(last), output), how)) before = file->fit;
     if (named_.insert(key + '\n' + output).second) first_names_.push_back(path);
     if (part_) note_frame(to.pattern, output, info, points.size());
-    warn_of_texts(to, points);
+    warn_of_strings(to, points);
     FrameWriter* writer = nullptr;
     {
         const std::lock_guard lock(mutex_);
@@ -338,17 +338,17 @@ void FrameFiles::submit(const OutputTarget& to, PointSet points, FrameInfo info,
 }
 
 // Warns once for each attribute that a file cannot store.
-void FrameFiles::warn_of_texts(const OutputTarget& to, const PointSet& points)
+void FrameFiles::warn_of_strings(const OutputTarget& to, const PointSet& points)
 {
     const Format& format = format_of(to.pattern);
-    if (format.holds_texts) return;
-    for (const std::string& name : names_of_texts(points)) {
-        const auto& asked = to.attributes;
-        if (asked && std::find(asked->begin(), asked->end(), name) == asked->end()) continue;
+    if (format.holds_strings) return;
+    for (const std::string& name : string_column_names(points)) {
+        const auto& requested = to.attributes;
+        if (requested && std::find(requested->begin(), requested->end(), name) == requested->end()) continue;
         if (!warned_.insert(to.pattern + '\n' + name).second) continue;
         std::string others;
         for (const Format& other : formats())
-            if (other.read && other.holds_texts && !other.places_alone)
+            if (other.read && other.holds_strings && !other.positions_only)
                 others += (others.empty() ? "" : ", ") + other.extension;
         warnings_.push_back(fmt::format("{}: {} holds no texts, and leaves out \"{}\"; these do: {}", to.pattern,
                                         format.extension, name, others));
@@ -372,7 +372,7 @@ void FrameFiles::write(const FrameResult& result)
         for (const std::string& output : target.outputs) {
             PointSet points = result.outputs.at(output);
             if (!target.to.attributes)
-                for (const std::string& name : unasked_.at(output)) points.remove(name);
+                for (const std::string& name : unrequested_.at(output)) points.remove(name);
             submit(target.to, std::move(points),
                    info_of(result.frame, result.time.at(output), result.fps.at(output), target.to), output, false);
         }

@@ -69,7 +69,7 @@ public:
         std::map<std::int64_t, std::map<std::string, File>> frames;
         std::map<std::string, std::string> films;  // with how they are made
     };
-    void go_on_behind(WholeFiles whole, const RunFrames& frames);
+    void continue_after(WholeFiles whole, const RunFrames& frames);
 
     // Queues the files of a frame. Throws Error if one of an earlier frame could not be written.
     void write(const FrameResult& result);
@@ -102,7 +102,7 @@ private:
         std::vector<std::string> outputs;  // the outputs whose points it takes
     };
     void resolve(Target& target, const Plan& plan) const;
-    void warn_of_texts(const OutputTarget& to, const PointSet& points);
+    void warn_of_strings(const OutputTarget& to, const PointSet& points);
     std::string name_in_part(const std::string& pattern) const;
     void check_part(const std::string& pattern) const;
     void note_frame(const std::string& pattern, const std::string& output, const FrameInfo& info, std::uint64_t points);
@@ -126,7 +126,7 @@ private:
         Location location;
     };
     std::vector<NodePattern> of_nodes_;
-    std::map<std::string, std::set<std::string>> unasked_;  // by output: Plan::unasked_columns
+    std::map<std::string, std::set<std::string>> unrequested_;  // by output: Plan::unrequested_columns
     std::shared_ptr<const PictureOptions> picture_;
     std::unique_ptr<SceneOfPlan> scene_;
 

@@ -8,18 +8,18 @@
 namespace rapid {
 
 template <StateArchive Archive>
-void serialize(Archive& keep, Stiffness::Cure& cure)
+void serialize(Archive& keep, Stiffness::Improvement& improvement)
 {
-    auto& [error, substeps, error_then] = cure;
-    keep(error, substeps, error_then);
+    auto& [error, substeps, error_after] = improvement;
+    keep(error, substeps, error_after);
 }
 
 template <StateArchive Archive>
 void serialize(Archive& keep, Stiffness& stiffness)
 {
-    auto& [node, kind, step, substeps, frame, cure, alone] = stiffness;
+    auto& [node, kind, step, substeps, frame, improvement, alone] = stiffness;
     int number = kind;
-    keep(node, number, step, substeps, frame, cure, alone);
+    keep(node, number, step, substeps, frame, improvement, alone);
     if constexpr (Archive::is_loading::value) StateReader::expect(0 <= number && number <= Stiffness::Oscillation);
     kind = static_cast<Stiffness::Kind>(number);
 }

@@ -33,7 +33,7 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
         if (const int version = json.at("rapid_part").get<int>(); version != record_version)
             throw Error(fmt::format("is a record of version {}; it must be {}", version, record_version));
         const auto number = json.at("part").get<std::int64_t>(), count = json.at("parts").get<std::int64_t>();
-        if (number < 1 || number > count || count > most_parts) throw Error("is no record of a part");
+        if (number < 1 || number > count || count > max_parts) throw Error("is no record of a part");
         record.part = {static_cast<int>(number), static_cast<int>(count)};
         if (!json.at("sample").is_null()) record.sample = json.at("sample").get<double>();
         record.frames.first = json.at("frames").at("first");

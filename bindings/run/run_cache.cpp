@@ -18,7 +18,7 @@ constexpr std::string_view snapshot = "snapshot";
 const std::string errors_estimated = "the estimate of errors";  // name in a fingerprint
 
 // Contents of a snapshot's file.
-struct KeptRun {
+struct StoredRun {
     Snapshot snapshot;
     std::uint64_t events = 0;  // length of the log of events
 
@@ -79,7 +79,7 @@ bool WrittenFile::is_whole() const
 void RunCache::set_graph(const fs::path& graph)
 {
     graph_ = graph;
-    read_ = std::make_unique<InputContents>(graph.parent_path(), InputContents::Code::LeftOut);
+    read_ = std::make_unique<InputContents>(graph.parent_path(), InputContents::Code::Excluded);
 }
 
 void RunCache::was_read(const fs::path& file)
@@ -171,7 +171,7 @@ void RunCache::check_contents()
     if (!changed.empty()) refuse(changed);
 }
 
-void RunCache::begin_anew()
+void RunCache::start_over()
 {
     known_ = {};
     contents_.clear();
@@ -183,11 +183,11 @@ void RunCache::begin_anew()
     fs::remove(events_log(), ignored);
 }
 
-void RunCache::go_on_as_before()
+void RunCache::continue_previous()
 {
     fingerprint_ = with_errors_as_in(known_.fingerprint);
-    const bool wanted = std::exchange(estimates_errors_, fingerprint_.at(errors_estimated) == "yes");
-    if (wanted && !estimates_errors_)
+    const bool requested = std::exchange(estimates_errors_, fingerprint_.at(errors_estimated) == "yes");
+    if (requested && !estimates_errors_)
         failures_.push_back(
             fmt::format("{} {}: no errors are estimated, as the run that began it has estimated none ({}); "
                         "give {} to estimate them",
@@ -207,9 +207,9 @@ void RunCache::begin(const Session& session, const Plan& plan, const RunFrames& 
     fingerprint_ = fingerprint_of(session, plan, graph_, all);
     if (!again_) read_journal();
     if (again_ || known_.fingerprint.empty())
-        begin_anew();
+        start_over();
     else
-        go_on_as_before();
+        continue_previous();
     known_.fingerprint = fingerprint_;
     find_due(plan, files);
     if (!events.path().empty()) {  // those up to the last frame are known when it is computed
@@ -258,7 +258,7 @@ void RunCache::find_due(const Plan& plan, FrameFiles& files)
             if (!first_due_) first_due_ = frame;
             last_due_ = frame;
         }
-    files.go_on_behind(std::move(whole), frames_);
+    files.continue_after(std::move(whole), frames_);
 }
 
 // Pictures before the first points wait for these, and then share their camera: all of them are drawn again, or none.
@@ -284,7 +284,7 @@ void RunCache::leave_waiting_pictures(FrameFiles::WholeFiles& whole, const Frame
 
 bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluator, EventFile& events)
 {
-    KeptRun kept;
+    StoredRun kept;
     try {
         const StateFile file(path);
         const Fingerprint known = file.header().at("fingerprint").get<Fingerprint>();
@@ -301,7 +301,7 @@ bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluat
         return false;
     }
     evaluator.load(kept.snapshot);
-    events.go_on_behind(kept.events);
+    events.continue_after(kept.events);
     last_kept_ = frame;
     return true;
 }
@@ -313,7 +313,7 @@ void RunCache::restore(Evaluator& evaluator, EventFile& events)
     for (auto one = all.rbegin(); one != all.rend(); ++one)
         if (one->first < *first_due_ && one->first >= first_frame_ && load(one->first, one->second, evaluator, events))
             return;
-    events.go_on_behind(0);
+    events.continue_after(0);
 }
 
 std::vector<const FrameRecord*> RunCache::records(std::int64_t first, std::int64_t last) const
@@ -384,7 +384,7 @@ void RunCache::keep(const Evaluator& evaluator, EventFile& events, bool in_any_c
     if (!(is_due || in_any_case) || last_kept_ == frame || frame < first_frame_) return;
     if (std::string failure = events.take_failure(); !failure.empty()) failures_.push_back(std::move(failure));
     if (!events.path().empty() && !events.logged()) return;
-    KeptRun kept{evaluator.save(), events.logged().value_or(0)};
+    StoredRun kept{evaluator.save(), events.logged().value_or(0)};
     CheckedJson header = {{"what", "snapshot of a run"}, {"graph", graph_.string()}, {"frame", frame}};
     for (const auto& [name, state] : kept.snapshot.simulations) header["simulations"][name] = state.size();
     for (const auto& [name, state] : kept.snapshot.nodes) header["nodes"][name] = state.size();

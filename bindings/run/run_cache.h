@@ -30,8 +30,8 @@ public:
     {
     }
 
-    bool asked() const { return !archive_.folder().empty(); }
-    bool keeps_snapshots() const { return asked() && every_ > 0; }
+    bool requested() const { return !archive_.folder().empty(); }
+    bool keeps_snapshots() const { return requested() && every_ > 0; }
     const std::filesystem::path& folder() const { return archive_.folder(); }
 
     // Reports a file that the graph reads, before it is read.
@@ -87,8 +87,8 @@ private:
     Fingerprint with_errors_as_in(const Fingerprint& other) const;
     void refuse(const std::vector<std::string>& differences);
     void check_contents();
-    void begin_anew();
-    void go_on_as_before();
+    void start_over();
+    void continue_previous();
     // Finds the complete files of the frames, and the frames to compute.
     void find_due(const Plan& plan, FrameFiles& files);
     void leave_waiting_pictures(FrameFiles::WholeFiles& whole, const FrameFiles& files) const;

@@ -21,14 +21,14 @@ namespace {
 namespace fs = std::filesystem;
 
 // Bytes of a frame's files above which its points are not all held in memory, and bytes of points that then are.
-constexpr std::uintmax_t most_in_memory = 24 << 20;
+constexpr std::uintmax_t max_in_memory = 24 << 20;
 constexpr std::size_t resident = 32 << 20;
 
 // Bytes of parts' files that are read at the same time; in memory they take several times as much.
-constexpr std::uintmax_t most_read_at_once = 48 << 20;
+constexpr std::uintmax_t max_read_at_once = 48 << 20;
 
 // Missing parts or frames that are listed; a foreign record may promise any number.
-constexpr std::size_t most_missing = 1000;
+constexpr std::size_t max_missing = 1000;
 
 fs::path folder_above(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
@@ -84,7 +84,7 @@ PointSet read_part(const std::string& file, const PartRecord::File& written)
     return points;
 }
 
-// Reads the files of a frame, several at the same time: .vdb is read by processes of one thread (read_apart.h).
+// Reads the files of a frame, several at the same time: .vdb is read by processes of one thread (read_sandboxed.h).
 std::vector<PointSet> read_parts(const std::vector<std::string>& files, const std::vector<PartRecord::File>& written,
                                  bool into_files)
 {
@@ -92,7 +92,7 @@ std::vector<PointSet> read_parts(const std::vector<std::string>& files, const st
     std::error_code none;
     for (std::size_t first = 0, end = 0; first < files.size(); first = end) {
         std::uintmax_t bytes = fs::file_size(files[end++], none);
-        while (end < files.size() && (bytes += fs::file_size(files[end], none)) <= most_read_at_once) ++end;
+        while (end < files.size() && (bytes += fs::file_size(files[end], none)) <= max_read_at_once) ++end;
         FirstError error;
         std::optional<ColumnFiles::Pause> pause(std::in_place);
         tbb::parallel_for(
@@ -148,8 +148,8 @@ void RunParts::find_missing(const std::map<int, PartFiles>& parts, int count, st
 {
     std::vector<std::string> missing;
     for (int number = 1; number <= count; ++number)
-        if (!parts.count(number) && missing.size() <= most_missing) missing.push_back(part_name(number, count));
-    if (missing.size() > most_missing) missing.back() = "and more";
+        if (!parts.count(number) && missing.size() <= max_missing) missing.push_back(part_name(number, count));
+    if (missing.size() > max_missing) missing.back() = "and more";
     if (!missing.empty())
         problems.push_back(
             fmt::format("missing {} {}", missing.size() == 1 ? "is part" : "are parts", fmt::join(missing, ", ")));
@@ -157,23 +157,23 @@ void RunParts::find_missing(const std::map<int, PartFiles>& parts, int count, st
 
 void RunParts::find_frames(PartFiles& part, std::vector<std::string>& problems)
 {
-    const RunFrames& wanted = part.record.frames;
+    const RunFrames& requested = part.record.frames;
     const FramePattern pattern(part.text);
     std::vector<int> missing;
     std::error_code none;
-    for (std::int64_t frame = wanted.first; frame <= wanted.last; frame += wanted.step) {
+    for (std::int64_t frame = requested.first; frame <= requested.last; frame += requested.step) {
         const int number = static_cast<int>(frame);
         const fs::path path = pattern.expand(number);
         if (fs::exists(path, none) && part.record.files.contains(frame))
             part.frames.emplace(number, path);
         else
             missing.push_back(number);
-        if (missing.size() == most_missing) break;
+        if (missing.size() == max_missing) break;
     }
     if (!missing.empty())
         problems.push_back(fmt::format(
             "of {} {} missing: {}{}", part.text, missing.size() == 1 ? "a frame is" : "frames are",
-            list_of_frames(missing, wanted.step), missing.size() == most_missing ? ", and maybe more" : ""));
+            list_of_frames(missing, requested.step), missing.size() == max_missing ? ", and maybe more" : ""));
 }
 
 std::vector<int> RunParts::frames() const
@@ -186,11 +186,11 @@ std::vector<int> RunParts::frames() const
 void RunParts::check_output(const std::string& output) const
 {
     const Format& format = format_of(output);
-    if (!format.read || format.film || format.places_alone)
+    if (!format.read || format.film || format.positions_only)
         throw Error(fmt::format("{} {}: a {} file holds no points; merge to a format that does",
                                 name_of(Setting::Output), output, format.extension));
     for (const PartFiles& part : parts_)
-        if (const Format& own = format_of(part.text); !own.read || own.places_alone)
+        if (const Format& own = format_of(part.text); !own.read || own.positions_only)
             throw Error(fmt::format("{}: a {} file holds no points that could be read", part.text, own.extension));
     const FramePattern pattern(output);
     if (parts_.front().frames.size() > 1 && !pattern.has_frame())
@@ -212,7 +212,7 @@ std::uint64_t RunParts::write_frame(int frame, const std::string& output) const
     for (const PartFiles& part : parts_) bytes += fs::file_size(part.frames.at(frame), none);
     fs::create_directories(folder_above(path), none);
     std::optional<ColumnFiles> columns;
-    if (bytes > most_in_memory) columns.emplace(folder_above(path), resident);
+    if (bytes > max_in_memory) columns.emplace(folder_above(path), resident);
 
     std::vector<std::string> names;
     std::vector<PartRecord::File> written;

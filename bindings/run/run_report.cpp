@@ -208,7 +208,7 @@ void RunReport::known_frame(const FrameRecord& record, bool is_before)
     totals_.add(record.statistics);
     if (statistics_) statistics_->add(record.statistics);
     keep_worst(run_.stiff, record.stiff);
-    for (const std::string& text : record.warnings) tell(text, record.statistics.frame);
+    for (const std::string& text : record.warnings) report_warning(text, record.statistics.frame);
     if (is_before) {
         earlier_seconds_ = std::max(earlier_seconds_, record.seconds);
         earlier_peak_ = std::max(earlier_peak_, record.peak_bytes);
@@ -232,24 +232,24 @@ void RunReport::warning(const std::string& text, std::int64_t frame)
 {
     const auto lock = locked();
     if (cache_) cache_->warned(text);
-    tell(text, frame);
+    report_warning(text, frame);
 }
 
-void RunReport::tell(const std::string& text, std::int64_t frame)
+void RunReport::report_warning(const std::string& text, std::int64_t frame)
 {
     if (warned_.contains(text) || !frame_warnings_.add(text, frame)) return;
     listener_.warning(fmt::format("frame {}: {}", frame, text));
 }
 
-void RunReport::tell_untold()
+void RunReport::report_suppressed()
 {
-    for (const std::string& text : std::exchange(frame_warnings_, {}).untold()) listener_.warning(text);
+    for (const std::string& text : std::exchange(frame_warnings_, {}).suppressed()) listener_.warning(text);
 }
 
 std::string RunReport::finish()
 {
     const auto lock = locked();
-    tell_untold();
+    report_suppressed();
     write_statistics();
     return summary(run_, totals_);
 }
@@ -257,7 +257,7 @@ std::string RunReport::finish()
 std::string RunReport::finish_early()
 {
     const auto lock = locked();
-    tell_untold();
+    report_suppressed();
     return try_to_write();
 }
 
@@ -267,7 +267,7 @@ std::optional<RunReport::Abandoned> RunReport::abandon()
     const std::unique_lock lock(mutex_, std::chrono::seconds(1));
     if (!lock) return std::nullopt;
     is_abandoned_ = true;
-    return Abandoned{frame_warnings_.untold(), try_to_write()};
+    return Abandoned{frame_warnings_.suppressed(), try_to_write()};
 }
 
 std::string RunReport::try_to_write()

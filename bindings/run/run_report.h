@@ -126,8 +126,8 @@ private:
     // Writes statistics and profile. Throws Error if a file cannot be written.
     void write_statistics();
     std::string try_to_write();
-    void tell(const std::string& text, std::int64_t frame);
-    void tell_untold();
+    void report_warning(const std::string& text, std::int64_t frame);
+    void report_suppressed();
     double now() const;
 
     const Listener listener_;

@@ -111,10 +111,10 @@ private:
 };
 
 // Reads the next frame of a reference. Throws Error if it is a different one.
-PointSet frame_of(const RecordLog& reference, std::int64_t frame, std::uint64_t& place)
+PointSet frame_of(const RecordLog& reference, std::int64_t frame, std::uint64_t& offset)
 {
     std::string record;
-    if (reference.read(place, record))
+    if (reference.read(offset, record))
         if (const StateFile file = StateFile::in_memory(std::move(record)); file.header().at("frame") == frame) {
             PointSet points;
             restore(points, file.state());
@@ -130,7 +130,7 @@ double run_frames(const Plan& plan, const Study& study,
     const std::string output = compared_output(plan);
     const Stopwatch stopwatch;
     Evaluator evaluator(plan);
-    evaluator.leave_out_errors();
+    evaluator.disable_error_estimates();
     while (evaluator.next_frame() <= study.last) {
         const FrameResult result = evaluator.advance();
         if (keep && is_compared(study, result.frame)) keep(result, result.outputs.at(output));
@@ -190,13 +190,13 @@ StudyRow StudyScene::measure(const RecordLog* reference, const Progress& progres
         if (run > 0) {
             seconds.push_back(run_frames(plan, study_, {}));
         } else {
-            std::uint64_t place = 0;
+            std::uint64_t offset = 0;
             const std::string output = compared_output(plan);
             run_frames(plan, study_, [&](const FrameResult& result, const PointSet& points) {
                 if (!study_.compares()) return measure.add(result.figures, points);
                 const double time = result.time.at(output), fps = result.fps.at(output);
                 const Frame frame{static_cast<double>(result.frame), time, 1 / fps};
-                const PointSet compared = study_.reference ? frame_of(*reference, result.frame, place)
+                const PointSet compared = study_.reference ? frame_of(*reference, result.frame, offset)
                                                            : session_.study_reference(frame, knobs_);
                 measure.add(points, compared, result.frame - plan.first_frame(), time);
             });

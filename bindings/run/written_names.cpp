@@ -58,16 +58,17 @@ void WrittenNames::reads(const fs::path& file) { read_.insert(true_path(file)); 
 
 void WrittenNames::add(const fs::path& file, std::string who)
 {
-    const fs::path place = true_path(file);
-    Writer writer{place.parent_path(), place.filename(), std::nullopt, {}, std::move(who)};
+    const fs::path resolved = true_path(file);
+    Writer writer{resolved.parent_path(), resolved.filename(), std::nullopt, {}, std::move(who)};
     check(writer);
     writers_.push_back(std::move(writer));
 }
 
 void WrittenNames::add(const FramePattern& pattern, std::string_view output, const RunFrames& frames, std::string who)
 {
-    const fs::path place = true_path(pattern.of_output(output));
-    Writer writer{place.parent_path(), place.filename(), FramePattern(place.filename()), frames, std::move(who)};
+    const fs::path resolved = true_path(pattern.for_output(output));
+    Writer writer{resolved.parent_path(), resolved.filename(), FramePattern(resolved.filename()), frames,
+                  std::move(who)};
     if (!writer.pattern->has_frame()) writer.pattern.reset();
     check(writer);
     writers_.push_back(std::move(writer));

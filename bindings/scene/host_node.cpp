@@ -113,15 +113,15 @@ public:
             return;
         }
         const Strided<std::uint8_t> members = members_of(points, fields_.group);
-        std::vector<std::uint32_t> places;
+        std::vector<std::uint32_t> indices;
         for (std::size_t i = 0; i < points.size(); ++i)
-            if (members[i]) places.push_back(static_cast<std::uint32_t>(i));
-        if (places.empty()) return;
-        PointSet some = points.select(places);
+            if (members[i]) indices.push_back(static_cast<std::uint32_t>(i));
+        if (indices.empty()) return;
+        PointSet some = points.select(indices);
         const std::vector<std::uint8_t> keep_some = call(some);
-        points.put(places, some);
+        points.put(indices, some);
         std::vector<std::uint8_t> keep(points.size(), 1);
-        for (std::size_t k = 0; k < places.size(); ++k) keep[places[k]] = keep_some[k];
+        for (std::size_t k = 0; k < indices.size(); ++k) keep[indices[k]] = keep_some[k];
         remove(points, keep);
     }
 
@@ -229,7 +229,7 @@ private:
     HostFields fields_;
 };
 
-Param param_of(const HostParameter& declared, std::size_t place)
+Param param_of(const HostParameter& declared, std::size_t slot)
 {
     Param param;
     param.name = declared.name;
@@ -238,19 +238,19 @@ Param param_of(const HostParameter& declared, std::size_t place)
     if (const double* number = std::get_if<double>(&declared.fallback)) {
         param.type = "number";
         param.fallback = *number;
-        param.range = Range{declared.least, declared.most};
-        param.assign = [place](const Param& self, void* fields, const Value& value) {
-            read_value(self, value, static_cast<HostFields*>(fields)->values[place]);
+        param.range = Range{declared.min, declared.max};
+        param.assign = [slot](const Param& self, void* fields, const Value& value) {
+            read_value(self, value, static_cast<HostFields*>(fields)->values[slot]);
         };
         return param;
     }
     const auto& [x, y, z] = std::get<std::array<double, 3>>(declared.fallback);
     param.type = "vec3";
     param.fallback = Vec3d(x, y, z);
-    param.assign = [place](const Param& self, void* fields, const Value& value) {
+    param.assign = [slot](const Param& self, void* fields, const Value& value) {
         Vec3d vector;
         read_value(self, value, vector);
-        std::copy_n(vector.data(), 3, &static_cast<HostFields*>(fields)->values[place]);
+        std::copy_n(vector.data(), 3, &static_cast<HostFields*>(fields)->values[slot]);
     };
     return param;
 }
@@ -301,13 +301,13 @@ try {
     type.varies = node.kind == HostNode::Edit;
     type.params.push_back(param_of(&HostFields::group, "group", Value(), any_number(), "",
                                    "limits the node to the points of this group"));
-    std::size_t place = 0;
+    std::size_t slot = 0;
     for (const HostParameter& parameter : node.parameters) {
         if (!is_name(parameter.name) || type.find(parameter.name) || parameter.name == "name")
             throw Error(fmt::format(
                 "parameter \"{}\": its name must be a word of letters, digits and _, and no other's", parameter.name));
-        type.params.push_back(param_of(parameter, place));
-        place += parameter.fallback.index() == 0 ? 1 : 3;
+        type.params.push_back(param_of(parameter, slot));
+        slot += parameter.fallback.index() == 0 ? 1 : 3;
     }
     for (const auto& [name, of] : node.reads) declare_column(type, node, name, of, false);
     for (const auto& [name, of] : node.writes) declare_column(type, node, name, of, true);

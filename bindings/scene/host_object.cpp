@@ -68,10 +68,10 @@ ObjectPtr make_mesh(const HostMesh& mesh, const std::string& name)
         made->positions.emplace_back(x, y, z);
     }
     for (const std::array<std::int32_t, 3>& corners : mesh.triangles) {
-        for (const std::int32_t place : corners)
-            if (place < 0 || static_cast<std::size_t>(place) >= mesh.positions.size())
+        for (const std::int32_t corner : corners)
+            if (corner < 0 || static_cast<std::size_t>(corner) >= mesh.positions.size())
                 throw Error(fmt::format("triangle {} has a corner at position {}; there are {}", made->triangles.size(),
-                                        place, mesh.positions.size()));
+                                        corner, mesh.positions.size()));
         made->triangles.emplace_back(corners[0], corners[1], corners[2]);
     }
     return made;
@@ -81,7 +81,7 @@ ObjectPtr make_points(const HostPoints& points)
 {
     auto made = std::make_shared<PointsObject>();
     made->points.append(points.count);
-    bool has_places = false;
+    bool has_positions = false;
     for (const HostPoints::Column& column : points.columns) {
         if (!column.data && points.count > 0) throw Error(fmt::format("the data of {} are null", column.name));
         if (column.name == "id") throw Error("id can't be given; ids count from 0 in order");
@@ -91,10 +91,10 @@ ObjectPtr make_points(const HostPoints& points)
         if ((known && known->index() != values.index()) || (spec && spec->fallback.index() != values.index()))
             throw Error(fmt::format("{} is of {}; it must be of {}", column.name, type_name(type_of(values)),
                                     type_name(known ? type_of(*known) : type_of(spec->fallback))));
-        has_places = has_places || column.name == "P";
+        has_positions = has_positions || column.name == "P";
         made->points.set(column.name, std::move(values));
     }
-    if (!has_places) throw Error("P is missing; give a column of Vec3 of this name");
+    if (!has_positions) throw Error("P is missing; give a column of Vec3 of this name");
     const std::span<std::int64_t> id = made->points.id().overwrite();
     for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
     return made;

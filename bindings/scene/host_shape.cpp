@@ -19,7 +19,7 @@ public:
     }
 
     // P: shape [n][3]; gradient: empty, or shape [n].
-    void ask(std::span<const double> P, std::span<double> phi, std::span<Vec3d> gradient) const
+    void query(std::span<const double> P, std::span<double> phi, std::span<Vec3d> gradient) const
     {
         if (phi.empty()) return;
         GuardedArray<double> distance(phi.size(), guarded_), slopes(3 * gradient.size(), guarded_);
@@ -35,13 +35,13 @@ public:
     double distance(const Vec3d& P) const
     {
         double phi = 0;
-        ask({P.data(), 3}, {&phi, 1}, {});
+        query({P.data(), 3}, {&phi, 1}, {});
         return phi;
     }
     double distance(const Vec3d& P, Vec3d& gradient) const
     {
         double phi = 0;
-        ask({P.data(), 3}, {&phi, 1}, {&gradient, 1});
+        query({P.data(), 3}, {&phi, 1}, {&gradient, 1});
         return phi;
     }
     double slope_bound() const { return shape_.slope_bound; }
@@ -66,13 +66,13 @@ public:
 
     void distances(int n, const double* X, const double* Y, const double* Z, double* phi) const
     {
-        ask(packed(n, X, Y, Z), {phi, static_cast<unsigned>(n)}, {});
+        query(packed(n, X, Y, Z), {phi, static_cast<unsigned>(n)}, {});
     }
     void distances_along(int n, const double* X, const double* Y, const double* Z, const double* vx, const double* vy,
                          const double* vz, double* phi, double* slope) const
     {
         std::vector<Vec3d> gradient(static_cast<unsigned>(n));
-        ask(packed(n, X, Y, Z), {phi, static_cast<unsigned>(n)}, gradient);
+        query(packed(n, X, Y, Z), {phi, static_cast<unsigned>(n)}, gradient);
         for (int i = 0; i < n; ++i) slope[i] = gradient[i].dot(Vec3d(vx[i], vy[i], vz[i]));
     }
 
@@ -108,7 +108,7 @@ public:
     // Evaluates all positions in one call.
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
     {
-        if (!P.empty()) sampler().ask({P.front().data(), 3 * P.size()}, phi, gradient);
+        if (!P.empty()) sampler().query({P.front().data(), 3 * P.size()}, phi, gradient);
     }
 
 private:
@@ -118,8 +118,8 @@ private:
         std::vector<double> P, phi(paths.size());
         P.reserve(3 * paths.size());
         for (const Path& path : paths) P.insert(P.end(), path.P.data(), path.P.data() + 3);
-        sampler().ask(P, phi, {});
-        std::vector<std::size_t> places;
+        sampler().query(P, phi, {});
+        std::vector<std::size_t> indices;
         std::vector<Path> near;
         for (std::size_t i = 0; i < paths.size(); ++i) {
             const Path& path = paths[i];
@@ -128,12 +128,12 @@ private:
             const double fastest = std::max(path.v.norm(), path.velocity(path.duration).norm());
             const double rounding = 0x1p-20 * (path.P.cwiseAbs().maxCoeff() + path.radius);
             if (phi[i] - path.radius - rounding > path.duration * fastest * shape_.slope_bound) continue;
-            places.push_back(i);
+            indices.push_back(i);
             near.push_back(path);
         }
         std::vector<Contact> found(near.size());
         FirstContactSearch(sampler(), near, found).find();
-        for (std::size_t k = 0; k < places.size(); ++k) contacts[places[k]] = found[k];
+        for (std::size_t k = 0; k < indices.size(); ++k) contacts[indices[k]] = found[k];
     }
 
     const HostShape shape_;

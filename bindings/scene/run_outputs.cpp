@@ -57,7 +57,7 @@ Explanation explained(const SceneInside::Impl& scene, const FileOutputs& outputs
 SceneReport report_of(const Snapshot& snapshot)
 {
     std::map<std::string, std::size_t> simulations, nodes;
-    std::vector<KeptBytes> kept;
+    std::vector<HeldBytes> kept;
     for (const auto& [name, state] : snapshot.simulations) {
         simulations[name] = state.size();
         kept.push_back({name, state.size(), "points, ids and what is adopted"});
@@ -88,13 +88,13 @@ void check_frames(const RunFrames& frames)
 
 FrameFiles frame_files(const FileOutputs& files)
 {
-    constexpr int most_pixels = 16384;
-    const PictureSettings& asked = files.pictures;
-    if (std::min(asked.size.width, asked.size.height) < 1 ||
-        std::max(asked.size.width, asked.size.height) > most_pixels)
-        refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", asked.size.width, asked.size.height,
-                           most_pixels));
-    return FrameFiles(files.outputs, picture_options(asked.camera, asked.size));
+    constexpr int max_pixels = 16384;
+    const PictureSettings& requested = files.pictures;
+    if (std::min(requested.size.width, requested.size.height) < 1 ||
+        std::max(requested.size.width, requested.size.height) > max_pixels)
+        refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", requested.size.width, requested.size.height,
+                           max_pixels));
+    return FrameFiles(files.outputs, picture_options(requested.camera, requested.size));
 }
 
 Result<OutputFormat> SceneInside::output_format(const std::string& output)
@@ -165,7 +165,7 @@ Result<SceneReport> SceneInside::explain_state(Scene& scene, const FileOutputs& 
         if (frame < output.plan.first_frame())
             refuse(fmt::format("frame {} is before the scene's first, {}", frame, output.plan.first_frame()));
         Evaluator evaluator(output.plan);
-        impl.beside([&] {
+        impl.run_separately([&] {
             while (evaluator.next_frame() <= frame) evaluator.advance();
         });
         return report_of(evaluator.save());
@@ -221,7 +221,7 @@ Result<std::string> SceneInside::advice_on(Scene& scene, const FileOutputs& file
         try {
             const SceneInside::Impl::Running running(impl);
             const OutputPlan output(impl, files, plan_options(impl, files));
-            impl.beside([&] {
+            impl.run_separately([&] {
                 try {
                     const FrameFigures found = Evaluator(output.plan).examine();
                     text = advice(found.stiff) + text_of(found.resolution);
@@ -251,7 +251,7 @@ Result<SceneRaces> SceneInside::find_races(Scene& scene, const FileOutputs& file
         tbb::task_arena(1).execute([&] {
             // One interruption stops all sessions of the trials.
             const auto scripts = std::make_shared<Interruption>();
-            const SceneInside::Impl::Apart apart(impl, scripts);
+            const SceneInside::Impl::SeparateCall separate(impl, scripts);
             const auto load = [&](const KernelOrder& order) {
                 SessionOptions session = impl.session_options(impl.settings);
                 session.quiet = true;

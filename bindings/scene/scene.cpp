@@ -141,7 +141,7 @@ Result<Done> Scene::offer(const std::string& name, const HostObject& object)
 {
     return impl_->call(SceneError::WrongCall, [&] {
         impl_->offers->objects[name] = make_object(name, object, impl_->options.guard_callbacks);
-        impl_->behind_frame.reset();  // its functions may change it
+        impl_->node_results_frame.reset();  // its functions may change it
         return Done();
     });
 }

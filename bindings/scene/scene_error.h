@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-constexpr int most_threads = 4096;  // per scene; more is a typing error
+constexpr int max_threads = 4096;  // per scene; more is a typing error
 
 SceneError wrong_call(std::string message);
 SceneError busy();  // the error of a call while the scene is in another one
@@ -24,10 +24,10 @@ SceneError caught_error(SceneError::Kind fault);
 
 // Calls a hook on a thread that may have no caller: exceptions are dropped.
 template <class T>
-void call_hook(const std::function<void(const T& told)>& hook, const std::type_identity_t<T>& told)
+void call_hook(const std::function<void(const T& argument)>& hook, const std::type_identity_t<T>& argument)
 {
     if (hook) try {
-            hook(told);
+            hook(argument);
         } catch (...) {
         }
 }

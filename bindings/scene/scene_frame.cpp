@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/files/left_out.h"
+#include "bindings/scene/state_file_io.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/compare.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
@@ -45,10 +45,10 @@ SceneColumn view_of(std::string_view name, const Column<T>& column)
     return view;
 }
 
-constexpr char what_a_frame_is[] = "frame of a scene";
+constexpr char frame_file_type[] = "frame of a scene";
 
 // Contents of a frame's file.
-struct KeptFrame {
+struct StoredFrame {
     std::int64_t number = 0;
     std::map<std::string, double> fps, time;
     std::map<std::string, PointSet> outputs;
@@ -64,7 +64,7 @@ struct KeptFrame {
     }
 };
 
-SceneError no_such(const char* what, std::string_view name, const std::vector<std::string>& names)
+SceneError unknown_name(const char* what, std::string_view name, const std::vector<std::string>& names)
 {
     return wrong_call(fmt::format("the frame has no {} \"{}\"{}", what, name, did_you_mean(name, names)));
 }
@@ -101,7 +101,7 @@ std::vector<std::string> SceneFrame::warnings() const { return data_->warnings; 
 Result<SceneFrame> SceneFrame::output(std::string_view name) const
 {
     const auto found = data_->result.outputs.find(std::string(name));
-    if (found == data_->result.outputs.end()) return no_such("output", name, outputs());
+    if (found == data_->result.outputs.end()) return unknown_name("output", name, outputs());
     return SceneFrame(data_, found->first);
 }
 
@@ -109,7 +109,7 @@ Result<SceneColumn> SceneFrame::column(std::string_view name) const
 {
     const PointSet& points = data_->result.outputs.at(output_);
     const auto found = points.columns().find(name);
-    if (found == points.columns().end()) return no_such("column", name, columns());
+    if (found == points.columns().end()) return unknown_name("column", name, columns());
     return std::visit([&](const auto& column) { return view_of(found->first, column); }, found->second);
 }
 
@@ -117,7 +117,7 @@ Result<SceneColumn> SceneFrame::group(std::string_view name) const
 {
     const PointSet& points = data_->result.outputs.at(output_);
     const auto found = points.groups().find(name);
-    if (found == points.groups().end()) return no_such("group", name, groups());
+    if (found == points.groups().end()) return unknown_name("group", name, groups());
     return view_of(found->first, found->second);
 }
 
@@ -142,14 +142,14 @@ Result<SceneColumn> SceneFrame::expanded(std::string_view name) const
     }
 }
 
-Result<std::vector<std::uint32_t>> SceneFrame::places(const std::vector<std::int64_t>& ids) const
+Result<std::vector<std::uint32_t>> SceneFrame::indices(const std::vector<std::int64_t>& ids) const
 {
-    static_assert(no_place == IdIndex::none);
+    static_assert(no_index == IdIndex::none);
     try {
         const IdIndex index(data_->result.outputs.at(output_).id());
-        std::vector<std::uint32_t> places(ids.size());
-        std::transform(ids.begin(), ids.end(), places.begin(), [&](std::int64_t id) { return index[id]; });
-        return places;
+        std::vector<std::uint32_t> indices(ids.size());
+        std::transform(ids.begin(), ids.end(), indices.begin(), [&](std::int64_t id) { return index[id]; });
+        return indices;
     } catch (...) {
         return caught_error(SceneError::WrongCall);
     }
@@ -193,7 +193,7 @@ Result<SceneValue> SceneFrame::detail(std::string_view name) const
 {
     const auto& all = data_->result.outputs.at(output_).details;
     const auto found = all.find(std::string(name));
-    if (found == all.end()) return no_such("detail value", name, details());
+    if (found == all.end()) return unknown_name("detail value", name, details());
     return value_of(found->second);
 }
 
@@ -262,11 +262,11 @@ Result<SceneFrame> SceneFrame::read(const std::string& path)
 {
     try {
         auto data = std::make_shared<Data>();
-        const LeftOut left_out;
+        const SkippedContents skipped;
         data->result.outputs.emplace("main", read_points(path));
         data->result.fps.emplace("main", FrameInfo().fps);
         data->result.time.emplace("main", 0);
-        data->warnings = left_out.list();
+        data->warnings = skipped.list();
         return SceneFrame(std::move(data), "main");
     } catch (...) {
         return caught_error(SceneError::WrongCall);
@@ -275,17 +275,18 @@ Result<SceneFrame> SceneFrame::read(const std::string& path)
 
 Result<Done> SceneInside::save(const SceneFrame& frame, const std::string& path, const std::string& key)
 {
-    return of_file(path, [&] {
+    return with_file_name(path, [&] {
         const FrameResult& result = frame.data_->result;
-        write_kept(path, what_a_frame_is, key, KeptFrame{result.frame, result.fps, result.time, result.outputs});
+        write_state_file(path, frame_file_type, key,
+                         StoredFrame{result.frame, result.fps, result.time, result.outputs});
         return Done();
     });
 }
 
 Result<SceneFrame> SceneInside::load_frame(const std::string& path, const std::string& key)
 {
-    return of_file(path, [&] {
-        auto kept = read_kept<KeptFrame>(path, what_a_frame_is, key);
+    return with_file_name(path, [&] {
+        auto kept = read_state_file<StoredFrame>(path, frame_file_type, key);
         auto data = std::make_shared<SceneFrame::Data>();
         data->result.frame = kept.number;
         data->result.outputs = std::move(kept.outputs);

@@ -40,8 +40,8 @@ std::string text_of(const SceneValue& value)
 
 std::optional<SceneError> fault_of(const SceneOptions& options)
 {
-    if (options.threads < 0 || options.threads > most_threads)
-        return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, most_threads));
+    if (options.threads < 0 || options.threads > max_threads)
+        return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, max_threads));
     if (!(options.script_seconds > 0))
         return wrong_call(fmt::format("script_seconds = {}; it must be above 0", options.script_seconds));
     if (options.script_memory == 0) return wrong_call("script_memory = 0; it must be bytes above 0");
@@ -66,11 +66,11 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
     for (const std::string& path : options.paths) result.paths.emplace_back(path);
     result.may_write = may_write;
     result.interruptible = true;
-    result.on_timeout = [this](const std::string& message) { call_hook(hooks.late, message); };
-    if (hooks.reads || read)
+    result.on_timeout = [this](const std::string& message) { call_hook(hooks.on_script_timeout, message); };
+    if (hooks.on_file_read || read)
         result.on_read = [this, read = std::move(read)](const std::filesystem::path& path) {
             if (read) read->add(path);
-            call_hook(hooks.reads, path.string());
+            call_hook(hooks.on_file_read, path.string());
         };
     result.keeps_state = hooks.keep_state;
     result.offers = offers;
@@ -92,10 +92,10 @@ SessionOptions Scene::Impl::session_options(const std::map<std::string, std::str
     return result;
 }
 
-void Scene::Impl::tell(const std::vector<std::string>& texts) const
+void Scene::Impl::log_warnings(const std::vector<std::string>& strings) const
 {
     if (!options.log) return;
-    for (const std::string& line : texts) call_program("log", options.log, LogLevel::Warning, line);
+    for (const std::string& line : strings) call_program("log", options.log, LogLevel::Warning, line);
 }
 
 void Scene::Impl::take_offers()
@@ -111,7 +111,8 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
 {
     std::shared_ptr<InputContents> read;
     if (keeps_inputs)
-        read = std::make_shared<InputContents>(std::filesystem::path(file).parent_path(), InputContents::Code::LeftOut);
+        read =
+            std::make_shared<InputContents>(std::filesystem::path(file).parent_path(), InputContents::Code::Excluded);
     SessionOptions session_with = session_options(set, read);
     session_with.interruption = std::make_shared<Interruption>();
     Cancellation opening;
@@ -125,21 +126,21 @@ void Scene::Impl::load(std::map<std::string, std::string> set)
     });
     auto fresh = std::make_unique<Session>(file, std::move(session_with));
     if (hooks.parameters) call_hook(hooks.parameters, parameters_of(*fresh));
-    std::vector<std::string> told = fresh->take_warnings();
-    tell(told);  // the plan may fail for the reason that they warn of
+    std::vector<std::string> fresh_warnings = fresh->take_warnings();
+    log_warnings(fresh_warnings);  // the plan may fail for the reason that they warn of
     auto fresh_plan = std::make_unique<Plan>(fresh->graph(), plan_options());
-    tell(fresh_plan->warnings);
-    told.insert(told.end(), fresh_plan->warnings.begin(), fresh_plan->warnings.end());
+    log_warnings(fresh_plan->warnings);
+    fresh_warnings.insert(fresh_warnings.end(), fresh_plan->warnings.begin(), fresh_plan->warnings.end());
     picture_scene.reset();
     evaluator.reset();
     plan.reset();
     session = std::move(fresh);
     settings = std::move(set);
-    warnings = std::move(told);
+    warnings = std::move(fresh_warnings);
     inputs = std::move(read);
     opened = inputs ? inputs->take() : Fingerprint();
-    behind.clear();
-    behind_frame.reset();
+    node_results.clear();
+    node_results_frame.reset();
     describe_scene(*fresh_plan);
     start(std::move(fresh_plan));
 }
@@ -181,8 +182,8 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     plan = std::move(fresh);
     evaluator = std::make_unique<Evaluator>(*plan, write);
     ended_by = nullptr;
-    if (!options.estimate_errors) evaluator->leave_out_errors();
-    if (hooks.tell_points) evaluator->tell_points();
+    if (!options.estimate_errors) evaluator->disable_error_estimates();
+    if (hooks.per_point_diagnostics) evaluator->add_per_point_diagnostics();
     next = plan->first_frame();
     has_advanced = false;
 }
@@ -209,7 +210,7 @@ SceneFrame Scene::Impl::advance()
     data->scene = number;
     next = evaluator->next_frame();
     has_advanced = true;
-    tell(data->warnings);
+    log_warnings(data->warnings);
     const std::string output = data->first_output();
     return SceneFrame(std::move(data), output);
 }
@@ -230,7 +231,7 @@ void Scene::Impl::cancel() noexcept
     }
 }
 
-Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scripts)
+Scene::Impl::SeparateCall::SeparateCall(Impl& impl, const std::shared_ptr<Interruption>& scripts)
     : scope(&impl.cancellation), stop(impl.hooks.stop, [&impl, scripts] {
           try {
               impl.cancellation.request();
@@ -246,15 +247,15 @@ Scene::Impl::Apart::Apart(Impl& impl, const std::shared_ptr<Interruption>& scrip
                 impl.cancellation.request(error);
                 scripts->request(error);
             },
-            impl.too_late());
+            impl.memory_overrun_callback());
     impl.cancellation.check();
 }
 
-MemoryWatch::Tell Scene::Impl::too_late() const
+MemoryWatch::Callback Scene::Impl::memory_overrun_callback() const
 {
-    if (!hooks.beyond_memory) return {};
+    if (!hooks.on_memory_exceeded) return {};
     return [this](const Error& error) {
-        call_hook(hooks.beyond_memory, cancellation.placed(error).at({file, 0}).what());
+        call_hook(hooks.on_memory_exceeded, cancellation.placed(error).at({file, 0}).what());
     };
 }
 

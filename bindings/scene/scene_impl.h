@@ -61,10 +61,10 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::unique_ptr<Evaluator> evaluator;  // null after an error
     std::exception_ptr ended_by;           // the error of a separate frame that left the scene without an evaluator
     std::unique_ptr<SceneOfPlan> picture_scene;
-    std::map<std::string, SceneFrame> behind;   // the points after the nodes in the last requested frame
-    std::optional<std::int64_t> behind_frame;   // its number
-    std::shared_ptr<InputContents> inputs;      // of the files that are read; null if they are not recorded
-    std::map<std::string, std::string> opened;  // the contents of the files read on opening
+    std::map<std::string, SceneFrame> node_results;  // the points after the nodes in the last requested frame
+    std::optional<std::int64_t> node_results_frame;  // its number
+    std::shared_ptr<InputContents> inputs;           // of the files that are read; null if they are not recorded
+    std::map<std::string, std::string> opened;       // the contents of the files read on opening
     std::int64_t next = 1;
     bool has_advanced = false;
 
@@ -109,7 +109,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     SessionOptions session_options(const std::map<std::string, std::string>& set,
                                    std::shared_ptr<InputContents> read = nullptr);
     PlanOptions plan_options() const;
-    void tell(const std::vector<std::string>& texts) const;
+    void log_warnings(const std::vector<std::string>& strings) const;
     void take_offers();
     // Runs the file with these settings. If that fails the scene is unchanged.
     void load(std::map<std::string, std::string> set);
@@ -124,11 +124,11 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     static std::uint64_t next_number();
     // Callable from any thread. If memory runs out, scripts continue to the next chunk.
     void cancel() noexcept;
-    SceneTrace trace(const TraceOptions& asked);
-    SceneFrame points_behind(const std::string& node, std::int64_t frame);
+    SceneTrace trace(const TraceOptions& requested);
+    SceneFrame points_after(const std::string& node, std::int64_t frame);
     // Computes frames of another plan of the session. Scripts that had to be stopped do not run again.
     template <class F>
-    void beside(const F& compute)
+    void run_separately(const F& compute)
     {
         try {
             compute();
@@ -142,18 +142,20 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
         session->take_warnings();  // of frames; the run reports them
     }
     // Computes the frames up to this one separately. from: may be null; results: called with each node's.
-    void compute_beside(const Plan& apart, std::int64_t frame, const Snapshot* from, Evaluator::ResultHook results);
+    void compute_separately(const Plan& separate, std::int64_t frame, const Snapshot* from,
+                            Evaluator::ResultHook results);
     // Returns the points after a node of a plan as a frame.
-    SceneFrame frame_behind(const Plan& apart, const PlannedNode& planned, std::int64_t frame, PointSet points) const;
-    const std::map<std::string, SceneFrame>& points_behind_all(std::int64_t frame, const SceneSnapshot* from);
+    SceneFrame frame_after_node(const Plan& separate, const PlannedNode& planned, std::int64_t frame, PointSet points)
+        const;
+    const std::map<std::string, SceneFrame>& points_after_nodes(std::int64_t frame, const SceneSnapshot* from);
     PointOrigin origin(const SceneFrame& frame, std::int64_t id, const SceneSnapshot* from);
     SceneShapes shapes_at(std::int64_t frame);
     void refuse_unless_ready() const;
     void refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const;
-    void refuse_unless_kept() const;  // keep_state
-    // Returns the callback that SceneHooks::beyond_memory needs, with the position of the computation; empty if no
+    void require_keep_state() const;  // keep_state
+    // Returns the callback that SceneHooks::on_memory_exceeded needs, with the position of the computation; empty if no
     // program set that hook.
-    MemoryWatch::Tell too_late() const;
+    MemoryWatch::Callback memory_overrun_callback() const;
 
     // While it lives, cancel() stops scripts.
     struct Scripts {
@@ -168,11 +170,11 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     };
     // While it lives, the end of a call also ends sessions with these scripts, which are not the scene's: those of
     // opening and of trials.
-    struct Apart {
+    struct SeparateCall {
         Cancellation::Scope scope;
         std::optional<MemoryWatch> watch;
         std::stop_callback<std::function<void()>> stop;
-        Apart(Impl& impl, const std::shared_ptr<Interruption>& scripts);
+        SeparateCall(Impl& impl, const std::shared_ptr<Interruption>& scripts);
     };
     // While it lives, frames are computed, and end when they are cancelled or exceed the memory limit.
     struct Running {
@@ -191,7 +193,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
                         impl.session->interrupt(error);
                         impl.cancellation.request(error);
                     },
-                    impl.too_late());
+                    impl.memory_overrun_callback());
             impl.cancellation.check();
         }
     };

@@ -5,7 +5,7 @@
 
 namespace rapid {
 
-void Scene::Impl::refuse_unless_kept() const
+void Scene::Impl::require_keep_state() const
 {
     if (!inputs) refuse("nothing is kept of what the scene reads; open it with SceneHooks::keep_state");
 }
@@ -14,10 +14,10 @@ Result<SceneFingerprint> SceneInside::fingerprint(Scene& scene)
 {
     Impl& impl = of(scene);
     return impl.call(SceneError::WrongCall, [&] {
-        impl.refuse_unless_kept();
+        impl.require_keep_state();
         SceneFingerprint result;
         result.parts = fingerprint_of(*impl.session, *impl.plan, impl.file, impl.opened);
-        if (impl.hooks.tell_points)
+        if (impl.hooks.per_point_diagnostics)
             result.parts["points tell"] = impl.options.estimate_errors ? "error, substeps, asleep" : "substeps, asleep";
         result.hash = hash_of(result.parts);
         return result;
@@ -28,7 +28,7 @@ Result<std::map<std::string, std::string>> SceneInside::take_inputs(Scene& scene
 {
     Impl& impl = of(scene);
     return impl.call(SceneError::WrongCall, [&] {
-        impl.refuse_unless_kept();
+        impl.require_keep_state();
         return impl.inputs->take();
     });
 }
@@ -37,7 +37,7 @@ Result<bool> SceneInside::are_unchanged(Scene& scene, const std::map<std::string
 {
     Impl& impl = of(scene);
     return impl.call(SceneError::WrongCall, [&] {
-        impl.refuse_unless_kept();
+        impl.require_keep_state();
         return std::all_of(inputs.begin(), inputs.end(), [&](const auto& one) {
             return InputContents::is_content(one.first) && impl.inputs->content_of(one.first) == one.second;
         });

@@ -24,13 +24,13 @@ struct SceneHooks {
     // Called with the error's text before a script that exceeds script_seconds is stopped, for a program that then
     // prefers to end: a process that may not read /proc/self/maps cannot stop compiled code. On a thread of Rapid's;
     // exceptions are dropped.
-    std::function<void(const std::string& message)> late;
+    std::function<void(const std::string& message)> on_script_timeout;
     // Called with each file before it is read, and with each path at which a module or a node was looked for. On any
     // thread; exceptions are dropped.
-    std::function<void(const std::string& path)> reads;
+    std::function<void(const std::string& path)> on_file_read;
     // Called with the error's text if the memory limit cannot end a computation in time: the process exceeds it by a
     // sixteenth, or did not stop within a second. For a program that then prefers to end. On a thread of Rapid's.
-    std::function<void(const std::string& message)> beyond_memory;
+    std::function<void(const std::string& message)> on_memory_exceeded;
     // True if a frame ends with an error when the process exceeds its memory limit. Not for a program that stores
     // frames for as long as it has room for them.
     bool watch_memory = true;
@@ -44,7 +44,7 @@ struct SceneHooks {
     // programs that continue in another process. fingerprint() requires it.
     bool keep_state = false;
     // The points after a solve have the columns "error" (m, if it is estimated), "substeps" and "asleep".
-    bool tell_points = false;
+    bool per_point_diagnostics = false;
 };
 
 // An output of the scene, known before a frame is computed.
@@ -70,8 +70,8 @@ struct PointOrigin {
 // The inputs that determine a scene's frames: scenes with equal fingerprints are bit-identical.
 struct SceneFingerprint {
     // By name: the build of Rapid, plugins, parameters, seeds, nodes with their arguments and inputs, the code of all
-    // functions, the contents of the files read on opening, the columns of SceneHooks::tell_points. For objects of the
-    // program only the names.
+    // functions, the contents of the files read on opening, the columns of SceneHooks::per_point_diagnostics. For
+    // objects of the program only the names.
     std::map<std::string, std::string> parts;
     std::string hash;  // of the parts, without the line numbers of functions
 };
@@ -91,8 +91,8 @@ struct NodeDocuments {
 
 // Graphviz's positions of a graph's nodes and edges, reused for the next run of the same graph.
 struct GraphLayout {
-    std::string graph;   // in Graphviz's language, without the parts that depend on values; empty: nothing is stored
-    std::string places;  // its layout, as written by `dot -Tjson`
+    std::string graph;      // in Graphviz's language, without the parts that depend on values; empty: nothing is stored
+    std::string positions;  // its layout, as written by `dot -Tjson`
 };
 
 // The format of a text of FileOutputs::outputs.
@@ -150,10 +150,10 @@ struct SceneInside {
     // frame, or from the first one. Those of the last requested frame are cached. Nodes whose result never changes are
     // not evaluated in each frame. Fails if the frame is before the first one, or if the snapshot belongs to another
     // graph or a later frame. If a script had to be stopped, the scene must be restarted.
-    static Result<std::map<std::string, SceneFrame>> points_behind_all(Scene& scene, std::int64_t frame,
-                                                                       const std::optional<SceneSnapshot>& from = {});
+    static Result<std::map<std::string, SceneFrame>> points_after_nodes(Scene& scene, std::int64_t frame,
+                                                                        const std::optional<SceneSnapshot>& from = {});
     // Returns the create node of a point of a frame's output, and its id there. If the points of several are merged,
-    // they are identified by position and velocity, from points_behind_all(). Fails if the frame has no such output or
+    // they are identified by position and velocity, from points_after_nodes(). Fails if the frame has no such output or
     // point, if several points share its position, or if nodes after its Solve have moved it.
     static Result<PointOrigin> origin(Scene& scene, const SceneFrame& frame, std::int64_t id,
                                       const std::optional<SceneSnapshot>& from = {});
@@ -194,7 +194,7 @@ struct SceneInside {
 
     // ---- Runs.
 
-    // The run sets keep_state and tell_points of the hooks.
+    // The run sets keep_state and per_point_diagnostics of the hooks.
     static Result<SceneRun> make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
                                  RunListener listener);
     // Returns, for a prepared run in `parts` parts, for each output the pattern of the whole and that of the parts,

@@ -38,13 +38,13 @@ Result<std::vector<SceneAttribute>> SceneInside::attributes(Scene& scene)
         std::vector<SceneAttribute> all;
         for (const PlannedSimulation& simulation : impl.plan->simulations) {
             const std::string& create = simulation.create->name;
-            std::set<std::string> told;  // Evaluator::tell_points
-            if (impl.hooks.tell_points && simulation.solve) told = {"asleep", "substeps"};
-            if (!told.empty() && impl.options.estimate_errors) told.insert("error");
+            std::set<std::string> diagnostics;  // Evaluator::add_per_point_diagnostics
+            if (impl.hooks.per_point_diagnostics && simulation.solve) diagnostics = {"asleep", "substeps"};
+            if (!diagnostics.empty() && impl.options.estimate_errors) diagnostics.insert("error");
             for (const PlannedAttribute& attribute : simulation.attributes)
-                if (!told.contains(attribute.name))
+                if (!diagnostics.contains(attribute.name))
                     all.push_back({attribute.name, create, attribute.kept, attribute.bytes_per_point()});
-            for (const std::string& name : told) all.push_back({name, create, true, sizeof(float)});
+            for (const std::string& name : diagnostics) all.push_back({name, create, true, sizeof(float)});
         }
         return all;
     });
@@ -70,25 +70,25 @@ Result<std::map<std::string, std::map<std::string, std::string>>> SceneInside::a
     });
 }
 
-void Scene::Impl::compute_beside(const Plan& apart, std::int64_t frame, const Snapshot* from,
-                                 Evaluator::ResultHook results)
+void Scene::Impl::compute_separately(const Plan& separate, std::int64_t frame, const Snapshot* from,
+                                     Evaluator::ResultHook results)
 {
     const Running running(*this);
-    refuse_before_first(apart, frame);
-    Evaluator run(apart, {}, std::move(results));
-    if (hooks.tell_points) run.tell_points();
-    if (!hooks.tell_points || !options.estimate_errors) run.leave_out_errors();
-    beside([&] {
+    refuse_before_first(separate, frame);
+    Evaluator run(separate, {}, std::move(results));
+    if (hooks.per_point_diagnostics) run.add_per_point_diagnostics();
+    if (!hooks.per_point_diagnostics || !options.estimate_errors) run.disable_error_estimates();
+    run_separately([&] {
         if (from) run.load(*from);
         while (run.next_frame() <= frame) run.advance();
     });
 }
 
-SceneFrame Scene::Impl::frame_behind(const Plan& apart, const PlannedNode& planned, std::int64_t frame,
-                                     PointSet points) const
+SceneFrame Scene::Impl::frame_after_node(const Plan& separate, const PlannedNode& planned, std::int64_t frame,
+                                         PointSet points) const
 {
     const std::string& node = planned.node->name;
-    const PlannedSimulation& simulation = apart.simulations[planned.simulation];
+    const PlannedSimulation& simulation = separate.simulations[planned.simulation];
     auto data = std::make_shared<SceneFrame::Data>();
     data->scene = number;
     data->result.frame = frame;
@@ -98,7 +98,7 @@ SceneFrame Scene::Impl::frame_behind(const Plan& apart, const PlannedNode& plann
     return SceneFrame(std::move(data), node);
 }
 
-SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t frame)
+SceneFrame Scene::Impl::points_after(const std::string& node, std::int64_t frame)
 {
     planned_node(*plan, node, nodes);
     refuse_before_first(*plan, frame);
@@ -106,13 +106,13 @@ SceneFrame Scene::Impl::points_behind(const std::string& node, std::int64_t fram
     const Plan watched(session->graph(), plan_options());
     const PlannedNode& found = planned_node(watched, node, nodes);
     PointSet points;  // for a node whose result never changes, those of its only evaluation
-    compute_beside(watched, frame, nullptr, [&](const Node& of, std::int64_t, const PointSet& result) {
+    compute_separately(watched, frame, nullptr, [&](const Node& of, std::int64_t, const PointSet& result) {
         if (of.name == node) points = result;
     });
-    return frame_behind(watched, found, frame, std::move(points));
+    return frame_after_node(watched, found, frame, std::move(points));
 }
 
-const std::map<std::string, SceneFrame>& Scene::Impl::points_behind_all(std::int64_t frame, const SceneSnapshot* from)
+const std::map<std::string, SceneFrame>& Scene::Impl::points_after_nodes(std::int64_t frame, const SceneSnapshot* from)
 {
     if (from) {
         refuse_unless_of_this_graph(*from);
@@ -120,20 +120,20 @@ const std::map<std::string, SceneFrame>& Scene::Impl::points_behind_all(std::int
             refuse(fmt::format("the snapshot is behind frame {}; frame {} takes one from before it", from->frame(),
                                frame));
     }
-    if (behind_frame == frame) return behind;
+    if (node_results_frame == frame) return node_results;
     const Plan watched(session->graph(), plan_options());
     std::map<std::string, PointSet> results;
-    compute_beside(watched, frame, from ? &from->data_->snapshot : nullptr,
-                   [&](const Node& node, std::int64_t at, const PointSet& points) {
-                       if (at == frame) results[node.name] = points;
-                   });
-    behind_frame.reset();
-    behind.clear();
+    compute_separately(watched, frame, from ? &from->data_->snapshot : nullptr,
+                       [&](const Node& node, std::int64_t at, const PointSet& points) {
+                           if (at == frame) results[node.name] = points;
+                       });
+    node_results_frame.reset();
+    node_results.clear();
     for (const PlannedNode& planned : watched.nodes)
         if (const auto found = results.find(planned.node->name); found != results.end())
-            behind.emplace(found->first, frame_behind(watched, planned, frame, std::move(found->second)));
-    behind_frame = frame;
-    return behind;
+            node_results.emplace(found->first, frame_after_node(watched, planned, frame, std::move(found->second)));
+    node_results_frame = frame;
+    return node_results;
 }
 
 PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const SceneSnapshot* from)
@@ -142,13 +142,13 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
     if (output == plan->outputs.end())
         refuse(fmt::format("the scene has no output \"{}\", which the frame has", frame.output_));
     const PointSet& points = frame.data_->result.outputs.at(frame.output_);
-    const std::uint32_t place = IdIndex(points.id())[id];
-    if (place == IdIndex::none) refuse("the point is not in this frame");
+    const std::uint32_t index = IdIndex(points.id())[id];
+    if (index == IdIndex::none) refuse("the point is not in this frame");
     const PlannedNode& planned = plan->nodes[output->second];
     if (planned.carries.size() == 1) return {plan->simulations[planned.simulation].create->name, id};
     // The chains' own points with bitwise equal position and velocity.
     std::vector<PointOrigin> found;
-    const std::map<std::string, SceneFrame>& results = points_behind_all(frame.number(), from);
+    const std::map<std::string, SceneFrame>& results = points_after_nodes(frame.number(), from);
     for (const std::size_t s : planned.carries) {
         const PlannedSimulation& simulation = plan->simulations[s];
         const auto end = results.find(simulation.solve ? simulation.solve->name : simulation.create->name);
@@ -156,7 +156,7 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
         const PointSet& chain = end->second.data_->result.outputs.at(end->first);
         const Strided<Vec3f> P = chain.P().read(), v = chain.v().read();
         for (std::size_t i = 0; i < chain.size(); ++i)
-            if (P[i] == points.P()[place] && v[i] == points.v()[place])
+            if (P[i] == points.P()[index] && v[i] == points.v()[index])
                 found.push_back({simulation.create->name, chain.id()[i]});
     }
     if (found.size() == 1) return found.front();
@@ -164,16 +164,16 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
                          : "several points are at this place with this velocity; choose another frame");
 }
 
-Result<SceneFrame> Scene::points_behind(const std::string& node, std::int64_t frame)
+Result<SceneFrame> Scene::points_after(const std::string& node, std::int64_t frame)
 {
-    return impl_->call(SceneError::FailedFrame, [&] { return impl_->points_behind(node, frame); });
+    return impl_->call(SceneError::FailedFrame, [&] { return impl_->points_after(node, frame); });
 }
 
-Result<std::map<std::string, SceneFrame>> SceneInside::points_behind_all(Scene& scene, std::int64_t frame,
-                                                                         const std::optional<SceneSnapshot>& from)
+Result<std::map<std::string, SceneFrame>> SceneInside::points_after_nodes(Scene& scene, std::int64_t frame,
+                                                                          const std::optional<SceneSnapshot>& from)
 {
     Impl& impl = of(scene);
-    return impl.call(SceneError::FailedFrame, [&] { return impl.points_behind_all(frame, from ? &*from : nullptr); });
+    return impl.call(SceneError::FailedFrame, [&] { return impl.points_after_nodes(frame, from ? &*from : nullptr); });
 }
 
 Result<PointOrigin> SceneInside::origin(Scene& scene, const SceneFrame& frame, std::int64_t id,

@@ -44,32 +44,32 @@ Result<std::string> SceneInside::graph_json(Scene& scene, GraphLayout* kept)
     return impl.call(SceneError::WrongCall, [&] {
         const GraphPicture picture = picture_of(*impl.plan);
         if (!kept) return to_json(picture, "");
-        std::string dot = to_dot(picture, Tips::LeftOut);
+        std::string dot = to_dot(picture, Tips::Pruned);
         if (kept->graph != dot) {
-            std::string places = lay_out(dot, "json");
-            *kept = {std::move(dot), std::move(places)};
+            std::string positions = lay_out(dot, "json");
+            *kept = {std::move(dot), std::move(positions)};
         }
-        return to_json(picture, kept->places);
+        return to_json(picture, kept->positions);
     });
 }
 
-SceneTrace Scene::Impl::trace(const TraceOptions& asked)
+SceneTrace Scene::Impl::trace(const TraceOptions& requested)
 {
-    Biographer(*plan, asked.ids, asked.create);  // throws Error if there is no such create
-    if (asked.last < plan->first_frame())
-        refuse(fmt::format("frame {} is before the scene's first, {}", asked.last, plan->first_frame()));
+    Biographer(*plan, requested.ids, requested.create);  // throws Error if there is no such create
+    if (requested.last < plan->first_frame())
+        refuse(fmt::format("frame {} is before the scene's first, {}", requested.last, plan->first_frame()));
     start_again();  // only after the arguments are checked
     const Running running(*this);
     PlanOptions with_steps = plan_options();
     with_steps.keep_steps = true;
     const Plan traced(session->graph(), with_steps);
-    Biographer biographer(traced, asked.ids, asked.create);
+    Biographer biographer(traced, requested.ids, requested.create);
     Evaluator run(traced, {}, biographer.results());
-    run.leave_out_errors();
+    run.disable_error_estimates();
     biographer.watch(run);
     SceneTrace result;
     try {
-        while (run.next_frame() <= asked.last) biographer.add(run.advance());
+        while (run.next_frame() <= requested.last) biographer.add(run.advance());
     } catch (const Error& error) {
         if (session->is_interrupted()) evaluator.reset();  // its scripts do not run again
         if (error.kind() == ErrorKind::Cancelled) throw;
@@ -78,14 +78,14 @@ SceneTrace Scene::Impl::trace(const TraceOptions& asked)
     }
     session->take_warnings();  // of frames; the run reports them
 
-    const std::int64_t first = std::max(asked.first, traced.first_frame());
+    const std::int64_t first = std::max(requested.first, traced.first_frame());
     std::vector<Biography> lives = biographer.lives();
-    for (const std::int64_t id : asked.ids)
+    for (const std::int64_t id : requested.ids)
         if (std::none_of(lives.begin(), lives.end(), [&](const Biography& life) { return life.id == id; }))
             result.unborn.push_back(id);
     for (Biography& life : lives)
         std::erase_if(life.steps, [&](const Biography::Step& step) {
-            return step.frame < first || step.frame > asked.last || (step.frame - first) % asked.step != 0;
+            return step.frame < first || step.frame > requested.last || (step.frame - first) % requested.step != 0;
         });
     result.lives = {to_text(lives), to_json(lives)};
     return result;

@@ -38,9 +38,9 @@ std::filesystem::path folder_of(const std::filesystem::path& file)
 void check_options(const SceneOptions& scene, const RunOptions& options)
 {
     if (const auto& part = options.part;
-        part && (part->count < 1 || part->count > most_parts || part->number < 1 || part->number > part->count))
+        part && (part->count < 1 || part->count > max_parts || part->number < 1 || part->number > part->count))
         refuse(fmt::format("part {} of {}; it must be from 1 to their number, which is at most {}", part->number,
-                           part->count, most_parts));
+                           part->count, max_parts));
     if (options.sample && !(*options.sample > 0 && *options.sample <= 1))
         refuse(fmt::format("sample = {}; it must be above 0 and at most 1", *options.sample));
     if (options.frames) check_frames(*options.frames);
@@ -83,9 +83,9 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     std::atomic<bool> computes = false;  // while frames are computed, their inputs are not noted
     std::atomic<bool> is_to_end = false;
 
-    Impl(std::string file, SceneOptions scene_options, SceneHooks hooks, RunOptions asked, RunListener told)
-        : options(std::move(asked)),
-          listener(std::move(told)),
+    Impl(std::string file, SceneOptions scene_options, SceneHooks hooks, RunOptions requested, RunListener run_listener)
+        : options(std::move(requested)),
+          listener(std::move(run_listener)),
           files(frame_files(options.files)),
           events(name_in_part(options.events, options.part)),
           cache(options.cache, scene_options.estimate_errors),
@@ -96,16 +96,16 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
                   },
                   [this](const std::string& text) { call_if_set(listener.line, text); },
                   [this](const std::string& text) { call_if_set(listener.warning, text); }},
-                 files, cache.asked() ? &cache : nullptr)
+                 files, cache.requested() ? &cache : nullptr)
     {
-        if (cache.asked()) cache.set_graph(file);
-        hooks.keep_state = cache.asked();
-        hooks.tell_points = false;
+        if (cache.requested()) cache.set_graph(file);
+        hooks.keep_state = cache.requested();
+        hooks.per_point_diagnostics = false;
         if (options.part) begin_part(file);
         scene.file = std::move(file);
         scene.text = options.text;
         scene.options = std::move(scene_options);
-        if (cache.asked()) scene.options.estimate_errors = true;  // until the cache decides
+        if (cache.requested()) scene.options.estimate_errors = true;  // until the cache decides
         scene.hooks = std::move(hooks);
         scene.may_write = true;
         if (options.part) note_settings();
@@ -137,15 +137,15 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
 
     void take_hooks()
     {
-        scene.hooks.reads = [this, reads = std::move(scene.hooks.reads)](const std::string& path) {
+        scene.hooks.on_file_read = [this, on_file_read = std::move(scene.hooks.on_file_read)](const std::string& path) {
             const std::filesystem::path file(path);
             if (!computes) {
                 const std::lock_guard lock(names_mutex);
                 names.reads(file);
             }
             if (read) read->add(file);
-            if (cache.asked()) cache.was_read(file);
-            if (reads) reads(path);
+            if (cache.requested()) cache.was_read(file);
+            if (on_file_read) on_file_read(path);
         };
         scene.options.log = [this, log = std::move(scene.options.log)](LogLevel level, const std::string& text) {
             if (level == LogLevel::Warning)
@@ -193,7 +193,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
                 throw Error(fmt::format("{} {}: {}", option, file, error.message()), error.kind());
             }
         };
-        if (cache.asked())
+        if (cache.requested())
             for (const char* name : {"journal", "events", ".lock"})
                 claim(cache.folder() / name, name_of(Setting::Cache));
         claim(name_in_part(options.statistics, options.part), name_of(Setting::Statistics));
@@ -227,9 +227,9 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         if (has_begun) refuse("the run has been computed; make another one");
         has_begun = true;
         events.begin();
-        if (cache.asked()) {
+        if (cache.requested()) {
             cache.begin(*scene.session, *scene.plan, frames, fingerprint_options(), files, events);
-            if (!cache.estimates_errors()) scene.evaluator->leave_out_errors();
+            if (!cache.estimates_errors()) scene.evaluator->disable_error_estimates();
         }
         computes = true;
         RunOutcome outcome;
@@ -265,7 +265,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         // Active until the last frame is computed: files written then must not count.
         const SceneInside::Impl::Running running(scene);
         std::int64_t last = frames.last;
-        if (cache.asked()) last = go_on();
+        if (cache.requested()) last = continue_from_cache();
         outcome.last_frame = std::max(outcome.last_frame, evaluator.next_frame() - 1);
         call_if_set(listener.begins, cache.keeps_snapshots());
         while (evaluator.next_frame() <= last) {
@@ -279,7 +279,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
             report.frame(result);
             events.add(result);
             const bool ends = is_to_end;
-            if (cache.asked()) cache.keep(evaluator, events, ends);
+            if (cache.requested()) cache.keep(evaluator, events, ends);
             if (ends) {
                 outcome.ending = RunOutcome::Ended;
                 break;
@@ -290,7 +290,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     }
 
     // Reports the cache's frames, and takes the evaluator there. Returns the last frame to compute.
-    std::int64_t go_on()
+    std::int64_t continue_from_cache()
     {
         Evaluator& evaluator = *scene.evaluator;
         cache.restore(evaluator, events);
@@ -304,7 +304,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
 
     void finish_cache(bool complete)
     {
-        if (!cache.asked()) return;
+        if (!cache.requested()) return;
         cache.finish(complete);
         for (const std::string& warning : cache.take_warnings()) report.warning(warning);
     }
@@ -364,8 +364,8 @@ Result<std::vector<std::pair<std::string, std::string>>> SceneInside::merges(Sce
 {
     return run.impl_->scene.call(SceneError::WrongCall, [&] {
         if (!run.impl_->is_ready) refuse("the run is not prepared; call prepare() first");
-        if (parts < 1 || parts > most_parts)
-            refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, most_parts));
+        if (parts < 1 || parts > max_parts)
+            refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, max_parts));
         if (run.impl_->options.part) refuse("the run is a part itself");
         if (parts > 1) refuse_coupled(*run.impl_->scene.plan);
         return run.impl_->files.merges();
@@ -383,10 +383,10 @@ void SceneRun::cancel() { impl_->scene.cancel(); }
 std::optional<Abandoned> SceneInside::abandon(SceneRun& run)
 {
     try {
-        std::optional<RunReport::Abandoned> told = run.impl_->report.abandon();
-        if (!told) return std::nullopt;
-        Abandoned result{std::move(told->warnings), {}};
-        if (!told->failure.empty()) result.unwritten.push_back(std::move(told->failure));
+        std::optional<RunReport::Abandoned> abandoned = run.impl_->report.abandon();
+        if (!abandoned) return std::nullopt;
+        Abandoned result{std::move(abandoned->warnings), {}};
+        if (!abandoned->failure.empty()) result.unwritten.push_back(std::move(abandoned->failure));
         return result;
     } catch (...) {  // out of memory
         return std::nullopt;

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <utility>
 
-#include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_impl.h"
+#include "bindings/scene/state_file_io.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/picture/picture_fit.h"
 #include "runtime/picture/picture_memory.h"
@@ -18,12 +18,12 @@
 namespace rapid {
 namespace {
 
-constexpr char what_shapes_are[] = "shapes of a frame";
+constexpr char shapes_file_type[] = "shapes of a frame";
 
 static_assert(sizeof(Vec3f) == 3 * sizeof(float) && sizeof(Mesh::Triangle) == 3 * sizeof(std::int32_t));
 
 // A PictureScene in a file.
-struct KeptScene {
+struct StoredScene {
     struct Body {
         std::vector<Vec3f> positions;
         std::vector<Mesh::Triangle> triangles;
@@ -39,8 +39,8 @@ struct KeptScene {
     std::vector<Body> bodies;
     PictureScene rest;  // without bodies
 
-    KeptScene() = default;
-    explicit KeptScene(const PictureScene& scene) : rest(scene)
+    StoredScene() = default;
+    explicit StoredScene(const PictureScene& scene) : rest(scene)
     {
         rest.bodies.clear();
         for (const PictureScene::Body& body : scene.bodies)
@@ -127,18 +127,18 @@ bool SceneShapes::operator==(const SceneShapes& other) const
 
 Result<Done> SceneInside::save(const SceneShapes& shapes, const std::string& path)
 {
-    return of_file(path, [&] {
+    return with_file_name(path, [&] {
         const PictureScene none;
-        write_kept(path, what_shapes_are, "", KeptScene(shapes.data_ ? *shapes.data_->scene : none));
+        write_state_file(path, shapes_file_type, "", StoredScene(shapes.data_ ? *shapes.data_->scene : none));
         return Done();
     });
 }
 
 Result<SceneShapes> SceneInside::load_shapes(const std::string& path)
 {
-    return of_file(path, [&] {
+    return with_file_name(path, [&] {
         auto data = std::make_shared<SceneShapes::Data>();
-        data->scene = read_kept<KeptScene>(path, what_shapes_are, "").scene();
+        data->scene = read_state_file<StoredScene>(path, shapes_file_type, "").scene();
         return SceneShapes(std::move(data));
     });
 }
@@ -150,7 +150,7 @@ SceneShapes Scene::Impl::shapes_at(std::int64_t frame)
     auto data = std::make_shared<SceneShapes::Data>();
     data->scene = picture_scene->at(frame);
     data->warnings = session->take_warnings();
-    tell(data->warnings);
+    log_warnings(data->warnings);
     return SceneShapes(std::move(data));
 }
 

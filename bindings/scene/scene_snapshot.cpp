@@ -3,9 +3,9 @@
 
 #include <utility>
 
-#include "bindings/scene/kept_file.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_inside.h"
+#include "bindings/scene/state_file_io.h"
 #include "runtime/base/json_text.h"
 #include "runtime/base/printable.h"
 #include "runtime/report/number_text.h"
@@ -13,10 +13,10 @@
 namespace rapid {
 namespace {
 
-constexpr char what_it_is[] = "snapshot of a scene";
+constexpr char snapshot_file_type[] = "snapshot of a scene";
 
 // Returns the members of a file's header, except those of its format.
-CheckedJson told_of(const std::string& path)
+CheckedJson members_of(const std::string& path)
 {
     const StateFile file(path);
     CheckedJson json = file.header();
@@ -25,21 +25,21 @@ CheckedJson told_of(const std::string& path)
     return json;
 }
 
-std::string told_as_text(const std::string& path, const CheckedJson& told)
+std::string members_as_text(const std::string& path, const CheckedJson& members)
 {
     const auto word = [](const CheckedJson& value) {
         constexpr std::size_t most = 4000;  // bytes: the code of some hundred functions
         return shortened(value.is_string() ? value.get<std::string>() : json_text(value), most);
     };
     std::string text =
-        fmt::format("{}: a snapshot, {} bytes\n", path, with_separators(told.at("bytes").get<std::uint64_t>()));
+        fmt::format("{}: a snapshot, {} bytes\n", path, with_separators(members.at("bytes").get<std::uint64_t>()));
     const auto add = [&](const char* key, const char* unit) {
-        if (!told.contains(key)) return;
-        for (const auto& [name, value] : told.at(key).items())
+        if (!members.contains(key)) return;
+        for (const auto& [name, value] : members.at(key).items())
             text += fmt::format("  {}  {}{}\n", printable_name(name), word(value), unit);
     };
-    if (told.contains("graph"))
-        text += fmt::format("of {} after frame {}\n", word(told.at("graph")), word(told.at("frame")));
+    if (members.contains("graph"))
+        text += fmt::format("of {} after frame {}\n", word(members.at("graph")), word(members.at("frame")));
     text += "simulations\n";
     add("simulations", " bytes");
     text += "nodes that keep something\n";
@@ -59,9 +59,9 @@ Result<Done> SceneSnapshot::write(const std::string& path) const { return SceneI
 
 Result<Done> SceneInside::save(const SceneSnapshot& saved, const std::string& path, const std::string& key)
 {
-    return of_file(path, [&] {
+    return with_file_name(path, [&] {
         const Snapshot& snapshot = saved.data_->snapshot;
-        CheckedJson header = {{"what", what_it_is}, {"graph", saved.data_->file}, {"frame", snapshot.frame}};
+        CheckedJson header = {{"what", snapshot_file_type}, {"graph", saved.data_->file}, {"frame", snapshot.frame}};
         if (!key.empty()) header["key"] = key;
         for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
         for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
@@ -73,7 +73,7 @@ Result<Done> SceneInside::save(const SceneSnapshot& saved, const std::string& pa
 
 SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
 {
-    if (file.header().at("what") != what_it_is)
+    if (file.header().at("what") != snapshot_file_type)
         throw Error("it is of a run, which goes on from it by itself where it has its cache");
     const CheckedJson& fingerprint = file.header().at("fingerprint");
     require_this_build(fingerprint.at("Rapid").get<std::string>());
@@ -86,12 +86,12 @@ SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
 
 Result<SceneSnapshot> SceneSnapshot::read(const std::string& path)
 {
-    return of_file(path, [&] { return Data::read_from(StateFile(path)); });
+    return with_file_name(path, [&] { return Data::read_from(StateFile(path)); });
 }
 
 Result<SceneSnapshot> SceneInside::load_snapshot(const std::string& path, const std::string& key)
 {
-    return of_file(path, [&] {
+    return with_file_name(path, [&] {
         const StateFile file(path);
         require_key(file.header(), key);
         return SceneSnapshot::Data::read_from(file);
@@ -102,9 +102,9 @@ bool SceneInside::is_snapshot(const std::string& path) { return StateFile::is_on
 
 Result<SceneReport> SceneInside::describe_snapshot(const std::string& path)
 {
-    return of_file(path, [&] {
-        const CheckedJson told = told_of(path);
-        return SceneReport{told_as_text(path, told), json_text(told)};
+    return with_file_name(path, [&] {
+        const CheckedJson members = members_of(path);
+        return SceneReport{members_as_text(path, members), json_text(members)};
     });
 }
 

@@ -29,8 +29,8 @@ struct SceneTestOptions {
     std::string filter;   // a Lua pattern that a test's name must match; empty: all
     int already_run = 0;  // number of tests to skip at the beginning of the file, if one ended the process
     int threads = 0;      // for scenes that do not set it; 0: all of the machine
-    // Like SceneHooks::late, for scenes; the test fails if it returns.
-    std::function<void(const std::string& message)> late;
+    // Like SceneHooks::on_script_timeout, for scenes; the test fails if it returns.
+    std::function<void(const std::string& message)> on_script_timeout;
 };
 
 // Runs the tests of a file in this process and reports each, in order, on the thread of the call. Scenes are confined
@@ -38,9 +38,9 @@ struct SceneTestOptions {
 // limited. Only one thread of the process may call this at a time: `threads` applies to the whole process meanwhile
 // (tbb::global_control).
 //
-// Fails with WrongCall if options are not possible or busted is missing, or with the exception of `tell`, after the
+// Fails with WrongCall if options are not possible or busted is missing, or with the exception of `on_event`, after the
 // last test.
 Result<Done> run_scene_tests(const std::string& file, const SceneTestOptions& options,
-                             const std::function<void(const SceneTestEvent& event)>& tell);
+                             const std::function<void(const SceneTestEvent& event)>& on_event);
 
 }  // namespace rapid

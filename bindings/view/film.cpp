@@ -8,17 +8,17 @@
 
 namespace rapid {
 
-ViewFilm::ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of)
-    : wish_(std::move(wish)), frame_of_(std::move(frame_of))
+ViewFilm::ViewFilm(Settings settings, std::function<ViewFramePtr(std::int64_t)> frame_of)
+    : settings_(std::move(settings)), frame_of_(std::move(frame_of))
 {
-    if (wish_.extension != ".mp4" && wish_.extension != ".webm" && wish_.extension != ".gif")
-        throw Error(fmt::format("a film can't be a \"{}\"; it must be .mp4, .webm or .gif", wish_.extension));
-    if (wish_.last < wish_.first)
-        throw Error(fmt::format("a film of the frames {} to {} has none", wish_.first, wish_.last));
+    if (settings_.extension != ".mp4" && settings_.extension != ".webm" && settings_.extension != ".gif")
+        throw Error(fmt::format("a film can't be a \"{}\"; it must be .mp4, .webm or .gif", settings_.extension));
+    if (settings_.last < settings_.first)
+        throw Error(fmt::format("a film of the frames {} to {} has none", settings_.first, settings_.last));
     folder_.emplace("film");
-    file_ = folder_->path() / ("film" + wish_.extension);
-    drawn_ = SceneFilm::begin(file_, wish_.film).value();
-    progress_.of = wish_.last - wish_.first + 1;
+    file_ = folder_->path() / ("film" + settings_.extension);
+    drawn_ = SceneFilm::begin(file_, settings_.film).value();
+    progress_.of = settings_.last - settings_.first + 1;
     thread_ = std::thread([this] { run(); });
 }
 
@@ -43,7 +43,7 @@ std::string ViewFilm::take()
 void ViewFilm::run()
 {
     std::string film, error;
-    tbb::task_arena arena(wish_.threads);
+    tbb::task_arena arena(settings_.threads);
     arena.execute([&] {
         try {
             film = draw();
@@ -62,13 +62,13 @@ void ViewFilm::run()
 std::string ViewFilm::draw()
 {
     std::uint64_t run = 0;
-    for (std::int64_t number = wish_.first; number <= wish_.last; ++number) {
+    for (std::int64_t number = settings_.first; number <= settings_.last; ++number) {
         cancellation_.check();
         const ViewFramePtr frame = frame_of_(number);
         if (!frame) throw Error(fmt::format("frame {} is not computed", number));
-        if (number == wish_.first) run = frame->run;
+        if (number == settings_.first) run = frame->run;
         if (frame->run != run) throw Error("the scene has begun again; make the film when it is computed");
-        const Result<SceneFrame> points = frame->points.output(wish_.output);
+        const Result<SceneFrame> points = frame->points.output(settings_.output);
         if (!points) throw Error("the scene has no such output");
         drawn_->add(*points, frame->shapes).value();
         const std::lock_guard lock(mutex_);

@@ -17,7 +17,7 @@ namespace rapid {
 
 class ViewFilm {
 public:
-    struct Wish {
+    struct Settings {
         std::string extension;  // .mp4, .webm or .gif
         std::int64_t first = 1, last = 1;
         std::string output;  // name of the output in the graph
@@ -26,7 +26,7 @@ public:
     };
     // frame_of: callable from any thread; null means that the frame does not exist, which is an error. Throws Error if
     // there is no ffmpeg, or if the format or size is not possible.
-    ViewFilm(Wish wish, std::function<ViewFramePtr(std::int64_t)> frame_of);
+    ViewFilm(Settings settings, std::function<ViewFramePtr(std::int64_t)> frame_of);
     // Stops the film.
     ~ViewFilm();
 
@@ -43,7 +43,7 @@ private:
     void run();
     std::string draw();
 
-    const Wish wish_;
+    const Settings settings_;
     const std::function<ViewFramePtr(std::int64_t)> frame_of_;
     std::optional<TemporaryFolder> folder_;  // exists until the film has been read
     std::string file_;

@@ -68,8 +68,8 @@ struct WordScale {
     }
     std::uint16_t operator()(float value) const
     {
-        const float place = (value - low) * factor;
-        return static_cast<std::uint16_t>(first + (place > 0 ? std::min(place + 0.5f, 65535 - first) : 0.0f));
+        const float scaled = (value - low) * factor;
+        return static_cast<std::uint16_t>(first + (scaled > 0 ? std::min(scaled + 0.5f, 65535 - first) : 0.0f));
     }
 };
 
@@ -121,9 +121,9 @@ SceneColumn group_of(const SceneFrame& points, const std::string& name)
     return *group;
 }
 
-void add_positions(Message& message, const SceneFrame& points, const Places* places)
+void add_positions(Message& message, const SceneFrame& points, const Indices* indices)
 {
-    const PointValues<float> P(column_of(points, "P"), places);
+    const PointValues<float> P(column_of(points, "P"), indices);
     const std::size_t count = P.size();
     const float* const values = P[0];
     const auto ranges = ranges_of<3>({values, 3 * (P.is_one() ? std::min<std::size_t>(count, 1) : count)});
@@ -138,8 +138,8 @@ void add_positions(Message& message, const SceneFrame& points, const Places* pla
         }
         const auto quantise = [&](const float* source, std::size_t begin, std::size_t n) {
             for (std::size_t j = 0; j < n; ++j) {
-                const float place = (source[j] - from[j]) * factor[j] + 0.5f;
-                const float bounded = place > 0 ? std::min(place, 65535.0f) : 0;  // NaN becomes 0
+                const float scaled = (source[j] - from[j]) * factor[j] + 0.5f;
+                const float bounded = scaled > 0 ? std::min(scaled, 65535.0f) : 0;  // NaN becomes 0
                 to[begin + j] = static_cast<std::uint16_t>(static_cast<std::int32_t>(bounded));
             }
         };
@@ -153,9 +153,9 @@ void add_positions(Message& message, const SceneFrame& points, const Places* pla
     });
 }
 
-void add_velocities(Message& message, const SceneFrame& points, const Places* places)
+void add_velocities(Message& message, const SceneFrame& points, const Indices* indices)
 {
-    const PointValues<float> v(column_of(points, "v"), places);
+    const PointValues<float> v(column_of(points, "v"), indices);
     float most = 0;
     for (std::size_t k = 0; k < v.size(); ++k)
         most = std::max(most, Eigen::Map<const Eigen::Vector3f>(v[k]).cwiseAbs().maxCoeff());
@@ -195,28 +195,28 @@ public:
     DisplayBytes()
     {
         for (std::size_t i = 0; i < bytes_.size(); ++i) {
-            const float root = static_cast<float>(i) / steps_a_unit;
+            const float root = static_cast<float>(i) / steps_per_unit;
             bytes_[i] = display_byte(root * root);
         }
     }
     std::uint8_t operator()(float light) const
     {
         const float bounded = light > 0 ? std::min(light, most) : 0;  // NaN becomes 0
-        return bytes_[static_cast<std::size_t>(static_cast<std::int32_t>(steps_a_unit * std::sqrt(bounded) + 0.5f))];
+        return bytes_[static_cast<std::size_t>(static_cast<std::int32_t>(steps_per_unit * std::sqrt(bounded) + 0.5f))];
     }
 
 private:
-    static constexpr int steps_a_unit = 8192;
+    static constexpr int steps_per_unit = 8192;
     static constexpr float most = 4;  // its root is 2
-    std::array<std::uint8_t, 2 * steps_a_unit + 1> bytes_;
+    std::array<std::uint8_t, 2 * steps_per_unit + 1> bytes_;
 };
 
-void add_colours(Message& message, const SceneFrame& points, const FrameWish& wish, const Places* places)
+void add_colours(Message& message, const SceneFrame& points, const FrameOptions& frame_options, const Indices* indices)
 {
     const std::optional<SceneColumn> Cd = find_column(points, "Cd", ColumnType::Vec3);
-    if (Cd && (wish.colour.empty() || wish.colour == "Cd")) {
+    if (Cd && (frame_options.colour.empty() || frame_options.colour == "Cd")) {
         message.header()["colour"] = "Cd";
-        const PointValues<float> from(*Cd, places);
+        const PointValues<float> from(*Cd, indices);
         message.add<std::uint8_t>("colour", "u8", 3 * from.size(), [from](std::span<std::uint8_t> to) {
             const float* const values = from[0];
             const std::size_t same = from.is_one() ? 3 : to.size();  // values that are not repeated
@@ -226,9 +226,9 @@ void add_colours(Message& message, const SceneFrame& points, const FrameWish& wi
         });
         return;
     }
-    const std::string name = wish.colour.empty() ? "speed" : wish.colour;
+    const std::string name = frame_options.colour.empty() ? "speed" : frame_options.colour;
     message.header()["colour"] = name;
-    add_values(message, "value", numbers_of(points, name, places), name.starts_with(group_mark) || name == "asleep");
+    add_values(message, "value", numbers_of(points, name, indices), name.starts_with(group_mark) || name == "asleep");
 }
 
 // Returns the alphabetical rank of each point's string among the strings of all these points.
@@ -236,10 +236,10 @@ std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
 {
     std::unordered_map<std::uint32_t, float> ranks;
     for (std::size_t k = 0; k < tokens.size(); ++k) ranks.try_emplace(*tokens[k]);
-    std::vector<std::pair<std::string_view, float*>> texts;
-    for (auto& [token, rank] : ranks) texts.emplace_back(SceneFrame::text_of(token).value(), &rank);
-    std::sort(texts.begin(), texts.end());
-    for (std::size_t r = 0; r < texts.size(); ++r) *texts[r].second = static_cast<float>(r);
+    std::vector<std::pair<std::string_view, float*>> strings;
+    for (auto& [token, rank] : ranks) strings.emplace_back(SceneFrame::text_of(token).value(), &rank);
+    std::sort(strings.begin(), strings.end());
+    for (std::size_t r = 0; r < strings.size(); ++r) *strings[r].second = static_cast<float>(r);
     std::vector<float> result(tokens.size());
     for (std::size_t k = 0; k < result.size(); ++k) result[k] = ranks.at(*tokens[k]);
     return result;
@@ -247,11 +247,11 @@ std::vector<float> ranks_of(const PointValues<std::uint32_t>& tokens)
 
 // Returns f of the components of each point.
 template <class T, class F>
-std::vector<float> numbers_of_each(const SceneColumn& column, const Places* places, const F& f)
+std::vector<float> numbers_of_each(const SceneColumn& column, const Indices* indices, const F& f)
 {
-    std::vector<float> numbers(places ? places->size() : column.count);
+    std::vector<float> numbers(indices ? indices->size() : column.count);
     for (std::size_t k = 0; k < numbers.size(); ++k)
-        numbers[k] = static_cast<float>(f(column.at<T>(places ? (*places)[k] : k)));
+        numbers[k] = static_cast<float>(f(column.at<T>(indices ? (*indices)[k] : k)));
     return numbers;
 }
 
@@ -265,76 +265,77 @@ T only_component(const T* components)
 
 }  // namespace
 
-std::vector<float> numbers_of(const SceneFrame& points, const std::string& name, const Places* places)
+std::vector<float> numbers_of(const SceneFrame& points, const std::string& name, const Indices* indices)
 {
     if (name.starts_with(group_mark))
-        return numbers_of_each<std::uint8_t>(group_of(points, name.substr(group_mark.size())), places,
+        return numbers_of_each<std::uint8_t>(group_of(points, name.substr(group_mark.size())), indices,
                                              only_component<std::uint8_t>);
     const bool is_speed = name == "speed" && !points.column("speed");
     const SceneColumn column = column_of(points, is_speed ? "v" : name);
     switch (column.type) {
         case ColumnType::Vec3:
-            return numbers_of_each<float>(column, places, length_of_vector);
+            return numbers_of_each<float>(column, indices, length_of_vector);
         case ColumnType::Quat:
-            return numbers_of_each<float>(column, places, [](const float* q) { return q[3]; });
+            return numbers_of_each<float>(column, indices, [](const float* q) { return q[3]; });
         case ColumnType::Float:
-            return numbers_of_each<float>(column, places, only_component<float>);
+            return numbers_of_each<float>(column, indices, only_component<float>);
         case ColumnType::Int32:
-            return numbers_of_each<std::int32_t>(column, places, only_component<std::int32_t>);
+            return numbers_of_each<std::int32_t>(column, indices, only_component<std::int32_t>);
         case ColumnType::Int64:
-            return numbers_of_each<std::int64_t>(column, places, only_component<std::int64_t>);
+            return numbers_of_each<std::int64_t>(column, indices, only_component<std::int64_t>);
         case ColumnType::UInt8:
-            return numbers_of_each<std::uint8_t>(column, places, only_component<std::uint8_t>);
+            return numbers_of_each<std::uint8_t>(column, indices, only_component<std::uint8_t>);
         case ColumnType::String:
-            return ranks_of(PointValues<std::uint32_t>(column, places));
+            return ranks_of(PointValues<std::uint32_t>(column, indices));
     }
     return {};
 }
 
-ShownPoints shown_points(const SceneFrame& points, const FrameWish& wish)
+ShownPoints shown_points(const SceneFrame& points, const FrameOptions& frame_options)
 {
     ShownPoints shown;
     shown.count = points.size();
-    if (wish.group.empty() && shown.count <= wish.most) return shown;
+    if (frame_options.group.empty() && shown.count <= frame_options.most) return shown;
     std::optional<SceneColumn> members;
-    if (!wish.group.empty()) members = group_of(points, wish.group);
-    Places places;
+    if (!frame_options.group.empty()) members = group_of(points, frame_options.group);
+    Indices indices;
     for (std::uint32_t i = 0; i < shown.count; ++i)
-        if (!members || *members->at<std::uint8_t>(i)) places.push_back(i);
+        if (!members || *members->at<std::uint8_t>(i)) indices.push_back(i);
     // Chosen by id, so that every frame shows the same points.
     const SceneColumn id = column_of(points, "id");
-    while (places.size() > wish.most) {
+    while (indices.size() > frame_options.most) {
         if (shown.every > UINT64_MAX / 2) {  // foreign files may have many points with the same id
-            places.resize(wish.most);
+            indices.resize(frame_options.most);
             break;
         }
         shown.every *= 2;
-        std::erase_if(places, [&](std::uint32_t i) {
+        std::erase_if(indices, [&](std::uint32_t i) {
             return static_cast<std::uint64_t>(*id.at<std::int64_t>(i)) % shown.every != 0;
         });
     }
-    shown.count = places.size();
-    shown.places = std::move(places);
+    shown.count = indices.size();
+    shown.indices = std::move(indices);
     return shown;
 }
 
-std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameWish& wish, CheckedJson head)
+std::string frame_message(std::uint32_t request, const SceneFrame& points, const FrameOptions& frame_options,
+                          CheckedJson head)
 {
     Message message(std::move(head));
-    const ShownPoints shown = shown_points(points, wish);
-    const Places* const places = shown.all_or_some();
+    const ShownPoints shown = shown_points(points, frame_options);
+    const Indices* const indices = shown.all_or_some();
     message.header()["total"] = points.size();
     message.header()["shown"] = shown.count;
     message.header()["every"] = shown.every;
-    add_positions(message, points, places);
-    add_colours(message, points, wish, places);
+    add_positions(message, points, indices);
+    add_colours(message, points, frame_options, indices);
     if (const auto pscale = find_column(points, "pscale", ColumnType::Float)) {
         if (pscale->stride == 0)
             message.header()["radius"] = points.size() == 0 ? 0.0f : *pscale->at<float>(0);
         else
-            add_values(message, "radius", numbers_of(points, "pscale", places));
+            add_values(message, "radius", numbers_of(points, "pscale", indices));
     }
-    if (wish.velocities) add_velocities(message, points, places);
+    if (frame_options.velocities) add_velocities(message, points, indices);
     return message.finish(request);
 }
 

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = CheckedJson;
 
-constexpr std::size_t most_runs = 8;
+constexpr std::size_t max_runs = 8;
 constexpr const char *frame_kind = "frame", *shapes_kind = "geometry", *snapshot_kind = "snapshot";
 
 // Throws the error; the archive knows the file.
@@ -113,7 +113,7 @@ ViewFramePtr FrameStore::find(std::int64_t number)
     return frame;
 }
 
-std::vector<ViewFramePtr> FrameStore::of_run(std::uint64_t run) const
+std::vector<ViewFramePtr> FrameStore::frames_of_run(std::uint64_t run) const
 {
     const std::lock_guard lock(mutex_);
     std::vector<ViewFramePtr> found;
@@ -308,7 +308,7 @@ void FrameCache::remove_old() const
         if (!none && entry->is_directory(none)) runs.emplace_back(used, entry->path());
     }
     std::sort(runs.rbegin(), runs.rend());
-    for (std::size_t k = most_runs; k < runs.size(); ++k) fs::remove_all(runs[k].second, error);
+    for (std::size_t k = max_runs; k < runs.size(); ++k) fs::remove_all(runs[k].second, error);
 }
 
 }  // namespace rapid

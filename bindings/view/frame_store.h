@@ -108,7 +108,7 @@ public:
     // Returns null if the frame does not exist. Throws Error if its cache cannot be read.
     ViewFramePtr find(std::int64_t number);
     // Returns all frames of a run that are in memory, in order.
-    std::vector<ViewFramePtr> of_run(std::uint64_t run) const;
+    std::vector<ViewFramePtr> frames_of_run(std::uint64_t run) const;
     // Returns the statistics of at most `most` frames of a run after a frame, in order.
     std::vector<std::string> statistics(std::uint64_t run, std::int64_t after, std::size_t most) const;
     // Removes the frames of other runs.

@@ -17,30 +17,30 @@ namespace rapid {
 inline const std::string group_mark = "group:";
 
 // Indices of some points in the columns.
-using Places = std::vector<std::uint32_t>;
+using Indices = std::vector<std::uint32_t>;
 
 // The values of a column, packed: a view into the frame if it has them in this form. T: type of a component. places:
 // null for all points.
 template <class T>
 class PointValues {
 public:
-    PointValues(const SceneColumn& column, const Places* places)
-        : size_(places ? places->size() : column.count),
+    PointValues(const SceneColumn& column, const Indices* indices)
+        : size_(indices ? indices->size() : column.count),
           components_(column.components),
           step_(column.stride == 0 ? 0 : components_),
           data_(static_cast<const T*>(column.data))
     {
-        if (is_one() || (!places && column.stride == components_ * sizeof(T))) return;
+        if (is_one() || (!indices && column.stride == components_ * sizeof(T))) return;
         own_ = std::make_shared<std::vector<T>>(size_ * components_);
         switch (components_) {
             case 1:
-                gather<1>(column, places);
+                gather<1>(column, indices);
                 break;
             case 3:
-                gather<3>(column, places);
+                gather<3>(column, indices);
                 break;
             default:
-                gather<0>(column, places);
+                gather<0>(column, indices);
         }
         data_ = own_->data();
     }
@@ -54,12 +54,12 @@ public:
 private:
     // count: number of components; 0: as many as the column has.
     template <std::size_t count>
-    void gather(const SceneColumn& column, const Places* places)
+    void gather(const SceneColumn& column, const Indices* indices)
     {
         const std::size_t n = count > 0 ? count : components_;
         T* to = own_->data();
         for (std::size_t k = 0; k < size_; ++k, to += n) {
-            const T* value = column.at<T>(places ? (*places)[k] : k);
+            const T* value = column.at<T>(indices ? (*indices)[k] : k);
             for (std::size_t c = 0; c < n; ++c) to[c] = value[c];
         }
     }

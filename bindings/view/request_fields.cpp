@@ -10,14 +10,14 @@
 namespace rapid {
 namespace {
 
-constexpr int most_depth = 8;  // of lists: copying deeper ones would overflow the stack
-constexpr int least_edge = 16, most_edge = 16384;
+constexpr int max_depth = 8;  // of lists: copying deeper ones would overflow the stack
+constexpr int min_edge = 16, max_edge = 16384;
 
 int edge_of(const CheckedJson& request, const char* name, int usual)
 {
     const int edge = request.value(name, usual);
-    if (edge < least_edge || edge > most_edge)
-        throw Error(fmt::format("{} = {}; it must be from {} to {} pixels", name, edge, least_edge, most_edge));
+    if (edge < min_edge || edge > max_edge)
+        throw Error(fmt::format("{} = {}; it must be from {} to {} pixels", name, edge, min_edge, max_edge));
     return edge;
 }
 
@@ -25,7 +25,7 @@ int edge_of(const CheckedJson& request, const char* name, int usual)
 
 CheckedJson parse_request(const std::string& message)
 {
-    const auto is_shallow = [](int depth, CheckedJson::parse_event_t, CheckedJson&) { return depth <= most_depth; };
+    const auto is_shallow = [](int depth, CheckedJson::parse_event_t, CheckedJson&) { return depth <= max_depth; };
     CheckedJson request = CheckedJson::parse(message, is_shallow, false);
     if (!request.is_object()) throw Error("a request must be an object in JSON");
     return request;
@@ -53,14 +53,14 @@ PictureCamera camera_of(const CheckedJson& request)
     return {std::array{camera[0], camera[1], camera[2]}, std::array{camera[3], camera[4], camera[5]}, camera[6]};
 }
 
-FrameWish wish_of(const CheckedJson& request)
+FrameOptions frame_options_of(const CheckedJson& request)
 {
-    FrameWish wish;
-    wish.colour = request.value("colour", "");
-    wish.group = request.value("group", "");
-    wish.velocities = request.value("velocities", false);
-    wish.most = request.value("most", wish.most);
-    return wish;
+    FrameOptions frame_options;
+    frame_options.colour = request.value("colour", "");
+    frame_options.group = request.value("group", "");
+    frame_options.velocities = request.value("velocities", false);
+    frame_options.most = request.value("most", frame_options.most);
+    return frame_options;
 }
 
 }  // namespace rapid

@@ -24,6 +24,6 @@ PictureSize size_of(const CheckedJson& request);
 PictureCamera camera_of(const CheckedJson& request);
 
 // colour, group, velocities, most.
-FrameWish wish_of(const CheckedJson& request);
+FrameOptions frame_options_of(const CheckedJson& request);
 
 }  // namespace rapid

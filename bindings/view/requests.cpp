@@ -18,10 +18,10 @@ namespace {
 
 using Json = CheckedJson;
 
-constexpr std::size_t most_rows = 500;          // of the spreadsheet, per request
-constexpr std::size_t most_figures = 500;       // frames, per request
-constexpr std::size_t most_segments = 480'000;  // of trails
-constexpr std::size_t most_waiting = 1000;      // requests; a page has one
+constexpr std::size_t max_rows = 500;          // of the spreadsheet, per request
+constexpr std::size_t max_figures = 500;       // frames, per request
+constexpr std::size_t max_segments = 480'000;  // of trails
+constexpr std::size_t max_waiting = 1000;      // requests; a page has one
 
 Json json_of(const SceneValue& value)
 {
@@ -95,7 +95,7 @@ Json row_of(const SceneFrame& points, std::size_t i)
     return {{"values", row}, {"groups", groups}};
 }
 
-std::uint32_t place_of(const SceneFrame& points, std::int64_t id) { return points.places({id}).value().front(); }
+std::uint32_t index_of(const SceneFrame& points, std::int64_t id) { return points.indices({id}).value().front(); }
 
 Eigen::Map<const Eigen::Vector3f> vector_at(const SceneColumn& column, std::size_t i)
 {
@@ -127,13 +127,13 @@ Json camera_of_scene(const ViewFrame& frame, const Json& json)
 
 }  // namespace
 
-void ViewRequests::Ask::tell(Json json) const
+void ViewRequests::PendingRequest::reply(Json json) const
 {
     json["re"] = re;
     answer(json_text(json), false);
 }
 
-void ViewRequests::Ask::send(const std::string& data) const
+void ViewRequests::PendingRequest::send(const std::string& data) const
 {
     std::string message(8, '\0');
     const std::uint32_t words[2] = {re, 0};
@@ -141,7 +141,7 @@ void ViewRequests::Ask::send(const std::string& data) const
     answer(message + data, true);
 }
 
-void ViewRequests::Ask::fail(const std::string& why) const { tell({{"error", why}}); }
+void ViewRequests::PendingRequest::fail(const std::string& why) const { reply({{"error", why}}); }
 
 ViewRequests::ViewRequests(ViewSimulation& simulation, std::string title,
                            std::function<void(std::function<void()>)> post)
@@ -154,15 +154,15 @@ void ViewRequests::handle(const std::string& message, const Answer& answer)
 {
     try {
         const Json json = parse_request(message);
-        const Ask ask{json.at("re").get<std::uint32_t>(), answer};
-        ask.guard([&] { dispatch(json, ask); });
+        const PendingRequest request{json.at("re").get<std::uint32_t>(), answer};
+        request.guard([&] { dispatch(json, request); });
     } catch (const std::exception& error) {
         answer(json_text(Json({{"re", nullptr}, {"error", error.what()}})), false);
     }
 }
 
 template <class F>
-void ViewRequests::Ask::guard(const F& answer_it) const
+void ViewRequests::PendingRequest::guard(const F& answer_it) const
 {
     try {
         answer_it();
@@ -172,58 +172,58 @@ void ViewRequests::Ask::guard(const F& answer_it) const
 }
 
 template <class F>
-void ViewRequests::answer_later(const Ask& ask, F answer)
+void ViewRequests::answer_later(const PendingRequest& request, F answer)
 {
-    post_([ask, answer = std::move(answer)] { ask.guard(answer); });
+    post_([request, answer = std::move(answer)] { request.guard(answer); });
 }
 
-void ViewRequests::dispatch(const Json& json, const Ask& ask)
+void ViewRequests::dispatch(const Json& json, const PendingRequest& request)
 {
     const std::string what = json.value("do", "");
     if (what == "status") {
         const std::uint64_t since = json.value("since", std::uint64_t{0});
         const std::uint64_t graph = json.value("graph", std::uint64_t{0});
-        if (simulation_.status().version > since) return tell_status(ask, graph);
-        if (waiting_.size() == most_waiting) {
-            waiting_.front().ask.fail("too many requests wait for a change");
+        if (simulation_.status().version > since) return send_status(request, graph);
+        if (waiting_.size() == max_waiting) {
+            waiting_.front().request.fail("too many requests wait for a change");
             waiting_.erase(waiting_.begin());
         }
-        waiting_.push_back({since, graph, ask});
+        waiting_.push_back({since, graph, request});
     } else if (what == "frame") {
-        tell_frame(json, ask);
+        send_frame(json, request);
     } else if (what == "shapes") {
-        tell_shapes(json, ask);
+        send_shapes(json, request);
     } else if (what == "point") {
-        tell_point(json, ask);
+        send_point(json, request);
     } else if (what == "path") {
-        tell_path(json, ask);
+        send_path(json, request);
     } else if (what == "trails") {
-        tell_trails(json, ask);
+        send_trails(json, request);
     } else if (what == "trace") {
-        tell_trace(json, ask);
+        send_trace(json, request);
     } else if (what == "sheet") {
-        tell_sheet(json, ask);
+        send_sheet(json, request);
     } else if (what == "region") {
-        tell_region(json, ask);
+        send_region(json, request);
     } else if (what == "figures") {
-        tell_figures(json, ask);
+        send_figures(json, request);
     } else if (what == "arguments") {
-        tell_arguments(json, ask);
+        send_arguments(json, request);
     } else if (what == "picture") {
-        tell_picture(json, ask);
+        send_picture(json, request);
     } else if (what == "film") {
-        begin_film(json, ask);
+        begin_film(json, request);
     } else if (what == "film_progress") {
-        tell_film(ask);
+        send_film_progress(request);
     } else if (what == "film_data") {
-        send_film(ask);
+        send_film(request);
     } else if (what == "film_cancel") {
         film_.reset();
-        ask.tell(Json::object());
+        request.reply(Json::object());
     } else if (what == "set") {
-        set_parameters(json, ask);
+        set_parameters(json, request);
     } else {
-        ask.fail(fmt::format("there is no request \"{}\"", what));
+        request.fail(fmt::format("there is no request \"{}\"", what));
     }
 }
 
@@ -232,12 +232,12 @@ void ViewRequests::answer_waiting()
     const std::uint64_t version = simulation_.status().version;
     std::erase_if(waiting_, [&](const auto& waiting) {
         if (version <= waiting.since) return false;
-        tell_status(waiting.ask, waiting.graph);
+        send_status(waiting.request, waiting.graph);
         return true;
     });
 }
 
-void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
+void ViewRequests::send_status(const PendingRequest& request, std::uint64_t graph) const
 {
     const ViewStatus status = simulation_.status();
     const FrameStore::Stretches stretches =
@@ -276,39 +276,40 @@ void ViewRequests::tell_status(const Ask& ask, std::uint64_t graph) const
     if (status.graph_number != graph && status.graph) json["graph"] = Json::parse(*status.graph);
     json["error"] = status.error ? json_of(*status.error) : Json();
     if (simulation_.is_sequence()) json["ready"] = {{status.first, status.last}};
-    ask.tell(std::move(json));
+    request.reply(std::move(json));
 }
 
-void ViewRequests::with_points(const Json& json, const Ask& ask, const WithPoints& use)
+void ViewRequests::with_points(const Json& json, const PendingRequest& request, const WithPoints& use)
 {
     const std::string node = json.value("after", "");
     if (!node.empty()) {
         simulation_.inspect(computable_frame(simulation_, json, "frame"),
                             [=, this](const ViewSimulation::Results& all, const std::string& error) {
-                                answer_later(ask, [=] {
-                                    if (!error.empty()) return ask.fail(error);
+                                answer_later(request, [=] {
+                                    if (!error.empty()) return request.fail(error);
                                     const auto points = all.find(node);
-                                    if (points == all.end()) return ask.fail("the node is not evaluated in this frame");
+                                    if (points == all.end())
+                                        return request.fail("the node is not evaluated in this frame");
                                     use(points->second);
                                 });
                             });
         return;
     }
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
-    if (!frame) return ask.fail("the frame is not computed");
+    if (!frame) return request.fail("the frame is not computed");
     const Result<SceneFrame> points = chosen_output(*frame, json);
-    if (!points) return ask.fail("the scene has no such output");
+    if (!points) return request.fail("the scene has no such output");
     use(*points);
 }
 
-void ViewRequests::tell_frame(const Json& json, const Ask& ask)
+void ViewRequests::send_frame(const Json& json, const PendingRequest& request)
 {
     const std::int64_t number = json.at("frame").get<std::int64_t>();
     const std::string after = json.value("after", "");
     const ViewFramePtr frame = after.empty() ? simulation_.frame(number) : nullptr;
     const Json head = {{"frame", number}, {"run", frame ? frame->run : simulation_.status().run}, {"after", after}};
-    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
-        ask.answer(frame_message(ask.re, points, wish, head), true);
+    with_points(json, request, [=, frame_options = frame_options_of(json)](const SceneFrame& points) {
+        request.answer(frame_message(request.re, points, frame_options, head), true);
     });
 }
 
@@ -321,43 +322,43 @@ std::uint64_t ViewRequests::number_of(const ShapeMesh& mesh)
     return next_mesh_++;
 }
 
-void ViewRequests::tell_shapes(const Json& json, const Ask& ask)
+void ViewRequests::send_shapes(const Json& json, const PendingRequest& request)
 {
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
-    if (!frame) return ask.fail("the frame is not computed");
+    if (!frame) return request.fail("the frame is not computed");
     std::vector<std::uint64_t> numbers;
     for (const ShapeMesh& mesh : frame->shapes.meshes()) numbers.push_back(number_of(mesh));
     const auto known = json.value("known", std::vector<std::uint64_t>());
     const Json head = {{"camera", camera_of_scene(*frame, json)}};
-    ask.answer(shapes_message(ask.re, frame->shapes, {known.begin(), known.end()}, numbers, head), true);
+    request.answer(shapes_message(request.re, frame->shapes, {known.begin(), known.end()}, numbers, head), true);
 }
 
-void ViewRequests::tell_point(const Json& json, const Ask& ask)
+void ViewRequests::send_point(const Json& json, const PendingRequest& request)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
+    with_points(json, request, [=, frame_options = frame_options_of(json)](const SceneFrame& points) {
         std::size_t i = points.size();
         if (json.contains("id")) {
-            i = place_of(points, json["id"].get<std::int64_t>());
+            i = index_of(points, json["id"].get<std::int64_t>());
         } else {
-            const ShownPoints shown = shown_points(points, wish);
+            const ShownPoints shown = shown_points(points, frame_options);
             const auto k = json.at("row").get<std::size_t>();
             if (k < shown.count) i = shown[k];
         }
-        if (i >= points.size()) return ask.fail("the point is not in this frame");
-        ask.tell(row_of(points, i));
+        if (i >= points.size()) return request.fail("the point is not in this frame");
+        request.reply(row_of(points, i));
     });
 }
 
 // Sends a point's path: its positions in all frames in memory, with speed, error and sub-steps.
-void ViewRequests::tell_path(const Json& json, const Ask& ask) const
+void ViewRequests::send_path(const Json& json, const PendingRequest& request) const
 {
     const auto id = json.at("id").get<std::int64_t>();
     Json path = Json::array();
-    for (const ViewFramePtr& frame : simulation_.store().of_run(simulation_.status().run)) {
+    for (const ViewFramePtr& frame : simulation_.store().frames_of_run(simulation_.status().run)) {
         const Result<SceneFrame> points = chosen_output(*frame, json);
         if (!points) continue;
-        const std::uint32_t i = place_of(*points, id);
-        if (i == SceneFrame::no_place) continue;
+        const std::uint32_t i = index_of(*points, id);
+        if (i == SceneFrame::no_index) continue;
         const auto P = vector_at(*points->column("P"), i);
         const auto error = find_column(*points, "error", ColumnType::Float);
         const auto substeps = find_column(*points, "substeps", ColumnType::Int32);
@@ -365,18 +366,18 @@ void ViewRequests::tell_path(const Json& json, const Ask& ask) const
                         number(vector_at(*points->column("v"), i).norm()), error ? value_at(*error, i) : Json(),
                         substeps ? value_at(*substeps, i) : Json()});
     }
-    ask.tell({{"path", path}});
+    request.reply({{"path", path}});
 }
 
 // Sends the previous positions of a frame's points as line segments; if there are many points, every nth by id.
-void ViewRequests::tell_trails(const Json& json, const Ask& ask)
+void ViewRequests::send_trails(const Json& json, const PendingRequest& request)
 {
     const std::int64_t last = computable_frame(simulation_, json, "frame");
     const std::int64_t first = last - std::clamp<std::int64_t>(json.value("frames", std::int64_t{12}), 1, 1000);
-    FrameWish wish = wish_of(json);
-    wish.most = std::min<std::size_t>(20000, most_segments / static_cast<std::size_t>(last - first));
-    with_points(json, ask, [=, this](const SceneFrame& now) {
-        const ShownPoints shown = shown_points(now, wish);
+    FrameOptions frame_options = frame_options_of(json);
+    frame_options.most = std::min<std::size_t>(20000, max_segments / static_cast<std::size_t>(last - first));
+    with_points(json, request, [=, this](const SceneFrame& now) {
+        const ShownPoints shown = shown_points(now, frame_options);
         const SceneColumn P_now = *now.column("P"), id = *now.column("id");
         std::vector<Eigen::Vector3f> there(shown.count);
         std::vector<std::int64_t> ids(shown.count);
@@ -391,45 +392,45 @@ void ViewRequests::tell_trails(const Json& json, const Ask& ask)
             if (!frame) break;
             const Result<SceneFrame> points = chosen_output(*frame, json);
             if (!points) break;
-            const std::vector<std::uint32_t> places = points->places(ids).value();
+            const std::vector<std::uint32_t> indices = points->indices(ids).value();
             const SceneColumn P = *points->column("P");
             const auto age = static_cast<float>(last - number) / static_cast<float>(last - first);
             for (std::size_t k = 0; k < shown.count; ++k) {
-                was[k] = was[k] && places[k] != SceneFrame::no_place;
+                was[k] = was[k] && indices[k] != SceneFrame::no_index;
                 if (!was[k]) continue;
-                const Eigen::Vector3f before = vector_at(P, places[k]);
+                const Eigen::Vector3f before = vector_at(P, indices[k]);
                 for (const Eigen::Vector3f& end : {there[k], before})
                     segments.insert(segments.end(), {end.x(), end.y(), end.z(), age});
                 there[k] = before;
             }
         }
-        ask.answer(trails_message(ask.re, segments, shown.every), true);
+        request.answer(trails_message(request.re, segments, shown.every), true);
     });
 }
 
-void ViewRequests::tell_trace(const Json& json, const Ask& ask)
+void ViewRequests::send_trace(const Json& json, const PendingRequest& request)
 {
     const std::int64_t last = computable_frame(simulation_, json, "last");
-    const auto tell = [=, this](const std::string& lives, const std::string& error) {
-        answer_later(ask, [=] {
-            if (!error.empty()) return ask.fail(error);
-            ask.tell({{"lives", Json::parse(lives)}});
+    const auto reply = [=, this](const std::string& lives, const std::string& error) {
+        answer_later(request, [=] {
+            if (!error.empty()) return request.fail(error);
+            request.reply({{"lives", Json::parse(lives)}});
         });
     };
     simulation_.origin(computable_frame(simulation_, json, "frame"), json.value("output", "main"),
                        json.at("id").get<std::int64_t>(),
                        [=, this](const PointOrigin& point, const std::string& unknown) {
-                           answer_later(ask, [=, this] {
-                               if (!unknown.empty()) return ask.fail(unknown);
-                               simulation_.trace(point, last, tell);
+                           answer_later(request, [=, this] {
+                               if (!unknown.empty()) return request.fail(unknown);
+                               simulation_.trace(point, last, reply);
                            });
                        });
 }
 
-void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
+void ViewRequests::send_sheet(const Json& json, const PendingRequest& request)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
-        FrameWish all = wish;
+    with_points(json, request, [=, frame_options = frame_options_of(json)](const SceneFrame& points) {
+        FrameOptions all = frame_options;
         all.most = points.size();
         const ShownPoints shown = shown_points(points, all);
         std::vector<std::uint32_t> order(shown.count);
@@ -450,40 +451,40 @@ void ViewRequests::tell_sheet(const Json& json, const Ask& ask)
                              [&](auto a, auto b) { return is_before(values[a], values[b]); });
         }
         const std::size_t from = std::min(json.value("from", std::size_t{0}), order.size());
-        const std::size_t to = std::min(order.size(), from + std::min(json.value("count", most_rows), most_rows));
+        const std::size_t to = std::min(order.size(), from + std::min(json.value("count", max_rows), max_rows));
         Json names = Json::array(), rows = Json::array();
         for (const std::string& name : points.columns())
             if (name != "dt") names.push_back(name);
         for (std::size_t k = from; k < to; ++k) rows.push_back(row_of(points, order[k]));
-        ask.tell(
+        request.reply(
             {{"total", order.size()}, {"from", from}, {"names", names}, {"groups", points.groups()}, {"rows", rows}});
     });
 }
 
 // Sends the number of points whose projection is within a rectangle of the screen, and the ranges of their attributes.
 // matrix: from the world to the screen's -1 ... 1, by columns.
-void ViewRequests::tell_region(const Json& json, const Ask& ask)
+void ViewRequests::send_region(const Json& json, const PendingRequest& request)
 {
-    with_points(json, ask, [=, wish = wish_of(json)](const SceneFrame& points) {
+    with_points(json, request, [=, frame_options = frame_options_of(json)](const SceneFrame& points) {
         const auto matrix = json.at("matrix").get<std::vector<double>>();
         const auto rectangle = json.at("rectangle").get<std::vector<double>>();  // smallest x, y, largest x, y
-        if (matrix.size() != 16 || rectangle.size() != 4) return ask.fail("a matrix has 16 numbers, a rectangle 4");
+        if (matrix.size() != 16 || rectangle.size() != 4) return request.fail("a matrix has 16 numbers, a rectangle 4");
         const Eigen::Map<const Eigen::Matrix4d> project(matrix.data());
-        FrameWish all = wish;
+        FrameOptions all = frame_options;
         all.most = points.size();
         const ShownPoints shown = shown_points(points, all);
         const SceneColumn P = *points.column("P");
-        Places places;
+        Indices indices;
         for (std::size_t k = 0; k < shown.count; ++k) {
             const Eigen::Vector4d at = project * vector_at(P, shown[k]).cast<double>().homogeneous();
             if (at.w() <= 0) continue;
             const double x = at.x() / at.w(), y = at.y() / at.w();
             if (x >= rectangle[0] && x <= rectangle[2] && y >= rectangle[1] && y <= rectangle[3])
-                places.push_back(static_cast<std::uint32_t>(shown[k]));
+                indices.push_back(static_cast<std::uint32_t>(shown[k]));
         }
         Json ranges = Json::object(), groups = Json::object();
         const auto add = [&](const std::string& name) {
-            const std::vector<float> values = numbers_of(points, name, &places);
+            const std::vector<float> values = numbers_of(points, name, &indices);
             float low = std::numeric_limits<float>::infinity(), high = -low;
             double sum = 0;
             for (const float value : values) low = std::min(low, value), high = std::max(high, value), sum += value;
@@ -495,81 +496,81 @@ void ViewRequests::tell_region(const Json& json, const Ask& ask)
             if (name != "dt" && name != "speed") add(name);
         for (const std::string& name : points.groups()) {
             const SceneColumn members = *points.group(name);
-            groups[name] = std::count_if(places.begin(), places.end(),
+            groups[name] = std::count_if(indices.begin(), indices.end(),
                                          [&](std::uint32_t i) { return *members.at<std::uint8_t>(i) != 0; });
         }
-        ask.tell({{"count", places.size()}, {"ranges", ranges}, {"groups", groups}});
+        request.reply({{"count", indices.size()}, {"ranges", ranges}, {"groups", groups}});
     });
 }
 
-void ViewRequests::tell_figures(const Json& json, const Ask& ask) const
+void ViewRequests::send_figures(const Json& json, const PendingRequest& request) const
 {
     const std::int64_t after = json.value("after", std::int64_t{INT64_MIN});
     const std::uint64_t run = simulation_.status().run;
-    const std::vector<std::string> all = simulation_.store().statistics(run, after, most_figures);
+    const std::vector<std::string> all = simulation_.store().statistics(run, after, max_figures);
     // The texts are forwarded unchanged: parsing and writing them again took ten times as long.
-    ask.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}}})", ask.re, run, fmt::join(all, ","),
-                           all.size() == most_figures),
-               false);
+    request.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}}})", request.re, run,
+                               fmt::join(all, ","), all.size() == max_figures),
+                   false);
 }
 
-void ViewRequests::tell_arguments(const Json& json, const Ask& ask)
+void ViewRequests::send_arguments(const Json& json, const PendingRequest& request)
 {
     simulation_.arguments(computable_frame(simulation_, json, "frame"),
                           [=, this](const ViewSimulation::Arguments& arguments, const std::string& error) {
-                              answer_later(ask, [=] {
-                                  if (!error.empty()) return ask.fail(error);
-                                  ask.tell({{"arguments", arguments}});
+                              answer_later(request, [=] {
+                                  if (!error.empty()) return request.fail(error);
+                                  request.reply({{"arguments", arguments}});
                               });
                           });
 }
 
-void ViewRequests::tell_picture(const Json& json, const Ask& ask)
+void ViewRequests::send_picture(const Json& json, const PendingRequest& request)
 {
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
-    if (!frame) return ask.fail("the frame is not computed");
-    with_points(json, ask, [=](const SceneFrame& points) {
-        ask.send(points.picture(frame->shapes, camera_of(json), size_of(json)).value());
+    if (!frame) return request.fail("the frame is not computed");
+    with_points(json, request, [=](const SceneFrame& points) {
+        request.send(points.picture(frame->shapes, camera_of(json), size_of(json)).value());
     });
 }
 
-void ViewRequests::begin_film(const Json& json, const Ask& ask)
+void ViewRequests::begin_film(const Json& json, const PendingRequest& request)
 {
     if (simulation_.options().is_confined)
-        return ask.fail(
+        return request.fail(
             "films are made by a program of its own, which --untrusted forbids; save pictures of frames (.png)");
     const ViewStatus status = simulation_.status();
-    ViewFilm::Wish wish;
-    wish.extension = json.value("extension", "");
-    wish.first = computable_frame(simulation_, json, "first");
-    wish.last = computable_frame(simulation_, json, "last");
-    wish.output = json.value("output", "main");
-    wish.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
-    wish.threads = simulation_.options().threads;
-    auto film =
-        std::make_unique<ViewFilm>(std::move(wish), [this](std::int64_t number) { return simulation_.frame(number); });
+    ViewFilm::Settings settings;
+    settings.extension = json.value("extension", "");
+    settings.first = computable_frame(simulation_, json, "first");
+    settings.last = computable_frame(simulation_, json, "last");
+    settings.output = json.value("output", "main");
+    settings.film = {json.value("fps", status.fps), size_of(json), camera_of(json)};
+    settings.threads = simulation_.options().threads;
+    auto film = std::make_unique<ViewFilm>(std::move(settings),
+                                           [this](std::int64_t number) { return simulation_.frame(number); });
     film_ = std::move(film);  // a film in progress is abandoned
-    tell_film(ask);
+    send_film_progress(request);
 }
 
-void ViewRequests::tell_film(const Ask& ask) const
+void ViewRequests::send_film_progress(const PendingRequest& request) const
 {
-    if (!film_) return ask.fail("no film is being made");
+    if (!film_) return request.fail("no film is being made");
     const ViewFilm::Progress progress = film_->progress();
-    if (!progress.error.empty()) return ask.fail(progress.error);
-    ask.tell({{"done", progress.done}, {"of", progress.of}, {"ended", progress.has_ended}});
+    if (!progress.error.empty()) return request.fail(progress.error);
+    request.reply({{"done", progress.done}, {"of", progress.of}, {"ended", progress.has_ended}});
 }
 
-void ViewRequests::send_film(const Ask& ask)
+void ViewRequests::send_film(const PendingRequest& request)
 {
-    if (!film_ || !film_->progress().has_ended) return ask.fail("no film is ready");
+    if (!film_ || !film_->progress().has_ended) return request.fail("no film is ready");
     std::string film = film_->take();
-    if (film.empty()) return ask.fail("no film is ready");
+    if (film.empty()) return request.fail("no film is ready");
     film_.reset();
-    ask.send(film);
+    request.send(film);
 }
 
-void ViewRequests::set_parameters(const Json& json, const Ask& ask)
+void ViewRequests::set_parameters(const Json& json, const PendingRequest& request)
 {
     std::map<std::string, std::string> values;
     for (const auto& [name, value] : json.at("values").items()) {
@@ -582,7 +583,7 @@ void ViewRequests::set_parameters(const Json& json, const Ask& ask)
         }
     }
     simulation_.set(std::move(values));
-    ask.tell({{"run", simulation_.status().run}});
+    request.reply({{"run", simulation_.status().run}});
 }
 
 }  // namespace rapid

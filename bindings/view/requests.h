@@ -29,11 +29,11 @@ public:
 
 private:
     using Json = CheckedJson;
-    struct Ask {  // a request with its number and its answer
+    struct PendingRequest {  // a request with its number and its answer
         std::uint32_t re;
         Answer answer;
 
-        void tell(Json json) const;
+        void reply(Json json) const;
         void send(const std::string& data) const;  // sends a file
         void fail(const std::string& why) const;
         // Calls answer_it(); if it throws, the answer is the error.
@@ -44,29 +44,29 @@ private:
     using WithPoints = std::function<void(const SceneFrame& points)>;
 
     // Answers a request whose number is known.
-    void dispatch(const Json& json, const Ask& ask);
+    void dispatch(const Json& json, const PendingRequest& request);
     // Calls answer() on the thread of the server's handler, for functions that other threads call.
     template <class F>
-    void answer_later(const Ask& ask, F answer);
-    void with_points(const Json& json, const Ask& ask, const WithPoints& use);
+    void answer_later(const PendingRequest& request, F answer);
+    void with_points(const Json& json, const PendingRequest& request, const WithPoints& use);
 
     // graph: the number of the page's picture of the graph; a different one is sent.
-    void tell_status(const Ask& ask, std::uint64_t graph) const;
-    void tell_frame(const Json& json, const Ask& ask);
-    void tell_shapes(const Json& json, const Ask& ask);
-    void tell_point(const Json& json, const Ask& ask);
-    void tell_path(const Json& json, const Ask& ask) const;
-    void tell_trails(const Json& json, const Ask& ask);
-    void tell_trace(const Json& json, const Ask& ask);
-    void tell_sheet(const Json& json, const Ask& ask);
-    void tell_region(const Json& json, const Ask& ask);
-    void tell_figures(const Json& json, const Ask& ask) const;
-    void tell_arguments(const Json& json, const Ask& ask);
-    void tell_picture(const Json& json, const Ask& ask);
-    void begin_film(const Json& json, const Ask& ask);
-    void tell_film(const Ask& ask) const;  // its progress
-    void send_film(const Ask& ask);
-    void set_parameters(const Json& json, const Ask& ask);
+    void send_status(const PendingRequest& request, std::uint64_t graph) const;
+    void send_frame(const Json& json, const PendingRequest& request);
+    void send_shapes(const Json& json, const PendingRequest& request);
+    void send_point(const Json& json, const PendingRequest& request);
+    void send_path(const Json& json, const PendingRequest& request) const;
+    void send_trails(const Json& json, const PendingRequest& request);
+    void send_trace(const Json& json, const PendingRequest& request);
+    void send_sheet(const Json& json, const PendingRequest& request);
+    void send_region(const Json& json, const PendingRequest& request);
+    void send_figures(const Json& json, const PendingRequest& request) const;
+    void send_arguments(const Json& json, const PendingRequest& request);
+    void send_picture(const Json& json, const PendingRequest& request);
+    void begin_film(const Json& json, const PendingRequest& request);
+    void send_film_progress(const PendingRequest& request) const;  // its progress
+    void send_film(const PendingRequest& request);
+    void set_parameters(const Json& json, const PendingRequest& request);
 
     std::uint64_t number_of(const ShapeMesh& mesh);
 
@@ -76,7 +76,7 @@ private:
     struct Waiting {
         std::uint64_t since;  // wants a newer version than this
         std::uint64_t graph;
-        Ask ask;
+        PendingRequest request;
     };
     std::vector<Waiting> waiting_;
     std::map<std::weak_ptr<const void>, std::uint64_t, std::owner_less<>> meshes_;  // by owner

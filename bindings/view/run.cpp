@@ -12,10 +12,10 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_warnings = 200;
-constexpr std::size_t most_laid_out = 150;  // nodes; the limit for Graphviz
-constexpr double snapshot_seconds = 0.25;   // of computing, at most repeated to inspect a frame
-constexpr double cached_seconds = 5;        // likewise, to continue from the cache
+constexpr std::size_t max_warnings = 200;
+constexpr std::size_t max_laid_out = 150;  // nodes; the limit for Graphviz
+constexpr double snapshot_seconds = 0.25;  // of computing, at most repeated to inspect a frame
+constexpr double cached_seconds = 5;       // likewise, to continue from the cache
 
 }  // namespace
 
@@ -41,7 +41,7 @@ void ViewSimulation::Run::abandon()
     wake_.notify_all();
 }
 
-void ViewSimulation::Run::ask(Task task)
+void ViewSimulation::Run::enqueue(Task task)
 {
     const std::lock_guard lock(mutex_);
     tasks_.push_back(std::move(task));
@@ -51,7 +51,7 @@ void ViewSimulation::Run::ask(Task task)
 ViewSimulation::Results ViewSimulation::Run::inspect(std::int64_t frame)
 {
     Results results =
-        SceneInside::points_behind_all(*scene_, frame, inspected_ == frame ? std::nullopt : snapshot_before(frame))
+        SceneInside::points_after_nodes(*scene_, frame, inspected_ == frame ? std::nullopt : snapshot_before(frame))
             .value();
     inspected_ = frame;
     return results;
@@ -75,7 +75,7 @@ PointOrigin ViewSimulation::Run::origin(std::int64_t frame, const std::string& o
 }
 
 template <class F>
-void ViewSimulation::Run::tell(const F& change)
+void ViewSimulation::Run::update_status(const F& change)
 {
     {
         const std::lock_guard lock(view_.mutex_);
@@ -94,7 +94,7 @@ void ViewSimulation::Run::run()
     } catch (const std::exception& error) {
         const Error known = error_of(error);
         if (!stopped())
-            tell([&](ViewStatus& status) {
+            update_status([&](ViewStatus& status) {
                 status.state = ViewState::Failed;
                 status.error = known;
             });
@@ -109,12 +109,12 @@ void ViewSimulation::Run::begin()
 {
     SceneHooks hooks;
     hooks.stop = stop_.get_token();
-    hooks.reads = [this](const std::string& file) { view_.note_file(number_, file); };
+    hooks.on_file_read = [this](const std::string& file) { view_.note_file(number_, file); };
     hooks.parameters = [this](const std::vector<SceneParameter>& parameters) {
-        tell([&](ViewStatus& status) { status.parameters = parameters; });
+        update_status([&](ViewStatus& status) { status.parameters = parameters; });
     };
     hooks.keep_state = view_.cache_ != nullptr;
-    hooks.tell_points = true;
+    hooks.per_point_diagnostics = true;
     hooks.watch_memory = false;  // frames share the memory, and are evicted
     view_.note_file(number_, view_.options_.graph);
     scene_ = SceneInside::open(view_.options_.graph, view_.scene_options(), std::move(hooks)).value();
@@ -125,7 +125,7 @@ void ViewSimulation::Run::begin()
     last_ = last;
     if (view_.cache_) cached_ = view_.cache_->open(*scene_);
     const std::vector<SceneAttribute> attributes = SceneInside::attributes(*scene_).value();
-    tell([&, last_frame = last](ViewStatus& status) {
+    update_status([&, last_frame = last](ViewStatus& status) {
         status.state = ViewState::Computing;
         status.first = start;
         status.last = last_frame;
@@ -171,7 +171,7 @@ void ViewSimulation::Run::warn(ViewStatus& status, std::int64_t frame, const std
     const auto same = std::find_if(status.warnings.begin(), status.warnings.end(),
                                    [&](const auto& known) { return known.second == text; });
     if (same != status.warnings.end()) return;
-    if (status.warnings.size() < most_warnings)
+    if (status.warnings.size() < max_warnings)
         status.warnings.emplace_back(frame, text);
     else
         ++status.more_warnings;
@@ -220,23 +220,23 @@ void ViewSimulation::Run::compute()
         if (!publish(frame, warnings, 0, number > first_)) return;
         if (number == first_) {
             auto with_shapes = std::make_shared<ViewFrame>(*frame);
-            const std::size_t told = warnings.size();
+            const std::size_t count_before = warnings.size();
             add_shapes(*with_shapes);
-            if (!publish(with_shapes, warnings, told, true)) return;
+            if (!publish(with_shapes, warnings, count_before, true)) return;
             draw_graph();
         }
     }
     if (stopped()) return;
     view_.store_.keep_only(number_);
     if (cached_) cached_->finish();
-    tell([this](ViewStatus& status) {
+    update_status([this](ViewStatus& status) {
         warn_of_cache(status, last_);
         status.state = ViewState::Done;
     });
 }
 
-bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t told,
-                                  bool is_whole)
+bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings,
+                                  std::size_t count_before, bool is_whole)
 {
     if (stopped()) return false;
     if (cached_ && is_whole) cached_->put(*frame, warnings, SceneInside::take_inputs(*scene_).value());
@@ -245,9 +245,9 @@ bool ViewSimulation::Run::publish(const ViewFramePtr& frame, const std::vector<s
         view_.store_.add(frame->number, number_, frame->statistics, cached_);
         kept = true;
     }
-    tell([&](ViewStatus& status) {
+    update_status([&](ViewStatus& status) {
         warn_of_cache(status, frame->number);
-        for (std::size_t k = told; k < warnings.size(); ++k) warn(status, frame->number, warnings[k]);
+        for (std::size_t k = count_before; k < warnings.size(); ++k) warn(status, frame->number, warnings[k]);
         if (!kept) status.state = ViewState::Full;
     });
     return kept;
@@ -266,7 +266,7 @@ void ViewSimulation::Run::draw_graph()
 {
     std::string drawn, why_not;
     // The page lays out larger graphs: dot would take seconds, and the sandbox starts no program.
-    if (scene_->nodes().size() <= most_laid_out && !view_.options_.is_confined) {
+    if (scene_->nodes().size() <= max_laid_out && !view_.options_.is_confined) {
         GraphLayout layout = view_.layout();
         Result<std::string> graph = SceneInside::graph_json(*scene_, &layout);
         if (graph)
@@ -277,7 +277,7 @@ void ViewSimulation::Run::draw_graph()
     }
     if (drawn.empty()) drawn = SceneInside::graph_json(*scene_, nullptr).value();
     const auto json = std::make_shared<const std::string>(std::move(drawn));
-    tell([&](ViewStatus& status) {
+    update_status([&](ViewStatus& status) {
         status.no_graph = why_not;
         if (status.graph && *status.graph == *json) return;
         status.graph = json;

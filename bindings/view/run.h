@@ -35,7 +35,7 @@ public:
     bool ended() const { return ended_; }
 
     using Task = std::function<void(Run&)>;
-    void ask(Task task);
+    void enqueue(Task task);
 
     // False after an error; then nothing else may be called.
     bool has_scene() const { return scene_.has_value(); }
@@ -49,7 +49,7 @@ private:
 
     // Calls `change` with the status, unless this run has been abandoned.
     template <class F>
-    void tell(const F& change);
+    void update_status(const F& change);
     void run();
     void begin();
 
@@ -65,8 +65,9 @@ private:
     void warn_of_cache(ViewStatus& status, std::int64_t frame);
     void compute();
 
-    // told: the number of warnings already reported. is_whole: it has its shapes, and may go to the cache.
-    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t told, bool is_whole);
+    // count_before: the number of warnings already reported. is_whole: it has its shapes, and may go to the cache.
+    bool publish(const ViewFramePtr& frame, const std::vector<std::string>& warnings, std::size_t count_before,
+                 bool is_whole);
 
     // Snapshots share most, not all, of their columns with each other and with frames; if there are many, every second
     // one is dropped.

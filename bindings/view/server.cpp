@@ -37,19 +37,19 @@ using Request = http::request<http::string_body>;
 using HttpResponse = http::response<http::string_body>;
 
 // Bytes. A header has the cookies of all servers of this machine that a browser has visited: it stores 180 per host.
-constexpr std::size_t most_header = 32768, most_body = 1024, most_message = 1 << 20;
+constexpr std::size_t max_header = 32768, max_body = 1024, max_message = 1 << 20;
 // Answers that a page has not taken, and their bytes: it requests few at a time.
-constexpr std::size_t most_answers = 64, most_answer_bytes = std::size_t{256} << 20;
+constexpr std::size_t max_answers = 64, max_answer_bytes = std::size_t{256} << 20;
 // Unanswered requests of a page; further ones are read when some are answered.
-constexpr int most_unanswered = 32;
+constexpr int max_unanswered = 32;
 // A connection has this long to send a request, and then to take the answer, unless it is a page's socket.
 constexpr std::chrono::seconds request_time{10}, answer_time{60};
 
 // Limits on descriptors, which leave most of the process's descriptors to the simulation.
 struct ConnectionLimits {
-    std::size_t pages, strangers;  // sockets with a token; connections without one
+    std::size_t pages, unauthenticated;  // sockets with a token; connections without one
 
-    static ConnectionLimits of_process()
+    static ConnectionLimits for_this_process()
     {
         rlimit files{};
         const bool is_known = ::getrlimit(RLIMIT_NOFILE, &files) == 0;
@@ -265,7 +265,7 @@ private:
     }
 
     // A page that opens a socket always sends its Origin.
-    bool asks_for_socket(const Request& request) const
+    bool requests_socket(const Request& request) const
     {
         return websocket::is_upgrade(request) && path_of(request) == "/socket" && refusal(request).empty() &&
                !request[http::field::origin].empty();
@@ -275,9 +275,9 @@ private:
     const Handler handler_;
     const std::string token_ = random_token(), token_to_open_ = random_token();
     bool is_opened_ = false;
-    const ConnectionLimits limits_ = ConnectionLimits::of_process();
-    std::list<Connection*> strangers_;    // connections without a token, in the order in which they came
-    std::atomic<std::size_t> pages_ = 0;  // sockets
+    const ConnectionLimits limits_ = ConnectionLimits::for_this_process();
+    std::list<Connection*> unauthenticated_;  // connections without a token, in the order in which they came
+    std::atomic<std::size_t> pages_ = 0;      // sockets
     std::map<std::string, std::filesystem::path> files_;  // by the path of a request
     asio::io_context net_{1}, work_{1};
     Tcp::acceptor acceptor_;
@@ -297,7 +297,7 @@ public:
     {
         beast::get_lowest_layer(stream_).expires_never();
         stream_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
-        stream_.read_message_max(most_message);
+        stream_.read_message_max(max_message);
         stream_.write_buffer_bytes(1 << 17);
         stream_.auto_fragment(false);
         stream_.set_option(websocket::stream_base::decorator(
@@ -311,10 +311,10 @@ public:
 
 private:
     // A request that is not answered yet; its answer shares ownership.
-    class Unanswered {
+    class PendingAnswer {
     public:
-        explicit Unanswered(std::weak_ptr<Socket> page) : page_(std::move(page)) {}
-        ~Unanswered()
+        explicit PendingAnswer(std::weak_ptr<Socket> page) : page_(std::move(page)) {}
+        ~PendingAnswer()
         {
             try {
                 if (auto page = page_.lock()) {
@@ -324,8 +324,8 @@ private:
             } catch (...) {  // out of memory: the page may request a smaller one
             }
         }
-        Unanswered(const Unanswered&) = delete;
-        Unanswered& operator=(const Unanswered&) = delete;
+        PendingAnswer(const PendingAnswer&) = delete;
+        PendingAnswer& operator=(const PendingAnswer&) = delete;
 
     private:
         const std::weak_ptr<Socket> page_;
@@ -333,13 +333,13 @@ private:
 
     void has_answered()
     {
-        if (unanswered_-- == most_unanswered && !is_handling_) read();
+        if (pending_answers_-- == max_unanswered && !is_handling_) read();
     }
 
     void has_handled()
     {
         is_handling_ = false;
-        if (unanswered_ < most_unanswered) read();
+        if (pending_answers_ < max_unanswered) read();
     }
 
     void read()
@@ -349,7 +349,7 @@ private:
             std::string text = beast::buffers_to_string(self->buffer_.data());
             self->buffer_.consume(self->buffer_.size());
             self->is_handling_ = true;
-            ++self->unanswered_;
+            ++self->pending_answers_;
             asio::post(self->server_.work_, [self, text = std::move(text)]() mutable {
                 self->handle(text);
                 asio::io_context& net = self->server_.net_;
@@ -361,9 +361,9 @@ private:
     // Runs on the handler's thread. An answer may take long, and its page may have closed.
     void handle(const std::string& text)
     {
-        const auto unanswered = std::make_shared<const Unanswered>(weak_from_this());
+        const auto pending_answers = std::make_shared<const PendingAnswer>(weak_from_this());
         if (is_closed_) return;
-        server_.handler_(text, [page = weak_from_this(), unanswered](std::string message, bool binary) {
+        server_.handler_(text, [page = weak_from_this(), pending_answers](std::string message, bool binary) {
             auto open = page.lock();
             if (!open) return;
             asio::io_context& net = open->server_.net_;
@@ -383,7 +383,7 @@ private:
     {
         if (is_closed_) return;
         bytes_ += message.size();
-        if (waiting_.size() >= most_answers || (bytes_ > most_answer_bytes && !waiting_.empty())) return close();
+        if (waiting_.size() >= max_answers || (bytes_ > max_answer_bytes && !waiting_.empty())) return close();
         waiting_.emplace_back(std::move(message), binary);
         if (waiting_.size() == 1) write();
     }
@@ -408,7 +408,7 @@ private:
     beast::flat_buffer buffer_;
     std::deque<std::pair<std::string, bool>> waiting_;
     std::size_t bytes_ = 0;                // of waiting answers
-    int unanswered_ = 0;                   // requests
+    int pending_answers_ = 0;              // requests
     bool is_handling_ = false;             // one of its requests is being handled
     std::atomic<bool> is_closed_ = false;  // its requests are no longer answered
 };
@@ -416,7 +416,9 @@ private:
 class ViewServer::Impl::Connection : public std::enable_shared_from_this<Connection> {
 public:
     Connection(Impl& server, Tcp::socket&& socket)
-        : server_(server), stream_(std::move(socket)), place_(server_.strangers_.insert(server_.strangers_.end(), this))
+        : server_(server),
+          stream_(std::move(socket)),
+          place_(server_.unauthenticated_.insert(server_.unauthenticated_.end(), this))
     {
     }
     ~Connection() { leave(); }
@@ -430,8 +432,8 @@ public:
     void read()
     {
         parser_.emplace();
-        parser_->header_limit(most_header);
-        parser_->body_limit(most_body);
+        parser_->header_limit(max_header);
+        parser_->body_limit(max_body);
         stream_.expires_after(request_time);
         http::async_read(stream_, buffer_, *parser_,
                          [self = shared_from_this()](const beast::error_code& error, std::size_t) {
@@ -442,14 +444,14 @@ public:
 private:
     void leave()
     {
-        if (place_) server_.strangers_.erase(*place_);
+        if (place_) server_.unauthenticated_.erase(*place_);
         place_.reset();
     }
 
     void respond()
     {
         const Request& request = parser_->get();
-        if (!server_.asks_for_socket(request))
+        if (!server_.requests_socket(request))
             response_ = server_.answer(request);
         else if (server_.pages_ >= server_.limits_.pages)
             response_ = refuse(request, http::status::service_unavailable, "too many pages are open; close one");
@@ -487,7 +489,7 @@ void ViewServer::Impl::accept()
         socket.set_option(Tcp::no_delay(true), none);
         close_on_exec(socket.native_handle());
         // If there are too many, the oldest is closed: a page needs few, and for a short time.
-        if (strangers_.size() >= limits_.strangers) strangers_.front()->close();
+        if (unauthenticated_.size() >= limits_.unauthenticated) unauthenticated_.front()->close();
         std::make_shared<Connection>(*this, std::move(socket))->read();
         accept();
     });

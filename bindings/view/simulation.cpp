@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t most_ending = 2;
-constexpr std::size_t most_spare = 32;  // columns of replaced frames, whose pages the next ones reuse
+constexpr std::size_t max_ending = 2;
+constexpr std::size_t max_spare = 32;  // columns of replaced frames, whose pages the next ones reuse
 
 fs::file_time_type changed_at(const fs::path& file)
 {
@@ -58,7 +58,7 @@ ViewSimulation::ViewSimulation(ViewOptions options, std::function<void()> change
     : options_(std::move(options)), changed_(std::move(changed)), store_(options_.memory)
 {
     status_.version = 1;
-    SceneInside::keep_spare_columns(most_spare).value();
+    SceneInside::keep_spare_columns(max_spare).value();
     if (!options_.cache.empty()) cache_ = std::make_unique<FrameCache>(options_.cache);
     if (!is_sequence()) {
         begin();
@@ -102,7 +102,7 @@ void ViewSimulation::begin()
 void ViewSimulation::collect_ended()
 {
     std::erase_if(ending_, [](const auto& run) { return run->ended(); });
-    while (ending_.size() > most_ending) ending_.pop_front();
+    while (ending_.size() > max_ending) ending_.pop_front();
 }
 
 std::size_t ViewSimulation::ending() const
@@ -197,46 +197,46 @@ ViewFramePtr ViewSimulation::read_file(std::int64_t number)
 }
 
 template <class T>
-void ViewSimulation::ask_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> told)
+void ViewSimulation::query_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> callback)
 {
-    run_->ask([answer = std::move(answer), told = std::move(told)](Run& run) {
-        if (!run.has_scene()) return told({}, "the scene has an error");
+    run_->enqueue([answer = std::move(answer), callback = std::move(callback)](Run& run) {
+        if (!run.has_scene()) return callback({}, "the scene has an error");
         try {
-            told(answer(run), "");
+            callback(answer(run), "");
         } catch (const std::exception& error) {
-            told({}, error_of(error).what());
+            callback({}, error_of(error).what());
         }
     });
 }
 
-void ViewSimulation::inspect(std::int64_t frame, std::function<void(Results, std::string error)> told)
+void ViewSimulation::inspect(std::int64_t frame, std::function<void(Results, std::string error)> callback)
 {
-    if (!run_) return told({}, "a sequence of files has no nodes");
-    ask_run<Results>([=](Run& run) { return run.inspect(frame); }, std::move(told));
+    if (!run_) return callback({}, "a sequence of files has no nodes");
+    query_run<Results>([=](Run& run) { return run.inspect(frame); }, std::move(callback));
 }
 
-void ViewSimulation::arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> told)
+void ViewSimulation::arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> callback)
 {
-    if (!run_) return told({}, "a sequence of files has no nodes");
-    ask_run<Arguments>([=](Run& run) { return run.arguments(frame); }, std::move(told));
+    if (!run_) return callback({}, "a sequence of files has no nodes");
+    query_run<Arguments>([=](Run& run) { return run.arguments(frame); }, std::move(callback));
 }
 
 void ViewSimulation::origin(std::int64_t frame, std::string output, std::int64_t id,
-                            std::function<void(PointOrigin, std::string error)> told)
+                            std::function<void(PointOrigin, std::string error)> callback)
 {
-    if (!run_) return told({}, "a sequence of files has no biographies");
-    ask_run<PointOrigin>([=](Run& run) { return run.origin(frame, output, id); }, std::move(told));
+    if (!run_) return callback({}, "a sequence of files has no biographies");
+    query_run<PointOrigin>([=](Run& run) { return run.origin(frame, output, id); }, std::move(callback));
 }
 
 void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
-                           std::function<void(std::string json, std::string error)> told)
+                           std::function<void(std::string json, std::string error)> callback)
 {
-    if (is_sequence()) return told("", "a sequence of files has no biographies");
+    if (is_sequence()) return callback("", "a sequence of files has no biographies");
     tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
     tracer_stop_ = std::stop_source();
     tracer_ = std::thread([=, this, options = scene_options(), stop = tracer_stop_.get_token(),
-                           told = std::move(told)] {
+                           callback = std::move(callback)] {
         tbb::task_arena arena(options_.threads);
         arena.execute([&] {
             try {
@@ -245,9 +245,9 @@ void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
                 Scene scene = SceneInside::open(options_.graph, options, hooks).value();
                 const SceneTrace trace = scene.trace({{point.id}, point.create, scene.first_frame(), last, 1}).value();
                 if (trace.fault) throw SceneException(*trace.fault);
-                told(trace.lives.json, "");
+                callback(trace.lives.json, "");
             } catch (const std::exception& error) {
-                told("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
+                callback("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
             }
         });
     });

@@ -79,20 +79,20 @@ public:
     bool is_sequence() const { return !options_.files.empty(); }
     const ViewOptions& options() const { return options_; }
 
-    // Calls `told` from the run's thread with the points after each node in a frame, by name, or with an error. The run
-    // then continues.
+    // Calls `callback` from the run's thread with the points after each node in a frame, by name, or with an error. The
+    // run then continues.
     using Results = std::map<std::string, SceneFrame>;
-    void inspect(std::int64_t frame, std::function<void(Results, std::string error)> told);
+    void inspect(std::int64_t frame, std::function<void(Results, std::string error)> callback);
     // Returns likewise the arguments of the nodes in a frame, as strings by node and name.
     using Arguments = std::map<std::string, std::map<std::string, std::string>>;
-    void arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> told);
+    void arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> callback);
     // Returns likewise the create node that made a point of an output in a frame, and its id there: merged chains get
     // other ids.
     void origin(std::int64_t frame, std::string output, std::int64_t id,
-                std::function<void(PointOrigin, std::string error)> told);
+                std::function<void(PointOrigin, std::string error)> callback);
     // Returns likewise the life of a point up to a frame, as JSON, from its own thread and scene.
     void trace(const PointOrigin& point, std::int64_t last,
-               std::function<void(std::string json, std::string error)> told);
+               std::function<void(std::string json, std::string error)> callback);
 
 private:
     class Run;
@@ -105,7 +105,7 @@ private:
     void keep(GraphLayout layout);
     ViewFramePtr read_file(std::int64_t number);
     template <class T>
-    void ask_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> told);
+    void query_run(std::function<T(Run&)> answer, std::function<void(T, std::string error)> callback);
 
     const ViewOptions options_;
     const std::function<void()> changed_;

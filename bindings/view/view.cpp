@@ -101,14 +101,14 @@ public:
                             threads.count(),
                             static_cast<std::size_t>(memory_budget() / 2),
                             cache_,
-                            untrusted_.asked()};
+                            untrusted_.requested()};
         options.scene.log = nullptr;  // the page shows the warnings
         if (frames_) options.frames = {frames_->first, frames_->last};
         if (std::filesystem::path(graph_.file()).extension() != ".lua")
             options.files = find_cache(graph_.file()).frames;
 
         std::unique_ptr<ViewRequests> requests;
-        ViewServer server(untrusted_.asked() ? inherited_socket : ViewServer::listen(port_), page_folder(),
+        ViewServer server(untrusted_.requested() ? inherited_socket : ViewServer::listen(port_), page_folder(),
                           [&](const std::string& message, const Answer& answer) { requests->handle(message, answer); });
         ViewSimulation simulation(std::move(options), [&] {
             server.post([&] {
@@ -122,7 +122,7 @@ public:
         server.repeat(watch_interval, [&] { simulation.check_files(); });
         print(server.address() + '\n');
         std::fflush(stdout);
-        if (!no_open_ && !untrusted_.asked()) open(server.address_to_open());  // starts a program
+        if (!no_open_ && !untrusted_.requested()) open(server.address_to_open());  // starts a program
         server.run();
         return status_done;
     }

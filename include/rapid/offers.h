@@ -64,8 +64,8 @@ struct HostParameter {
     std::string name, doc;                                       // the doc is shown by `rapid nodes`
     std::variant<double, std::array<double, 3>> fallback = 0.0;  // the default
     std::string unit = {};                                       // "m/s"; empty: none
-    double least = -std::numeric_limits<double>::infinity();     // of a number
-    double most = std::numeric_limits<double>::infinity();       // of a number
+    double min = -std::numeric_limits<double>::infinity();       // of a number
+    double max = std::numeric_limits<double>::infinity();        // of a number
 };
 
 // Two points that a constraint keeps at a distance.

@@ -182,7 +182,7 @@ typedef struct rapid_parameter {
 /* Parameters are in the order in which the scene declares them. */
 size_t rapid_scene_parameter_count(rapid_scene* scene);
 /* The texts stay valid until the scene is set or released. */
-int rapid_scene_parameter(rapid_scene* scene, size_t place, rapid_parameter* parameter, rapid_error** error);
+int rapid_scene_parameter(rapid_scene* scene, size_t index, rapid_parameter* parameter, rapid_error** error);
 /* Sets parameters, runs the scene's file again, and returns to the start. After an error the scene is unchanged. */
 int rapid_scene_set(rapid_scene* scene, const rapid_setting* settings, size_t count, rapid_error** error);
 
@@ -197,7 +197,7 @@ typedef struct rapid_node {
 
 /* Nodes are in the order in which the scene makes them; their texts stay valid until the scene is set or released. */
 size_t rapid_scene_node_count(rapid_scene* scene);
-int rapid_scene_node(rapid_scene* scene, size_t place, rapid_node* node, rapid_error** error);
+int rapid_scene_node(rapid_scene* scene, size_t index, rapid_node* node, rapid_error** error);
 /* Returns all node types that a scene of this program may use, as JSON: [{"name", "doc", "parameters": [{"name",
  * "type", "unit", "doc", "default", "required"}]}]. The text belongs to the scene, until the next call of this
  * function. */
@@ -216,7 +216,7 @@ int64_t rapid_scene_next_frame(rapid_scene* scene);
 int rapid_scene_advance(rapid_scene* scene, rapid_frame** frame, rapid_error** error);
 int rapid_scene_advance_to(rapid_scene* scene, int64_t number, rapid_frame** frame, rapid_error** error);
 int rapid_scene_restart(rapid_scene* scene, rapid_error** error);
-/* Ends the advance, trace or points_behind that is running, or else the next one, with RAPID_CANCELLED. From any
+/* Ends the advance, trace or points_after that is running, or else the next one, with RAPID_CANCELLED. From any
  * thread.
  */
 int rapid_scene_cancel(rapid_scene* scene, rapid_error** error);
@@ -238,8 +238,8 @@ int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
 int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** error);
 /* The points as they leave a node in a frame, as a frame with the only output of the node's name: goes to the start,
  * and computes the frames up to this one beside the scene, which then is at its start. *frame is to be released. */
-int rapid_scene_points_behind(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
-                              rapid_error** error);
+int rapid_scene_points_after(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
+                             rapid_error** error);
 /* Forms of a graph: in Graphviz's language; as a picture; as nodes and edges with their positions, an object, as
  * written by `rapid graph -o FILE.json`. */
 enum { RAPID_GRAPH_DOT = 0, RAPID_GRAPH_SVG = 1, RAPID_GRAPH_JSON = 2 };
@@ -403,7 +403,7 @@ int rapid_frame_group(rapid_frame* frame, const char* name, rapid_column* column
 /* Does the same as rapid_frame_column(), but writes out a value that all points share, so that stride is never 0. */
 int rapid_frame_expanded(rapid_frame* frame, const char* name, rapid_column* column, rapid_error** error);
 /* Returns the indices of the points with these ids in the columns, shape [count]; UINT32_MAX for an unknown id. */
-int rapid_frame_places(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* places, rapid_error** error);
+int rapid_frame_indices(rapid_frame* frame, const int64_t* ids, size_t count, uint32_t* indices, rapid_error** error);
 /* Returns a value of the whole set (:detail). */
 int rapid_frame_detail(rapid_frame* frame, const char* name, rapid_value* value, rapid_error** error);
 
@@ -451,9 +451,9 @@ typedef struct rapid_plane {
 
 /* Both are in the order of the nodes; infinite shapes other than planes are omitted. */
 size_t rapid_shapes_mesh_count(rapid_shapes* shapes);
-int rapid_shapes_mesh(rapid_shapes* shapes, size_t place, rapid_mesh* mesh, rapid_error** error);
+int rapid_shapes_mesh(rapid_shapes* shapes, size_t index, rapid_mesh* mesh, rapid_error** error);
 size_t rapid_shapes_plane_count(rapid_shapes* shapes);
-int rapid_shapes_plane(rapid_shapes* shapes, size_t place, rapid_plane* plane, rapid_error** error);
+int rapid_shapes_plane(rapid_shapes* shapes, size_t index, rapid_plane* plane, rapid_error** error);
 /* Returns 1 if the scene sets the camera of its pictures. */
 int rapid_shapes_has_camera(rapid_shapes* shapes);
 /* Returns the warnings of making them, such as a mesh with holes, one per line. */

@@ -238,10 +238,10 @@ public:
     // owns it.
     Result<SceneColumn> expanded(std::string_view name) const;
     // The index for an id that no point has.
-    static constexpr std::uint32_t no_place = UINT32_MAX;
+    static constexpr std::uint32_t no_index = UINT32_MAX;
     // Returns the indices of the points with these ids in the columns. One call with many ids is much faster than many
     // calls.
-    Result<std::vector<std::uint32_t>> places(const std::vector<std::int64_t>& ids) const;
+    Result<std::vector<std::uint32_t>> indices(const std::vector<std::int64_t>& ids) const;
 
     std::vector<std::string> details() const;  // names of values of the whole set (:detail), in order
     // Returns such a value: a number or three. Fails, with the nearest name, if there is no such detail value.
@@ -427,7 +427,7 @@ public:
     Result<SceneSnapshot> save();
     Result<Done> restore(const SceneSnapshot& snapshot);
 
-    // Ends the current computation (frames, also of trace() and points_behind(); shapes), or else the next one, with
+    // Ends the current computation (frames, also of trace() and points_after(); shapes), or else the next one, with
     // the error Cancelled: in a frame at the next chunk of points or substep, and at once in a script. Callable from
     // any thread. restart(), restore() and set() clear it.
     void cancel();
@@ -446,7 +446,7 @@ public:
     // Returns the points as they leave a node in a frame, as a frame whose only output has the node's name. Goes to the
     // start, and computes the frames up to this one separately, like trace(). Fails if there is no such node (with the
     // nearest name), if the plan omits it, or if the frame is before the first one.
-    Result<SceneFrame> points_behind(const std::string& node, std::int64_t frame);
+    Result<SceneFrame> points_after(const std::string& node, std::int64_t frame);
     // Returns the shapes that points collide with or are born from in a frame, which need not be computed, and the look
     // of its pictures.
     Result<SceneShapes> shapes(std::int64_t frame);

@@ -20,10 +20,10 @@ return rapid.node {
   },
   points = function(p, _, params)
     local dt = p.dt
-    local way = params.target - p.P
-    local d = way:length()
+    local offset = params.target - p.P
+    local d = offset:length()
     if dt <= 0 or d == 0 then return end
-    local n = way / d
+    local n = offset / d
     local v = (n * params.speed):lerp(p.v, math.exp(-dt / params.response))
     -- The longest way it may go: at the greater of both speeds up to the radius, then slowing down in the time left.
     local closing = v:dot(n)

@@ -47,10 +47,10 @@ return rapid.node {
         local along = speed > 1e-9 and u / speed or vec3(0, 0, 1)
         local place = detail.leader_P - along * (params.distance + params.length * p:rand(1))
           + across(along, p) * params.width
-        local wanted = u + (place - p.P) / params.time
-        local most = wanted:length()
-        if most > params.speed then wanted = wanted * (params.speed / most) end
-        p.v = wanted:lerp(p.v, math.exp(-p.dt / params.response))
+        local target = u + (place - p.P) / params.time
+        local most = target:length()
+        if most > params.speed then target = target * (params.speed / most) end
+        p.v = target:lerp(p.v, math.exp(-p.dt / params.response))
       end }
   end,
 }

@@ -5,11 +5,11 @@
 namespace rapid {
 namespace {
 
-thread_local const Cancellation* of_thread = nullptr;
+thread_local const Cancellation* innermost = nullptr;
 
 }  // namespace
 
-const Cancellation* Cancellation::current() { return of_thread; }
+const Cancellation* Cancellation::current() { return innermost; }
 
 void Cancellation::request(const Error& why)
 {
@@ -32,32 +32,32 @@ void Cancellation::fail() const
 
 void Cancellation::check_current()
 {
-    if (of_thread) of_thread->check();
+    if (innermost) innermost->check();
 }
 
 Error Cancellation::placed(Error error) const
 {
     const std::lock_guard lock(mutex_);
-    if (place_) error.in_node(place_->node_).at(place_->location_);
+    if (scope_) error.in_node(scope_->node_).at(scope_->location_);
     return error;
 }
 
-Cancellation::Place::Place(const std::string& node, const Location& location)
-    : of_(of_thread), node_(node), location_(location)
+Cancellation::NodeScope::NodeScope(const std::string& node, const Location& location)
+    : of_(innermost), node_(node), location_(location)
 {
     if (!of_) return;
     const std::lock_guard lock(of_->mutex_);
-    before_ = std::exchange(of_->place_, this);
+    before_ = std::exchange(of_->scope_, this);
 }
 
-Cancellation::Place::~Place()
+Cancellation::NodeScope::~NodeScope()
 {
     if (!of_) return;
     const std::lock_guard lock(of_->mutex_);
-    of_->place_ = before_;
+    of_->scope_ = before_;
 }
 
-Cancellation::Scope::Scope(const Cancellation* cancellation) : before_(std::exchange(of_thread, cancellation)) {}
-Cancellation::Scope::~Scope() { of_thread = before_; }
+Cancellation::Scope::Scope(const Cancellation* cancellation) : before_(std::exchange(innermost, cancellation)) {}
+Cancellation::Scope::~Scope() { innermost = before_; }
 
 }  // namespace rapid

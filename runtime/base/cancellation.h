@@ -42,16 +42,16 @@ public:
     };
 
     // Records the node that this thread evaluates during its lifetime, for code that ends the thread from outside.
-    class Place {
+    class NodeScope {
     public:
-        Place(const std::string& node, const Location& location);
-        ~Place();
-        Place(const Place&) = delete;
-        Place& operator=(const Place&) = delete;
+        NodeScope(const std::string& node, const Location& location);
+        ~NodeScope();
+        NodeScope(const NodeScope&) = delete;
+        NodeScope& operator=(const NodeScope&) = delete;
 
     private:
         const Cancellation* const of_;
-        const Place* before_ = nullptr;
+        const NodeScope* before_ = nullptr;
         const std::string& node_;
         const Location& location_;
         friend class Cancellation;
@@ -65,7 +65,7 @@ private:
     std::atomic<bool> requested_ = false;
     mutable std::mutex mutex_;
     Error why_ = cancelled();
-    mutable const Place* place_ = nullptr;
+    mutable const NodeScope* scope_ = nullptr;
 };
 
 }  // namespace rapid

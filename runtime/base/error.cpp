@@ -42,16 +42,16 @@ Error Error::reworded(std::string message) const
 
 std::string error_text(const Location& location, std::string_view node, std::string_view message)
 {
-    constexpr std::size_t most_of_message = 4000, most_of_name = 200;  // bytes
-    constexpr std::size_t most_of_path = 4096;                         // longer ones name no file
+    constexpr std::size_t max_message_bytes = 4000, max_name_bytes = 200;  // bytes
+    constexpr std::size_t max_path_bytes = 4096;                           // longer ones name no file
     std::string text;
     if (!location.file.empty()) {
-        text += shortened(location.file, most_of_path);
+        text += shortened(location.file, max_path_bytes);
         if (location.line > 0) text += fmt::format(":{}", location.line);
         text += ": ";
     }
-    if (!node.empty()) text += fmt::format("node \"{}\": ", shortened(node, most_of_name));
-    text += shortened(message, most_of_message);
+    if (!node.empty()) text += fmt::format("node \"{}\": ", shortened(node, max_name_bytes));
+    text += shortened(message, max_message_bytes);
     // what() would end there.
     for (std::size_t zero; (zero = text.find('\0')) != std::string::npos;) text.replace(zero, 1, "\\x00");
     return text;
@@ -90,10 +90,10 @@ std::size_t edit_distance(std::string_view a, std::string_view b)
 std::string nearest_name(std::string_view name, const std::vector<std::string>& names)
 {
     std::string nearest;
-    const std::string wanted = lower_case(name);
+    const std::string target = lower_case(name);
     std::size_t least = std::max<std::size_t>(1, name.size() / 3) + 1;
     for (const std::string& candidate : names) {
-        const std::size_t distance = edit_distance(wanted, lower_case(candidate));
+        const std::size_t distance = edit_distance(target, lower_case(candidate));
         const bool alike = distance < std::max(name.size(), candidate.size());
         if (alike && distance < least) {
             least = distance;

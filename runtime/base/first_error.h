@@ -17,15 +17,15 @@ public:
     template <class F>
     bool guard(std::size_t loop, std::size_t point, const F& f)
     {
-        const std::uint64_t place = std::uint64_t{loop} << 48 | point;
-        if (place > place_.load(std::memory_order_relaxed)) return false;
+        const std::uint64_t index = std::uint64_t{loop} << 48 | point;
+        if (index > index_.load(std::memory_order_relaxed)) return false;
         try {
             f();
             return true;
         } catch (...) {
             const std::lock_guard lock(mutex_);
-            if (place < place_) {
-                place_ = place;
+            if (index < index_) {
+                index_ = index;
                 error_ = std::current_exception();
             }
             return false;
@@ -39,7 +39,7 @@ public:
 
 private:
     std::mutex mutex_;
-    std::atomic<std::uint64_t> place_{UINT64_MAX};
+    std::atomic<std::uint64_t> index_{UINT64_MAX};
     std::exception_ptr error_;
 };
 

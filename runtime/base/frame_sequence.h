@@ -41,12 +41,12 @@ struct FrameSequence {
     }
 
     // Return the range of frames in which the file may change.
-    double begins() const { return goes_on(before) ? -infinite : static_cast<double>(first + offset); }
-    double ends() const { return goes_on(after) ? infinite : static_cast<double>(last + offset); }
+    double begins() const { return is_endless(before) ? -infinite : static_cast<double>(first + offset); }
+    double ends() const { return is_endless(after) ? infinite : static_cast<double>(last + offset); }
 
 private:
     static constexpr double infinite = std::numeric_limits<double>::infinity();
-    static bool goes_on(Beyond beyond) { return beyond == Repeat || beyond == Mirror; }
+    static bool is_endless(Beyond beyond) { return beyond == Repeat || beyond == Mirror; }
 };
 
 }  // namespace rapid

@@ -112,7 +112,7 @@ std::uint64_t free_memory()
     return most - std::min(most, used);
 }
 
-Error beyond_memory(const std::string& what, double bytes, const std::string& remedy)
+Error memory_exceeded(const std::string& what, double bytes, const std::string& remedy)
 {
     return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set {}", what, memory_text(bytes),
                              memory_text(static_cast<double>(free_memory())),

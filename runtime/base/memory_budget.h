@@ -39,7 +39,7 @@ bool fits_in_memory(double bytes);
 std::uint64_t free_memory();
 
 // Returns the error "WHAT would take about 119.2 GiB, and 21.3 GiB are free of 64.0 GiB; REMEDY, or set --memory".
-Error beyond_memory(const std::string& what, double bytes, const std::string& remedy);
+Error memory_exceeded(const std::string& what, double bytes, const std::string& remedy);
 
 // Returns a string such as "119.2 GiB" or "12 MiB".
 std::string memory_text(double bytes);

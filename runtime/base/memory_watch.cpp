@@ -48,8 +48,8 @@ private:
 
 }  // namespace
 
-MemoryWatch::MemoryWatch(std::uint64_t at_first, Tell beyond, Tell too_late)
-    : beyond_(std::move(beyond)), too_late_(std::move(too_late))
+MemoryWatch::MemoryWatch(std::uint64_t at_first, Callback on_exceeded, Callback on_overrun)
+    : on_exceeded_(std::move(on_exceeded)), on_overrun_(std::move(on_overrun))
 {
     if (!is_memory_limited()) return;
     const std::uint64_t most = std::max(memory_budget(), at_first + 2 * negligible_memory);
@@ -91,14 +91,14 @@ void MemoryWatch::watch(std::uint64_t most)
         error = error.reworded(fmt::format(
             "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set {}",
             memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)), name_of(Setting::Memory)));
-        beyond_(error);
+        on_exceeded_(error);
     } catch (const std::exception&) {  // this thread has no caller
     }
-    if (!too_late_) return;
+    if (!on_overrun_) return;
     for (double waited = 0; waited < grace_seconds && memory.bytes() <= most + most / 16; waited += look_seconds)
         if (ends_within(look_seconds)) return;
     try {
-        too_late_(error);
+        on_overrun_(error);
     } catch (const std::exception&) {
     }
 }

@@ -5,6 +5,6 @@
 
 namespace rapid {
 
-inline constexpr std::size_t most_deflate_expansion = 1032;  // output bytes per input byte, at most
+inline constexpr std::size_t max_deflate_expansion = 1032;  // output bytes per input byte, at most
 
 }  // namespace rapid

@@ -102,20 +102,20 @@ void RecordLog::append(std::string_view record)
     end_ = at;
 }
 
-bool RecordLog::read(std::uint64_t& place, std::string& record) const
+bool RecordLog::read(std::uint64_t& position, std::string& record) const
 {
     const std::uint64_t end = size();
     Head head;
-    if (place > end || end - place < sizeof head || !read_at(file_.number(), place, &head, sizeof head) ||
-        head.bytes > end - place - sizeof head)
+    if (position > end || end - position < sizeof head || !read_at(file_.number(), position, &head, sizeof head) ||
+        head.bytes > end - position - sizeof head)
         return false;
     if (!fits_in_memory(static_cast<double>(head.bytes)))
-        throw beyond_memory("a record of it", static_cast<double>(head.bytes), "give another folder");
+        throw memory_exceeded("a record of it", static_cast<double>(head.bytes), "give another folder");
     record.resize(head.bytes);
-    if (!read_at(file_.number(), place + sizeof head, record.data(), record.size()) ||
+    if (!read_at(file_.number(), position + sizeof head, record.data(), record.size()) ||
         content_hash(record) != head.hash)
         return false;
-    place += sizeof head + record.size();
+    position += sizeof head + record.size();
     return true;
 }
 
@@ -125,10 +125,10 @@ void RecordLog::clear()
     end_ = 0;
 }
 
-Descriptor FrameArchive::lock(const fs::path& folder, const fs::path& asked, const char* who)
+Descriptor FrameArchive::lock(const fs::path& folder, const fs::path& shown_as, const char* who)
 {
     const auto refuse = [&](const std::string& why) {
-        throw Error(fmt::format("{} {}: {}", name_of(Setting::Cache), asked.string(), why));
+        throw Error(fmt::format("{} {}: {}", name_of(Setting::Cache), shown_as.string(), why));
     };
     std::error_code error;
     fs::create_directories(folder, error);
@@ -271,7 +271,7 @@ void FrameArchive::begin_journal(const std::vector<std::string>& records)
         }
         file.finish();
         journal_.emplace(journal());
-        journal_->go_on_at(file.appended());
+        journal_->continue_at(file.appended());
     } catch (const std::exception& error) {
         const std::lock_guard lock(mutex_);
         failures_.push_back(

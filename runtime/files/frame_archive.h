@@ -35,14 +35,15 @@ public:
 
     // Throws Error if the record can't be written; the log is then unchanged.
     void append(std::string_view record);
-    // Reads the record at `place` and moves `place` to the next one. Returns false if there is no complete record.
-    bool read(std::uint64_t& place, std::string& record) const;
+    // Reads the record at `position` and moves `position` to the next one. Returns false if there is no complete
+    // record.
+    bool read(std::uint64_t& position, std::string& record) const;
 
     // Returns the position of the next record.
     std::uint64_t end() const { return end_; }
-    // Continues at `place`. Records after it stay until new ones replace them: a run that resumes from an early
+    // Continues at `position`. Records after it stay until new ones replace them: a run that resumes from an early
     // snapshot writes the same records again, and a later snapshot may refer to them.
-    void go_on_at(std::uint64_t place) { end_ = place; }
+    void continue_at(std::uint64_t position) { end_ = position; }
     void clear();
 
 private:
@@ -63,7 +64,7 @@ public:
 
     // Creates the folder and locks it for this process. asked, who: the folder and its user in error messages. Throws
     // Error if another process keeps the lock for five seconds; a killed process holds it until its memory is freed.
-    static Descriptor lock(const std::filesystem::path& folder, const std::filesystem::path& asked, const char* who);
+    static Descriptor lock(const std::filesystem::path& folder, const std::filesystem::path& shown_as, const char* who);
 
     const std::filesystem::path& folder() const { return folder_; }
     std::filesystem::path file(std::string_view kind, std::int64_t frame) const;

@@ -103,7 +103,7 @@ std::string FramePattern::expand(int frame, std::string_view output) const
     return with_output(before_, output) + number + with_output(after_, output);
 }
 
-std::string FramePattern::of_output(std::string_view output) const { return with_output(text_, output); }
+std::string FramePattern::for_output(std::string_view output) const { return with_output(text_, output); }
 
 std::string FramePattern::without_frame(std::string_view output) const
 {

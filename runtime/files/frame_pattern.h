@@ -23,7 +23,7 @@ public:
 
     std::string expand(int frame, std::string_view output = "main") const;
     // Returns the pattern for one output.
-    std::string of_output(std::string_view output) const;
+    std::string for_output(std::string_view output) const;
     // Returns the name for all frames: without the number and the dot, dash or underscore before it.
     std::string without_frame(std::string_view output = "main") const;
 
@@ -41,7 +41,7 @@ private:
 std::string with_part(const std::string& pattern, std::string_view part);
 bool has_part(std::string_view pattern);
 
-constexpr int most_parts = 100000;
+constexpr int max_parts = 100000;
 
 // Returns "03of16". The number is as wide as the count, so that names sort in order.
 std::string part_name(int number, int count);

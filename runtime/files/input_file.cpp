@@ -70,7 +70,7 @@ InputFile::InputFile(const std::filesystem::path& path)
 {
     const OpenFile file = open_regular(path);
     if (const auto bytes = static_cast<double>(file.bytes); !fits_in_memory(bytes))  // a sparse file may have any size
-        throw beyond_memory("the file, which is read whole,", bytes, "read a smaller one");
+        throw memory_exceeded("the file, which is read whole,", bytes, "read a smaller one");
     bytes_ = std::make_unique_for_overwrite<unsigned char[]>(file.bytes);
     size_ = file.bytes;
     constexpr std::size_t block = std::size_t{4} << 20;  // large enough to amortise a task, small enough to distribute

@@ -148,10 +148,10 @@ static_assert(std::atomic<pid_t>::is_always_lock_free, "a signal handler reads t
 
 WritingProgram::WritingProgram(pid_t program)
 {
-    for (std::atomic<pid_t>& place : writing_programs) {
+    for (std::atomic<pid_t>& slot : writing_programs) {
         pid_t none = 0;
-        if (!place.compare_exchange_strong(none, program)) continue;
-        place_ = &place;
+        if (!slot.compare_exchange_strong(none, program)) continue;
+        slot_ = &slot;
         if (ending) ::kill(program, SIGKILL);  // remove_unfinished_files() will not run again
         return;
     }
@@ -159,7 +159,7 @@ WritingProgram::WritingProgram(pid_t program)
 
 WritingProgram::~WritingProgram()
 {
-    if (place_) *place_ = 0;
+    if (slot_) *slot_ = 0;
 }
 
 // A random name. The destructor or remove_unfinished_files() removes its file, unless the name was given away.

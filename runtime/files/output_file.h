@@ -79,7 +79,7 @@ public:
     WritingProgram& operator=(const WritingProgram&) = delete;
 
 private:
-    std::atomic<pid_t>* place_ = nullptr;
+    std::atomic<pid_t>* slot_ = nullptr;
 };
 
 // Removes all unfinished files, kills the programs that write them, and prevents new ones. For a signal handler or a

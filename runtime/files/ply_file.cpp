@@ -184,13 +184,13 @@ PlyRecords PlyFile::read_records(const PlyElement& element)
     return records;
 }
 
-void PlyFile::read_lists(const PlyElement& element, std::size_t wanted,
+void PlyFile::read_lists(const PlyElement& element, std::size_t selected,
                          const std::function<void(std::span<const std::int64_t> list)>& row)
 {
     check_promise(element);
-    if (wanted < element.properties.size() && is_floating(element.properties[wanted].type))
+    if (selected < element.properties.size() && is_floating(element.properties[selected].type))
         throw Error(fmt::format("{} of {} is of floating numbers; it must be of integers",
-                                element.properties[wanted].name, element.name));
+                                element.properties[selected].name, element.name));
     std::vector<std::int64_t> list;
     if (element.properties.empty()) return;
     numbers_.assign(element.properties.size(), 0);
@@ -203,18 +203,18 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t wanted,
             if (property.list && !(count >= 0 && count <= static_cast<double>((text_.size() - at_) / least)))
                 throw Error(fmt::format("{} {} of {}: a list of {} numbers is longer than the file", element.name, i,
                                         element.count, count));
-            if (p == wanted) list.clear();
-            if (property.list && p != wanted && encoding_ != Encoding::Ascii) {
+            if (p == selected) list.clear();
+            if (property.list && p != selected && encoding_ != Encoding::Ascii) {
                 at_ += static_cast<std::size_t>(count) * scalar_bytes(property.type);
                 continue;
             }
             for (auto left = static_cast<std::size_t>(count); left > 0; --left) {
                 const double number = take_number(element, i, property, property.type);
                 numbers_[p] = number;
-                if (p == wanted) list.push_back(static_cast<std::int64_t>(number));
+                if (p == selected) list.push_back(static_cast<std::int64_t>(number));
             }
         }
-        if (wanted < element.properties.size()) row(list);
+        if (selected < element.properties.size()) row(list);
     }
 }
 

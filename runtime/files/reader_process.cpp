@@ -14,7 +14,7 @@
 #include <new>
 
 #include "runtime/files/file_error.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 
 namespace rapid {
 namespace {
@@ -26,11 +26,11 @@ std::map<std::string, NamedReader>& readers()
 }
 
 void read_in_copy(const ReadRequest& request, const std::function<void(MessageReader&)>& receive,
-                  std::size_t most_memory)
+                  std::size_t max_memory)
 {
     const NamedReader& reader = readers().at(request.reader);
     rapid::read_in_copy(
-        request.path, [&](MessageWriter& message) { reader(request, message); }, receive, most_memory);
+        request.path, [&](MessageWriter& message) { reader(request, message); }, receive, max_memory);
 }
 
 // Writes all bytes. Returns false if the other end is closed.
@@ -80,7 +80,7 @@ bool put_answer(int pipe, const AnswerHeader& header, const void* from)
     return put(pipe, &header, sizeof header) && put(pipe, from, header.bytes);
 }
 
-bool answer(int pipe, const ReadRequest& request, std::size_t most_memory)
+bool answer(int pipe, const ReadRequest& request, std::size_t max_memory)
 {
     const auto refuse = [&](const std::string& why, ErrorKind kind) {
         return put_answer(pipe, {true, kind, why.size()}, why.data());
@@ -93,7 +93,7 @@ bool answer(int pipe, const ReadRequest& request, std::size_t most_memory)
                 const std::span<const unsigned char> bytes = message.left();
                 sent = put_answer(pipe, {false, ErrorKind::Fault, bytes.size()}, bytes.data());
             },
-            most_memory);
+            max_memory);
         return sent;
     } catch (const Error& error) {
         return refuse(error.message(), error.kind());
@@ -118,10 +118,10 @@ struct Pipe {
 [[noreturn]] void serve(const Descriptor& requests, const Descriptor& answers)
 {
     ReadRequest request;
-    std::size_t most_memory = 0;  // budget of the requesting process
+    std::size_t max_memory = 0;  // budget of the requesting process
     while (take_text(requests.number(), request.reader) && take_text(requests.number(), request.path) &&
-           take_text(requests.number(), request.what) && take(requests.number(), &most_memory, sizeof most_memory))
-        if (!answer(answers.number(), request, most_memory)) break;
+           take_text(requests.number(), request.what) && take(requests.number(), &max_memory, sizeof max_memory))
+        if (!answer(answers.number(), request, max_memory)) break;
     ::_exit(0);
 }
 
@@ -160,9 +160,9 @@ public:
         {
             const std::lock_guard lock(mutex_);
             const int to = requests_.number(), from = answers_.number();
-            const std::size_t most_memory = memory_of_copy();
+            const std::size_t max_memory = memory_of_copy();
             if (!put_text(to, request.reader) || !put_text(to, request.path) || !put_text(to, request.what) ||
-                !put(to, &most_memory, sizeof most_memory) || !take(from, &header, sizeof header))
+                !put(to, &max_memory, sizeof max_memory) || !take(from, &header, sizeof header))
                 throw Error("can't be read: the reader process has ended");
             bytes = std::make_unique_for_overwrite<unsigned char[]>(header.bytes);
             if (!take(from, bytes.get(), header.bytes)) throw Error("can't be read: the reader process has ended");

@@ -1,8 +1,8 @@
 // A process that reads files on behalf of one that may not start others.
 //
 // It is forked before that process gives up its rights, is confined too, and waits for requests: the names of a reader,
-// a file and a part of it. For each request it forks a copy that reads the file (read_apart.h), and returns the copy's
-// result or error. It ends with the process that it serves.
+// a file and a part of it. For each request it forks a copy that reads the file (read_sandboxed.h), and returns the
+// copy's result or error. It ends with the process that it serves.
 #pragma once
 
 #include <functional>

@@ -27,7 +27,7 @@ std::string unknown(const NodeType& type, const std::string& name)
 {
     const Param* values = type.find("attributes");
     const bool gives_attributes = values && values->type == param_type<std::map<std::string, AttributeValue>>();
-    const std::string made = name == "name" ? "" : text_of_making(name);
+    const std::string made = name == "name" ? "" : advice_for_making(name);
     if (gives_attributes && (known_attribute(name) || conventional_attribute(name)))
         return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name, made);
     const std::vector<std::string> names = type.param_names();

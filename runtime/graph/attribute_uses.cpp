@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "runtime/base/at_node.h"
-#include "runtime/graph/attribute_places.h"
+#include "runtime/graph/attribute_locations.h"
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
 
@@ -71,13 +71,13 @@ std::vector<std::string> AttributeFlow::names_at(std::size_t node) const
 namespace {
 
 // Returns the first location at which a function of the node names the attribute; line 0 if none does.
-Location place_of(const Node& node, const std::string& attribute)
+Location location_of(const Node& node, const std::string& attribute)
 {
     for (const auto& [param, value] : node.arguments) {
         const ObjectPtr* object = value.get<ObjectPtr>();
-        const auto* function = object ? dynamic_cast<const AttributePlaces*>(object->get()) : nullptr;
+        const auto* function = object ? dynamic_cast<const AttributeLocations*>(object->get()) : nullptr;
         if (!function) continue;
-        if (const Location place = function->place_of(attribute); place.line > 0) return place;
+        if (const Location place = function->location_of(attribute); place.line > 0) return place;
     }
     return {};
 }
@@ -90,7 +90,7 @@ int numbers_in(const Node& node, const std::string& attribute)
         const Param* param = reference && reference->name == attribute ? node.type->find(name) : nullptr;
         if (param && param->type == "vec3") return 3;
         const ObjectPtr* object = value.get<ObjectPtr>();
-        const auto* function = object ? dynamic_cast<const AttributePlaces*>(object->get()) : nullptr;
+        const auto* function = object ? dynamic_cast<const AttributeLocations*>(object->get()) : nullptr;
         if (const int numbers = function ? function->numbers_of(attribute) : 0; numbers > 0) return numbers;
     }
     return 1;
@@ -103,7 +103,7 @@ void at_mention(const Node& node, const std::string& attribute, const F& check)
     try {
         check();
     } catch (Error& error) {
-        if (const Location place = place_of(node, attribute); place.line > 0) error.at(place);
+        if (const Location place = location_of(node, attribute); place.line > 0) error.at(place);
         throw;
     }
 }
@@ -236,7 +236,7 @@ private:
     {
         for (const std::string& name : uses.writes)
             if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.written_by, node);
-        for (const std::string& name : uses.gives) add_once(givers_[name], node);
+        for (const std::string& name : uses.gives) add_once(providers_[name], node);
     }
 
     void add_reader(std::size_t node, const Uses& uses)
@@ -245,8 +245,8 @@ private:
             for (const std::string& name : *list)
                 if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.read_by, node);
         for (const auto* list : {&uses.reads_groups, &uses.takes_groups})
-            for (const std::string& name : *list) add_once(takers_[group_prefix + name], node);
-        for (const std::string& name : uses.takes) add_once(takers_[name], node);
+            for (const std::string& name : *list) add_once(consumers_[group_prefix + name], node);
+        for (const std::string& name : uses.takes) add_once(consumers_[name], node);
         if (uses.reads_all) readers_of_all_.push_back(node);
     }
 
@@ -254,20 +254,21 @@ private:
     {
         for (const std::string& name : uses.reads_of_source)
             if (const auto at = found_.find(name); at != found_.end()) add_once(at->second.read_by, node);
-        for (const std::string& name : uses.reads_of_source) add_once(takers_[name], node);
-        for (const std::string& name : uses.takes_of_source) add_once(takers_[name], node);
-        for (const std::string& name : uses.reads_groups_of_source) add_once(takers_[group_prefix + name], node);
+        for (const std::string& name : uses.reads_of_source) add_once(consumers_[name], node);
+        for (const std::string& name : uses.takes_of_source) add_once(consumers_[name], node);
+        for (const std::string& name : uses.reads_groups_of_source) add_once(consumers_[group_prefix + name], node);
     }
 
     // Resolves attributes that are written if something reads them, and read if something else makes them.
     void resolve_conditional_uses()
     {
         for (auto& [name, attribute] : found_) {
-            const bool given = givers_.count(name) && takers_.count(name);
+            const bool given = providers_.count(name) && consumers_.count(name);
             if (given)
-                attribute.written_by.insert(attribute.written_by.end(), givers_[name].begin(), givers_[name].end());
+                attribute.written_by.insert(attribute.written_by.end(), providers_[name].begin(),
+                                            providers_[name].end());
             if (!attribute.is_of_scene()) continue;
-            for (const std::size_t taker : takers_[name]) add_once(attribute.read_by, taker);
+            for (const std::size_t taker : consumers_[name]) add_once(attribute.read_by, taker);
             if (!attribute.made_by.empty())
                 attribute.read_by.insert(attribute.read_by.end(), readers_of_all_.begin(), readers_of_all_.end());
         }
@@ -285,7 +286,7 @@ private:
     const std::size_t simulation_;
     std::set<std::size_t> sources_;  // simulations whose points are merged into this one
     std::map<std::string, PlannedAttribute> found_;
-    std::map<std::string, std::vector<std::size_t>> takers_, givers_;  // nodes of Uses::takes and Uses::gives
+    std::map<std::string, std::vector<std::size_t>> consumers_, providers_;  // nodes of Uses::takes and Uses::gives
     std::vector<std::size_t> readers_of_all_;
 };
 
@@ -373,14 +374,15 @@ bool is_used_before_made(const std::vector<PlannedNode>& nodes, const AttributeF
 std::vector<PlannedAttribute> find_attributes(const std::vector<PlannedNode>& nodes, const AttributeFlow& flow,
                                               std::size_t simulation, const PlanOptions& options)
 {
-    const std::set<std::string> asked(options.attributes.begin(), options.attributes.end());
+    const std::set<std::string> requested(options.attributes.begin(), options.attributes.end());
     std::vector<PlannedAttribute> attributes;
     for (auto& [name, attribute] : UseCollector(nodes, simulation).collect()) {
         const std::string plain = attribute.group ? name.substr(group_prefix.size()) : name;
-        attribute.asked_by_name = asked.count(plain) > 0 && name != "dt";
-        attribute.asked_as_made = options.all_made && !attribute.made_by.empty();
+        attribute.requested_by_name = requested.count(plain) > 0 && name != "dt";
+        attribute.requested_as_made = options.all_made && !attribute.made_by.empty();
         attribute.kept = attribute.always || !attribute.written_by.empty() || !attribute.read_by.empty() ||
-                         attribute.asked_by_name || attribute.asked_as_made || (options.keep_all && name != "dt");
+                         attribute.requested_by_name || attribute.requested_as_made ||
+                         (options.keep_all && name != "dt");
         attribute.used_before_made = is_used_before_made(nodes, flow, attribute);
         attributes.push_back(std::move(attribute));
     }

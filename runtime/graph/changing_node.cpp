@@ -13,9 +13,9 @@
 namespace rapid {
 namespace {
 
-constexpr int most_values = 5;  // values at steps: four give the value and all five its error
-constexpr std::size_t most_used = 4;
-constexpr std::size_t most_coordinates = 3 * 4096;
+constexpr int max_values = 5;  // values at steps: four give the value and all five its error
+constexpr std::size_t max_used = 4;
+constexpr std::size_t max_coordinates = 3 * 4096;
 
 // Adds the numbers of a value, including nested lists. Returns false if it contains anything else.
 bool add_numbers(const Value& value, std::vector<double>& numbers)
@@ -26,7 +26,7 @@ bool add_numbers(const Value& value, std::vector<double>& numbers)
         numbers.insert(numbers.end(), v->data(), v->data() + 3);
     } else if (const Table* table = value.table(); table && table->named.empty() && table->numbered.empty()) {
         for (const Value& entry : table->list)
-            if (numbers.size() >= most_coordinates || !add_numbers(entry, numbers)) return false;
+            if (numbers.size() >= max_coordinates || !add_numbers(entry, numbers)) return false;
     } else {
         return false;
     }
@@ -106,7 +106,7 @@ void FrameCurve::move_to(std::int64_t step, const FrameClock& clock)
     begin_ = step > clock.start ? value_at(step - 1) : value_at(step);
     end_ = value_at(step);
     const std::size_t coordinates = numbers_of(end_).size();
-    const std::int64_t first = std::max(clock.start, step - most_values + 2);
+    const std::int64_t first = std::max(clock.start, step - max_values + 2);
     known_.erase(known_.begin(), known_.lower_bound(first));
     if (step <= clock.start) return;
     if (coordinates == 0) {
@@ -131,7 +131,7 @@ void FrameCurve::move_to(std::int64_t step, const FrameClock& clock)
     for (std::int64_t at = step; at >= first && add(at, before); --at) {
     }
     if (before.size() < 2) return;
-    const std::int64_t last = std::max(step + 1, first + most_values - 1);
+    const std::int64_t last = std::max(step + 1, first + max_values - 1);
     for (std::int64_t at = step + 1; at <= last && add(at, after); ++at) {
     }
     first_ = 2 - static_cast<int>(before.size());
@@ -155,7 +155,7 @@ Value FrameCurve::at(double part, bool finer) const
                      end = values[static_cast<std::size_t>(1 - first_)];
         const double line = begin + part * (end - begin);
         const bool is_curve = values.size() > 2 && !jumps(values);
-        const std::size_t used = finer ? values.size() : std::min(most_used, values.size() - 1);
+        const std::size_t used = finer ? values.size() : std::min(max_used, values.size() - 1);
         const double curve = is_curve ? interpolated(values, first_, used, part) : finer ? end : line;
         numbers.push_back(param_.range.contains(curve) ? curve : line);
     }
@@ -209,7 +209,7 @@ ChangingNode::ChangingNode(const PlannedNode& planned, std::shared_ptr<Simulatio
             curves_.emplace_back(*param, *node.arguments.at(name).function());
 }
 
-std::vector<std::string> ChangingNode::not_followed(const Node& node)
+std::vector<std::string> ChangingNode::ignored_changes(const Node& node)
 {
     std::vector<std::string> names = functions_of_the_frame(node);
     std::erase_if(names, [&](const std::string& name) { return is_followed(node, *node.type->find(name)); });

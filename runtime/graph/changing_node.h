@@ -74,7 +74,7 @@ public:
     void follow(Dynamics& dynamics, std::size_t before, const Evaluation& now);
 
     // Returns the parameters whose changes within a step `follow` ignores.
-    static std::vector<std::string> not_followed(const Node& node);
+    static std::vector<std::string> ignored_changes(const Node& node);
 
 private:
     template <class D>

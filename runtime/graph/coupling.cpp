@@ -13,7 +13,7 @@ namespace {
 // The type of a parameter that takes a function of all points at once (Kernel::set_function_type).
 constexpr std::string_view whole_set_function_type = "function of the points";
 
-constexpr const char* of_place = "may read p.index, the place of a point among all";
+constexpr const char* by_index = "may read p.index, the place of a point among all";
 
 std::vector<CouplingRule>& rules()
 {
@@ -42,15 +42,15 @@ bool reads_whole_set(const PlannedNode& planned, const Param& param)
     const auto argument = planned.node->arguments.find(param.name);
     if (argument == planned.node->arguments.end()) return true;
     const auto function = argument->second.object<PointFunction>();
-    return !function || function->asks_places();
+    return !function || function->reads_indices();
 }
 
-bool asks_places(const PlannedNode& planned)
+bool reads_indices(const PlannedNode& planned)
 {
-    if (const PointEdit* edit = planned.op->as_point_edit(); edit && edit->asks_places()) return true;
+    if (const PointEdit* edit = planned.op->as_point_edit(); edit && edit->reads_indices()) return true;
     return std::any_of(planned.node->arguments.begin(), planned.node->arguments.end(), [](const auto& argument) {
         const auto function = argument.second.template object<PointFunction>();
-        return function && function->asks_places();
+        return function && function->reads_indices();
     });
 }
 
@@ -59,7 +59,7 @@ std::string what_couples(const Plan& plan, const PlannedNode& planned)
     const NodeType& type = *planned.node->type;
     if (const Param* param = whole_set_function_of(type))
         return reads_whole_set(planned, *param) ? "its function is given all points, and reads them" : "";
-    if (asks_places(planned)) return of_place;
+    if (reads_indices(planned)) return by_index;
     if (type.has(Stage::Constraints)) return "its constraints are solved for all points together";
     const CouplingRule* rule = rule_of(type.name);
     std::string what = rule ? rule->couples(plan, planned) : "";

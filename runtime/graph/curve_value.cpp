@@ -40,11 +40,11 @@ PointSet points_in(const Param& param, const Value& value)
 {
     if (const auto points = value.object<PointsObject>()) return points->points;
     if (!value.table()) wrong_type(param, value);
-    std::vector<Vec3f> places;
-    rapid::read_value(param, value, places);
+    std::vector<Vec3f> positions;
+    rapid::read_value(param, value, positions);
     PointSet points;
-    points.append(places.size());
-    points.P() = Column<Vec3f>(std::span<const Vec3f>(places));
+    points.append(positions.size());
+    points.P() = Column<Vec3f>(std::span<const Vec3f>(positions));
     return points;
 }
 
@@ -61,7 +61,7 @@ public:
     {
         const std::lock_guard lock(mutex_);
         const Key key{clock.fps, clock.start, frame};
-        for (const auto& [known, curves] : kept_)
+        for (const auto& [known, curves] : recent_)
             if (known == key) return curves;
         CurvesPtr curves = call(clock.at(static_cast<double>(frame)));
         if (curves->lines()->after != first_->lines()->after)
@@ -69,9 +69,9 @@ public:
                 fmt::format("the function of a curve returned {} points in frame {}, and {} in the first, or other "
                             "lines between them; a curve that deforms keeps its points",
                             curves->points().size(), frame, first_->points().size()));
-        kept_.emplace_front(key, std::move(curves));
-        if (kept_.size() > most_kept) kept_.pop_back();
-        return kept_.front().second;
+        recent_.emplace_front(key, std::move(curves));
+        if (recent_.size() > max_recent) recent_.pop_back();
+        return recent_.front().second;
     }
     bool has(std::int64_t) const override { return true; }
     FrameRange range() const override
@@ -82,7 +82,7 @@ public:
 
 private:
     using Key = std::tuple<double, std::int64_t, std::int64_t>;
-    static constexpr std::size_t most_kept = 8;  // as for the files of a mesh
+    static constexpr std::size_t max_recent = 8;  // as for the files of a mesh
 
     CurvesPtr call(const Frame& frame) const
     {
@@ -101,7 +101,7 @@ private:
     bool closed_;
     CurvesPtr first_;
     mutable std::mutex mutex_;
-    mutable std::deque<std::pair<Key, CurvesPtr>> kept_;  // most recent first
+    mutable std::deque<std::pair<Key, CurvesPtr>> recent_;  // most recent first
 };
 
 }  // namespace
@@ -123,8 +123,8 @@ CurvesPtr curves_of(const PointSet& points, bool closed, const std::string& name
         for (std::size_t k = 0; k < counts.back(); ++k) kept.push_back(first + k);
         first += count;
     }
-    std::vector<Vec3f> places;
-    for (const std::size_t i : kept) places.push_back(points.P()[i]);
+    std::vector<Vec3f> positions;
+    for (const std::size_t i : kept) positions.push_back(points.P()[i]);
     std::map<std::string, Mesh::VertexValues> values;
     for (const auto& [attribute, any] : points.columns()) {
         if (attribute == "P" || attribute == "v" || attribute == "N") continue;
@@ -138,7 +138,7 @@ CurvesPtr curves_of(const PointSet& points, bool closed, const std::string& name
             },
             any);
     }
-    return std::make_shared<Curves>(std::move(places), counts, closed, std::move(values), name);
+    return std::make_shared<Curves>(std::move(positions), counts, closed, std::move(values), name);
 }
 
 ObjectPtr CurveValue::curves(bool closed) const

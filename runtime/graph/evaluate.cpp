@@ -19,7 +19,7 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
       write_(std::move(write)),
       result_(std::move(result)),
       next_(plan.first_frame()),
-      kept_(plan.nodes.size())
+      constant_results_(plan.nodes.size())
 {
     subframes_ = plan.simulations.front().subframes;
     for (const PlannedSimulation& planned : plan.simulations) {
@@ -30,7 +30,7 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
         simulation->seed = planned.seed;
         if (planned.recorded) simulation->record = std::make_shared<StepRecord>();
         for (const PlannedNode& node : plan.nodes)
-            if (auto names = ChangingNode::not_followed(*node.node); !names.empty())
+            if (auto names = ChangingNode::ignored_changes(*node.node); !names.empty())
                 simulation->varying[node.node->name] = std::move(names);
         simulations_.push_back(std::move(simulation));
     }
@@ -45,14 +45,14 @@ Evaluator::Evaluator(const Plan& plan, WriteHook write, ResultHook result)
 
 Evaluator::~Evaluator() = default;
 
-void Evaluator::leave_out_errors()
+void Evaluator::disable_error_estimates()
 {
     for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->estimates_errors = false;
 }
 
-void Evaluator::tell_points()
+void Evaluator::add_per_point_diagnostics()
 {
-    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->tells_points = true;
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->per_point_diagnostics = true;
 }
 
 FrameResult Evaluator::advance()
@@ -88,7 +88,7 @@ FrameFigures Evaluator::examine()
     const FrameFigures found = advance().figures;
     const std::int64_t start = next_ - 2;
     std::uint64_t idle = found.idle;
-    for (std::int64_t after = 2; idle > 0 && after <= most_tried; after *= 2) {
+    for (std::int64_t after = 2; idle > 0 && after <= max_tried; after *= 2) {
         next_ = start + after;
         idle = advance().figures.idle;
     }
@@ -199,7 +199,7 @@ public:
             write_ = [&](const std::string& pattern, const PointSet& points) {
                 PointSet written = points;
                 const auto node = static_cast<std::size_t>(&planned - evaluator.plan_.nodes.data());
-                for (const std::string& name : evaluator.plan_.unasked_columns(node)) written.remove(name);
+                for (const std::string& name : evaluator.plan_.unrequested_columns(node)) written.remove(name);
                 evaluator.write_(pattern, written, now_, simulation_.fps);
             };
         // A simulation that begins at the end of this frame, or later, counts its figures once.
@@ -207,7 +207,7 @@ public:
         evaluation.emplace(Evaluation{
             now_, at_start, planned.node->name, planned.node->location, RandomKey(simulation_.seed, planned.node->name),
             left > 0 && at_start ? repeated_ : frame.figures, frame.warnings, write_,
-            &evaluator.plan_.simulations[planned.simulation].left_out, ranges_for_solve(planned), planned.in_loop});
+            &evaluator.plan_.simulations[planned.simulation].pruned, ranges_for_solve(planned), planned.in_loop});
     }
     Context(const Context&) = delete;
     Context& operator=(const Context&) = delete;
@@ -227,7 +227,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
 {
     const PlannedNode& planned = plan_.nodes[first];
     const Node& node = *planned.node;
-    if (kept_[first]) return *kept_[first];
+    if (constant_results_[first]) return *constant_results_[first];
 
     std::vector<Flow> inputs;
     for (const std::size_t input : planned.inputs)
@@ -238,7 +238,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
 
     const Context context(*this, planned, left, frame);
     const Evaluation& evaluation = *context.evaluation;
-    const Cancellation::Place place(node.name, node.location);
+    const Cancellation::NodeScope scope(node.name, node.location);
     return at_node(node.name, node.location, [&] {
         if (input_) input_(node, evaluation.frame, inputs);
         const double begin = frame_clock_.seconds();
@@ -263,7 +263,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
             if (kind == NodeKind::Solve) undeclared->restore(simulations_[planned.simulation]->state);
         }
         add_work(first, last, begin, scripts_before, result.points, frame);
-        if (planned.once) kept_[first] = result;
+        if (planned.once) constant_results_[first] = result;
         if (result_) result_(node, next_, result.points);
         Cancellation::check_current();  // checks the memory that this node has taken
         return result;

@@ -68,10 +68,10 @@ public:
 
     // Disables error estimates, which take up to twice the time of Solve, for runs that do not report them. With a
     // tolerance, the results are identical.
-    void leave_out_errors();
+    void disable_error_estimates();
     // Adds the attributes of PointFigures to points after a Solve: each point's estimated error, substeps and sleep
     // state. They are meant for inspection, and nodes after a Solve see them, too.
-    void tell_points();
+    void add_per_point_diagnostics();
 
     // Makes `input` receive the flow that enters each node. Nodes are then evaluated one by one.
     void watch_inputs(InputHook input) { input_ = std::move(input); }
@@ -85,7 +85,7 @@ public:
     FrameResult advance();
 
     // Examines stiffness and resolution in the first frame after the start, for a few newborn and the initial points,
-    // which Solve does not move. If an emitter emits nothing in that frame, later ones are tried, at most most_tried
+    // which Solve does not move. If an emitter emits nothing in that frame, later ones are tried, at most max_tried
     // frames away: their points also go through the kernels. The evaluator cannot be used afterwards. Throws Error as
     // advance() does.
     FrameFigures examine();
@@ -98,7 +98,7 @@ public:
     void load(const Snapshot& snapshot);
 
 private:
-    static constexpr std::int64_t most_tried = 64;  // frames after the start
+    static constexpr std::int64_t max_tried = 64;  // frames after the start
 
     void evaluate_constants(const Snapshot& snapshot);
     bool adopts_once(std::size_t node) const;
@@ -130,7 +130,7 @@ private:
     int subframes_ = 1;  // of all simulations
     bool checks_declarations_ = false;
     std::vector<std::shared_ptr<Simulation>> simulations_;
-    std::vector<std::optional<Flow>> kept_;                // results of nodes that are evaluated once, by node
+    std::vector<std::optional<Flow>> constant_results_;    // results of nodes that are evaluated once, by node
     std::vector<std::unique_ptr<ChangingNode>> changing_;  // by node; null if no parameter is a function of the frame
 };
 

@@ -32,14 +32,14 @@ struct Evaluation {
     // Writes a set to a file; empty if nothing may be written (check, explain, test).
     const std::function<void(const std::string& pattern, const PointSet& points)>& write;
     // Attributes and groups that the plan prunes from this simulation (PlannedAttribute); null: none.
-    const std::set<std::string>* left_out = nullptr;
+    const std::set<std::string>* pruned = nullptr;
     // Ranges of the attributes that a node reads for Solve: those of its parameters, and known ones.
     std::vector<AttributeRange> ranges = {};
     // The node is between a Create and its Solve: the next frame starts with the points that this Solve leaves.
     bool is_fed_back = true;
 
     // Returns true if a node that makes this attribute or group should make it.
-    bool keeps(const std::string& name) const { return !left_out || !left_out->count(name); }
+    bool keeps(const std::string& name) const { return !pruned || !pruned->count(name); }
     bool keeps_group(const std::string& name) const { return keeps(group_prefix + name); }
 };
 

@@ -62,8 +62,8 @@ std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)
     std::vector<std::string> reasons;
     if (!attribute.read_by.empty()) reasons.push_back(done_by(plan, attribute.read_by, "read"));
     if (!attribute.written_by.empty()) reasons.push_back(done_by(plan, attribute.written_by, "write"));
-    if (attribute.asked_by_name) reasons.push_back("an output asks for it");
-    if (attribute.asked_as_made && attribute.read_by.empty() && attribute.written_by.empty())
+    if (attribute.requested_by_name) reasons.push_back("an output asks for it");
+    if (attribute.requested_as_made && attribute.read_by.empty() && attribute.written_by.empty())
         reasons.push_back(done_by(plan, attribute.made_by, "make") + ", and an output takes all that is made");
     if (attribute.kept_for_merge) reasons.push_back("its points are merged with others that have it");
     if (reasons.empty()) reasons.push_back("nothing is left out");
@@ -78,16 +78,16 @@ std::string what_brings_in(const PlannedAttribute& attribute)
         return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or {1} FILE:{0}", name,
                            name_of(Setting::Output));
     }
-    return usual_way_in(attribute.name);
+    return usual_way_to_keep(attribute.name);
 }
 
 // Returns the calls per frame: functions of Solves and of nodes upstream of them are called for each subframe.
-int calls_a_frame(const Plan& plan, const PlannedNode& planned)
+int calls_per_frame(const Plan& plan, const PlannedNode& planned)
 {
     return planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
 }
 
-std::string times_a_frame(int times) { return times > 1 ? fmt::format("{} times a frame", times) : "once a frame"; }
+std::string times_per_frame(int times) { return times > 1 ? fmt::format("{} times a frame", times) : "once a frame"; }
 
 // Returns the treatment of a function of the frame between its calls.
 std::string between_calls(const PlannedNode& planned, const Param& param)
@@ -117,12 +117,12 @@ void explain_functions(const Plan& plan, const PlannedNode& planned, Explanation
                  "called between frames, until pieces of the path are within 1e-5 of its length"});
         else
             result.functions.push_back(
-                {full, times_a_frame(calls_a_frame(plan, planned)), between_calls(planned, *param)});
+                {full, times_per_frame(calls_per_frame(plan, planned)), between_calls(planned, *param)});
     }
 }
 
 template <class T>
-void put_kept_first(std::vector<T>& all)
+void sort_kept_first(std::vector<T>& all)
 {
     std::stable_partition(all.begin(), all.end(), [](const T& one) { return one.kept; });
 }
@@ -136,7 +136,7 @@ std::size_t Explanation::bytes_per_point() const
     return bytes;
 }
 
-std::string usual_way_in(const std::string& attribute)
+std::string usual_way_to_keep(const std::string& attribute)
 {
     return fmt::format("p.{0} in a kernel, rapid.attr \"{0}\", or {1} FILE:{0}", attribute, name_of(Setting::Output));
 }
@@ -145,7 +145,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
 {
     Explanation result;
     for (const PlannedNode& planned : plan.nodes) {
-        const int times = calls_a_frame(plan, planned);
+        const int times = calls_per_frame(plan, planned);
         const std::string why = plan.outputs.size() == 1 ? "reached from the output"
                                                          : fmt::format("reached from the output{} {}",
                                                                        planned.reached_from.size() == 1 ? "" : "s",
@@ -157,7 +157,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
                                 why, planned.changes});
         explain_functions(plan, planned, result);
     }
-    for (const NodePtr& node : plan.left_out)
+    for (const NodePtr& node : plan.pruned)
         result.nodes.push_back({node->name, node->type->name, false, "never", "no output comes from it", ""});
 
     for (const PlannedSimulation& simulation : plan.simulations)
@@ -167,7 +167,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
                  attribute.kept ? attribute.bytes_per_point() : 0,
                  attribute.kept ? why_kept(plan, attribute) : "no node reads it and no output asks for it",
                  attribute.kept ? std::string() : what_brings_in(attribute)});
-    put_kept_first(result.attributes);
+    sort_kept_first(result.attributes);
 
     for (const StageWords& words : stage_words) {
         std::vector<std::string> users;
@@ -179,7 +179,7 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
                                  users.empty() ? fmt::format(fmt::runtime(words.absent), name_of(Setting::Output))
                                                : fmt::format("{}", fmt::join(users, ", "))});
     }
-    put_kept_first(result.stages);
+    sort_kept_first(result.stages);
 
     for (const std::vector<std::size_t>& pass : plan.passes()) {
         std::vector<std::string>& names = result.passes.emplace_back();

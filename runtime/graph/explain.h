@@ -56,7 +56,7 @@ struct Explanation {
 };
 
 // Returns the usual way to make a pruned attribute live.
-std::string usual_way_in(const std::string& attribute);
+std::string usual_way_to_keep(const std::string& attribute);
 
 // outputs: files that the run writes in addition to those of `:write` nodes, as named by the user.
 Explanation explain(const Plan& plan, const std::vector<std::string>& outputs);

@@ -13,23 +13,23 @@
 namespace rapid {
 namespace {
 
-const Node& find_node(const Graph& graph, const std::string& path, const std::string& wanted)
+const Node& find_node(const Graph& graph, const std::string& path, const std::string& target)
 {
     std::vector<std::string> names, of_type;
     const Node* found = nullptr;
     for (const NodePtr& node : graph.nodes) {
-        if (node->name == wanted) return *node;
+        if (node->name == target) return *node;
         names.push_back(node->name);
-        if (node->type->name != wanted) continue;
+        if (node->type->name != target) continue;
         of_type.push_back(node->name);
         found = node.get();
     }
     if (of_type.size() == 1) return *found;
     if (of_type.size() > 1)
-        throw Error(fmt::format("{}: {} nodes are of the type {}; name one of {}", path, of_type.size(), wanted,
+        throw Error(fmt::format("{}: {} nodes are of the type {}; name one of {}", path, of_type.size(), target,
                                 fmt::join(of_type, ", ")));
     for (const NodePtr& node : graph.nodes) names.push_back(node->type->name);
-    throw Error(fmt::format("{}: the graph has no node \"{}\"{}", path, wanted, did_you_mean(wanted, names)));
+    throw Error(fmt::format("{}: the graph has no node \"{}\"{}", path, target, did_you_mean(target, names)));
 }
 
 // Returns the graph with copies of its nodes, connected to each other. Calls change(copy, node) for each.
@@ -75,7 +75,7 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
     });
 }
 
-Graph with_names_apart(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed)
+Graph with_unique_names(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed)
 {
     std::set<const Node*> reached;
     std::vector<const Node*> open;

@@ -17,6 +17,6 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
 
 // Renames nodes for which `may_be_renamed` is true if an earlier node that an output reaches has the same name. The
 // new name has the next free number: k, k2, k3.
-Graph with_names_apart(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed);
+Graph with_unique_names(const Graph& graph, const std::function<bool(const Node&)>& may_be_renamed);
 
 }  // namespace rapid

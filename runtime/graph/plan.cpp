@@ -31,16 +31,16 @@ bool names(const std::vector<std::string>& list, std::string_view name)
     return std::find(list.begin(), list.end(), name) != list.end();
 }
 
-bool comes(const PlannedSimulation& simulation, std::string_view name)
+bool is_provided(const PlannedSimulation& simulation, std::string_view name)
 {
     const PlannedAttribute* attribute = simulation.find(name);
     return attribute && (!attribute->made_by.empty() || !attribute->written_by.empty());
 }
 
-bool comes_to(const Plan& plan, const PlannedNode& reader, std::string_view name)
+bool is_provided_to(const Plan& plan, const PlannedNode& reader, std::string_view name)
 {
     return std::any_of(reader.carries.begin(), reader.carries.end(),
-                       [&](std::size_t simulation) { return comes(plan.simulations[simulation], name); });
+                       [&](std::size_t simulation) { return is_provided(plan.simulations[simulation], name); });
 }
 
 // Warns of nodes whose result is unused. Chains that are unused as a whole, or end in a Solve, are assumed to be
@@ -54,11 +54,11 @@ void warn_of_dropped_nodes(const Graph& graph, const Plan& plan, std::vector<std
             if (const auto source = value.object<NodeHandle>()) taken.insert(source->node.get());
     }
     for (const PlannedNode& planned : plan.nodes) reached.insert(planned.node.get());
-    for (const NodePtr& node : plan.left_out) {
+    for (const NodePtr& node : plan.pruned) {
         const std::string& type = node->type->name;
         const bool ends = node->type->kind == NodeKind::Solve || node->inputs.empty();
-        const bool is_told = type == "write" || type == "rasterize";  // by the plan
-        if (ends || is_told || taken.count(node.get()) || !reached.count(node->inputs.front().get())) continue;
+        const bool is_reported = type == "write" || type == "rasterize";  // by the plan
+        if (ends || is_reported || taken.count(node.get()) || !reached.count(node->inputs.front().get())) continue;
         warnings.push_back(warning_of(
             *node,
             fmt::format("leads to no output, as its result is dropped; keep it: chain = chain:{} {{ ... }}", type)));
@@ -73,7 +73,7 @@ void warn_of_missing_lives(const Plan& plan, std::vector<std::string>& warnings)
         const auto is_script = [](const auto& argument) { return argument.second.template object<PointFunction>(); };
         if (std::none_of(arguments.begin(), arguments.end(), is_script)) continue;
         const std::vector<std::string> reads = uses_of(planned).reads;
-        if (!names(reads, "age") || !names(reads, "life") || comes_to(plan, planned, "life")) continue;
+        if (!names(reads, "age") || !names(reads, "life") || is_provided_to(plan, planned, "life")) continue;
         warnings.push_back(
             warning_of(*planned.node, "its points live for ever, so their age is no part of a life; give emit a life"));
     }
@@ -158,7 +158,7 @@ void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& 
 
 // Returns warnings, with advice, about nodes whose result is dropped, that wait for something that never comes, or
 // that make something unused. plan: the plan of the graph, after its attributes are found.
-std::vector<std::string> doubts_about(const Graph& graph, const Plan& plan)
+std::vector<std::string> warnings_about(const Graph& graph, const Plan& plan)
 {
     std::vector<std::string> warnings;
     warn_of_dropped_nodes(graph, plan, warnings);
@@ -212,7 +212,7 @@ std::vector<NodePtr> sources_of(const Node& node)
 std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
                                        const std::vector<PlannedSimulation>& simulations)
 {
-    const auto comes = [&](std::size_t simulation, const char* name) {
+    const auto is_provided = [&](std::size_t simulation, const char* name) {
         const PlannedAttribute& hit = *simulations[simulation].find(name);
         return !hit.made_by.empty() || !hit.written_by.empty();
     };
@@ -220,10 +220,10 @@ std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
     for (std::size_t s = 0; s < simulations.size(); ++s)
         for (const char* name : Hits::names) {
             const PlannedAttribute& hit = *simulations[s].find(name);
-            if (hit.read_by.empty() || comes(s, name)) continue;
+            if (hit.read_by.empty() || is_provided(s, name)) continue;
             const PlannedNode& reader = nodes[hit.read_by.front()];
             const bool comes_elsewhere = std::any_of(reader.carries.begin(), reader.carries.end(),
-                                                     [&](std::size_t other) { return comes(other, name); });
+                                                     [&](std::size_t other) { return is_provided(other, name); });
             if (comes_elsewhere) continue;
             warnings.insert(
                 fmt::format("{}:{}: node \"{}\": reads {}, which no collider writes; give a :collide record = true",
@@ -262,9 +262,9 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     keep_for_merges(nodes, simulations);
     for (PlannedSimulation& simulation : simulations)
         for (const PlannedAttribute& attribute : simulation.attributes)
-            if (!attribute.kept && attribute.name != "dt") simulation.left_out.insert(attribute.name);
+            if (!attribute.kept && attribute.name != "dt") simulation.pruned.insert(attribute.name);
     for (const std::string& warning : reads_of_no_hits(nodes, simulations)) warnings.push_back(warning);
-    for (const std::string& warning : doubts_about(graph, *this)) warnings.push_back(warning);
+    for (const std::string& warning : warnings_about(graph, *this)) warnings.push_back(warning);
 }
 
 // Collects the nodes reached from the outputs, in order of creation: inputs come first.
@@ -316,7 +316,7 @@ void Plan::collect_nodes(const Graph& graph)
 
     for (const NodePtr& node : graph.nodes) {
         if (reached.count(node->serial)) continue;
-        left_out.push_back(node);
+        pruned.push_back(node);
         if (node->type->name == "write" || node->type->name == "rasterize")
             warnings.push_back(
                 fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
@@ -328,12 +328,12 @@ void Plan::collect_nodes(const Graph& graph)
 // warning per simulation, about the first such node.
 void Plan::warn_of_idle_nodes()
 {
-    std::set<std::size_t> told;
+    std::set<std::size_t> reported;
     for (const PlannedNode& planned : nodes) {
         const Node& node = *planned.node;
         const bool is_dynamic = node.type->kind == NodeKind::Dynamic;
         if (planned.in_loop || (!is_dynamic && !node.type->has(Stage::Emission))) continue;
-        if (!told.insert(planned.simulation).second) continue;
+        if (!reported.insert(planned.simulation).second) continue;
         warnings.push_back(
             fmt::format("{}:{}: node \"{}\": {}: no :solve comes after it; end the chain with :solve {{}}",
                         node.location.file, node.location.line, node.name,
@@ -490,7 +490,7 @@ std::set<std::string> Plan::names_of_scene() const
     return names;
 }
 
-std::set<std::string> Plan::unasked_columns(std::size_t node) const
+std::set<std::string> Plan::unrequested_columns(std::size_t node) const
 {
     std::set<std::string> names;
     for (const PlannedAttribute& attribute : simulations[nodes[node].simulation].attributes)
@@ -507,7 +507,7 @@ std::size_t Plan::last_together(std::size_t first) const
         if (last + 1 == nodes.size() || nodes[last + 1].inputs != std::vector{last}) return last;
         const PlannedNode &before = nodes[last], &after = nodes[last + 1];
         edit = after.op->as_point_edit();
-        if (!edit || (removed && edit->asks_places())) return last;
+        if (!edit || (removed && edit->reads_indices())) return last;
         if (before.consumers > 1 || before.in_loop != after.in_loop || before.once || after.once) return last;
     }
     return first;
@@ -574,7 +574,7 @@ std::vector<AttributeSpec> Plan::columns_of(std::size_t simulation) const
             columns.push_back(*known_attribute(attribute.name));
     }
     std::erase_if(columns,
-                  [&](const AttributeSpec& spec) { return simulations[simulation].left_out.count(spec.name) > 0; });
+                  [&](const AttributeSpec& spec) { return simulations[simulation].pruned.count(spec.name) > 0; });
     return columns;
 }
 
@@ -586,9 +586,8 @@ std::vector<std::string> Plan::groups_of(std::size_t simulation) const
         const Uses uses = uses_of(planned);
         groups.insert(uses.makes_groups.begin(), uses.makes_groups.end());
     }
-    std::erase_if(groups, [&](const std::string& name) {
-        return simulations[simulation].left_out.count(group_prefix + name) > 0;
-    });
+    std::erase_if(
+        groups, [&](const std::string& name) { return simulations[simulation].pruned.count(group_prefix + name) > 0; });
     return {groups.begin(), groups.end()};
 }
 

@@ -40,8 +40,8 @@ struct PlannedAttribute {
     bool group = false;
     bool always = false;  // P, v, id
     std::vector<std::size_t> made_by, written_by, read_by;
-    bool asked_by_name = false;  // by an output
-    bool asked_as_made = false;  // by an output that takes all that the scene makes
+    bool requested_by_name = false;  // by an output
+    bool requested_as_made = false;  // by an output that takes all that the scene makes
     bool kept = false;
     bool kept_for_merge = false;    // only for the set into which the points of this simulation are merged
     bool used_before_made = false;  // known attribute: used by a node before the nodes that make it
@@ -59,7 +59,7 @@ struct PlannedSimulation {
     std::uint64_t seed = 0;
     bool recorded = false;                     // Solve stores the events of a step, for emitters
     std::vector<PlannedAttribute> attributes;  // all that are known or made, in order of name
-    std::set<std::string> left_out;            // names of pruned attributes
+    std::set<std::string> pruned;              // names of pruned attributes
 
     const PlannedAttribute* find(std::string_view name) const;
 };
@@ -90,7 +90,7 @@ public:
     std::vector<PlannedNode> nodes;
     std::vector<PlannedSimulation> simulations;
     std::map<std::string, std::size_t> outputs;  // index into `nodes` by name
-    std::vector<NodePtr> left_out;               // nodes that no output depends on
+    std::vector<NodePtr> pruned;                 // nodes that no output depends on
     bool keeps_all = false;
     bool keeps_steps = false;
     std::vector<std::string> warnings;  // about doubtful graphs, e.g. a write node that is not reached
@@ -114,7 +114,7 @@ public:
 
     // Returns the columns of a node's result that its output did not request: another output requests them by name,
     // other points have them, or nothing is pruned.
-    std::set<std::string> unasked_columns(std::size_t node) const;
+    std::set<std::string> unrequested_columns(std::size_t node) const;
 
     // Returns the earliest first frame of the simulations.
     std::int64_t first_frame() const;

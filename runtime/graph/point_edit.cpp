@@ -23,7 +23,7 @@ void Stretch::remove(std::span<const std::uint8_t> marks) const
                    [](std::uint8_t mark, std::uint8_t here) -> std::uint8_t { return here & ~mark; });
 }
 
-void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove)
+void run_passes(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove)
 {
     if (passes.empty() || points.empty()) return;
     std::size_t chunk = 0;
@@ -57,8 +57,8 @@ void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points
 Flow PointEdit::evaluate(std::span<Flow> inputs, const Evaluation& now)
 {
     const PointEdit* const self = this;
-    const Evaluation* const told = &now;
-    edit_together({&self, 1}, {&told, 1}, inputs[0].points);
+    const Evaluation* const evaluation = &now;
+    edit_together({&self, 1}, {&evaluation, 1}, inputs[0].points);
     return std::move(inputs[0]);
 }
 
@@ -75,7 +75,7 @@ void edit_together(std::span<const PointEdit* const> edits, std::span<const Eval
             before.edits = true;
             before.removals |= edits[k]->removes_points();
         });
-    go_over(passes, points, before.removals);
+    run_passes(passes, points, before.removals);
     if (std::any_of(passes.begin(), passes.end(), [](const auto& pass) { return pass->is_script(); }))
         now.front()->figures.script_seconds += stopwatch.seconds();
 }

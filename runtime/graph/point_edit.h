@@ -46,7 +46,7 @@ public:
 
 // Applies the passes to the points, in parallel, and removes marked points. Throws the Error of the first failing
 // pass, at its first failing point, with its node.
-void go_over(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove);
+void run_passes(std::span<const std::unique_ptr<EditPass>> passes, PointSet& points, bool remove);
 
 // The earlier edits among those fused with an edit.
 struct Before {
@@ -63,15 +63,15 @@ public:
     virtual bool removes_points() const = 0;
     // Returns true if it may read indices in the set (p.index). It is then not fused with an earlier edit that removes
     // points.
-    virtual bool asks_places() const = 0;
+    virtual bool reads_indices() const = 0;
 
     const PointEdit* as_point_edit() const override { return this; }
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now) override;
     Flow start(std::span<Flow> inputs, const Evaluation&) override { return std::move(inputs[0]); }
 };
 
-// The operator of a node whose struct has prepare(); removes_points() and asks_places() are needed only if they may be
-// true.
+// The operator of a node whose struct has prepare(); removes_points() and reads_indices() are needed only if they may
+// be true.
 template <class T>
 class PointEditOf : public PointEdit {
 public:
@@ -87,9 +87,9 @@ public:
         if constexpr (requires { fields_.removes_points(); }) return fields_.removes_points();
         return false;
     }
-    bool asks_places() const override
+    bool reads_indices() const override
     {
-        if constexpr (requires { fields_.asks_places(); }) return fields_.asks_places();
+        if constexpr (requires { fields_.reads_indices(); }) return fields_.reads_indices();
         return false;
     }
     void uses(Uses& uses) const override
@@ -108,7 +108,7 @@ private:
 };
 
 // Applies fused edits in order; now: the context of each. The result is bit-identical to applying one edit after the
-// other. Throws Error as go_over() does.
+// other. Throws Error as run_passes() does.
 void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
 
 }  // namespace rapid

@@ -33,7 +33,7 @@ public:
     virtual void uses(Uses& uses) const = 0;
     // Returns true if it may read a point's index in the set; for a function of all points at once, if it may read any
     // point.
-    virtual bool asks_places() const = 0;
+    virtual bool reads_indices() const = 0;
 
     // Creates the test. The set and `now` must outlive it.
     virtual std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const = 0;

@@ -27,8 +27,9 @@ public:
     std::int64_t of(std::int64_t id, std::int64_t& next)
     {
         if (last_ < runs_.size() && runs_[last_].holds(id)) return runs_[last_].of(id);
-        const auto after = std::upper_bound(runs_.begin(), runs_.end(), id,
-                                            [](std::int64_t wanted, const Run& run) { return wanted < run.first; });
+        const auto after = std::upper_bound(runs_.begin(), runs_.end(), id, [](std::int64_t requested, const Run& run) {
+            return requested < run.first;
+        });
         if (after != runs_.begin()) {
             Run& before = *(after - 1);
             last_ = static_cast<std::size_t>(after - runs_.begin()) - 1;
@@ -75,7 +76,7 @@ struct Simulation {
     bool trial = false;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
     bool estimates_errors = true;                             // if false, Solve estimates none
-    bool tells_points = false;  // Solve stores per-point figures as attributes (solve/step_observers.cpp)
+    bool per_point_diagnostics = false;  // Solve stores per-point figures as attributes (solve/step_observers.cpp)
 
     FrameClock clock() const { return {fps, start, subframes}; }
     Frame frame(std::int64_t step) const { return clock().at_step(step); }

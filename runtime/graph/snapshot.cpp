@@ -16,7 +16,7 @@ namespace {
 
 // Serialization of a simulation (points/state_archive.h): its points, the ids given, and the events of the last step.
 
-constexpr std::int64_t most_ids = std::int64_t{1} << 53;
+constexpr std::int64_t max_ids = std::int64_t{1} << 53;
 
 // Returns true if the points have unique ids below next_id.
 bool have_ids_below(const PointSet& points, std::int64_t next_id)
@@ -64,7 +64,7 @@ void serialize(Archive& keep, Simulation& simulation)
     keep(simulation.next_id, simulation.state, simulation.first_new);
     if (simulation.record) keep(*simulation.record);
     if constexpr (Archive::is_loading::value) {
-        StateReader::expect(0 <= simulation.next_id && simulation.next_id <= most_ids);
+        StateReader::expect(0 <= simulation.next_id && simulation.next_id <= max_ids);
         StateReader::expect(have_ids_below(simulation.state, simulation.next_id));
         if (!simulation.record) return;
         for (const PointSet* set : {&simulation.record->before, &simulation.record->killed, &simulation.record->old})
@@ -88,7 +88,7 @@ Snapshot Evaluator::save() const
         snapshot.simulations[plan_.simulations[s].create->name] = state_of(*simulations_[s]);
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) {
         const std::string& name = plan_.nodes[i].node->name;
-        if (adopts_once(i)) snapshot.constants[name] = state_of(kept_[i]->points);
+        if (adopts_once(i)) snapshot.constants[name] = state_of(constant_results_[i]->points);
         const auto* op = dynamic_cast<const Stateful*>(plan_.nodes[i].op.get());
         if (!op) continue;
         StateWriter writer;
@@ -145,14 +145,14 @@ void Evaluator::evaluate_constants(const Snapshot& snapshot)
         const auto saved = snapshot.constants.find(plan_.nodes[i].node->name);
         if (saved == snapshot.constants.end()) StateReader::fail();
         restore(results[i].points, saved->second);
-        kept_[i] = results[i];
+        constant_results_[i] = results[i];
     }
 }
 
 // Returns true if the result never changes but contains ids that other points were given before.
 bool Evaluator::adopts_once(std::size_t node) const
 {
-    return kept_[node] && plan_.nodes[node].node->type->kind == NodeKind::Merge;
+    return constant_results_[node] && plan_.nodes[node].node->type->kind == NodeKind::Merge;
 }
 
 }  // namespace rapid

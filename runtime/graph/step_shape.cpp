@@ -196,7 +196,7 @@ ShapePtr sequence_in_step(const LevelSetSequence& sequence, const Step& step)
 }
 
 // A shape far away, for intervals in which a sequence has no data.
-class Nowhere final : public Shape {
+class EmptyShape final : public Shape {
 public:
     Box3d bounds() const override { return Box3d(); }
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
@@ -215,7 +215,7 @@ ShapePtr shape_in_step(const ObjectPtr& object, const Step& step)
 {
     if (const auto sequence = std::dynamic_pointer_cast<const LevelSetSequence>(object)) {
         const ShapePtr shape = sequence_in_step(*sequence, step);
-        return shape ? shape : std::make_shared<Nowhere>();
+        return shape ? shape : std::make_shared<EmptyShape>();
     }
     if (const auto shape = std::dynamic_pointer_cast<const AnimatedShape>(object)) return rigid_in_step(*shape, step);
     if (const auto body = std::dynamic_pointer_cast<const DeformingLevelSet>(object))
@@ -280,7 +280,7 @@ Value in_step(const Param& param, const Value& value, const FrameClock& clock, c
 
 bool differs_by_step(const Param& param, const Value& value)
 {
-    if (const StepShapeUser* user = user_in(value)) return user->asks_moving_shapes();
+    if (const StepShapeUser* user = user_in(value)) return user->queries_moving_shapes();
     const ObjectPtr* object = value.get<ObjectPtr>();
     if (!object || !*object) return false;
     if (takes_step_curves(param) && (*object)->varies()) return true;

@@ -10,7 +10,7 @@ class StepShapeUser {
 public:
     virtual ~StepShapeUser() = default;
 
-    virtual bool asks_moving_shapes() const = 0;
+    virtual bool queries_moving_shapes() const = 0;
     // Begins the step that ends at `frame`. Must be called on one thread. Throws the Error of a motion, or of a file
     // of a sequence.
     virtual void begin_step(const FrameClock& clock, const Frame& frame) const = 0;

@@ -103,8 +103,8 @@ bool is_poisoned(const AnyColumn& any)
     if (const auto* floats = std::get_if<Column<float>>(&any)) return holds(*floats, is_poison);
     if (const auto* vectors = std::get_if<Column<Vec3f>>(&any))
         return holds(*vectors, [&](const Vec3f& x) { return is_poison(x[0]) || is_poison(x[1]) || is_poison(x[2]); });
-    if (const auto* texts = std::get_if<Column<Token>>(&any))
-        return holds(*texts, [](Token x) { return x == poison_token(); });
+    if (const auto* strings = std::get_if<Column<Token>>(&any))
+        return holds(*strings, [](Token x) { return x == poison_token(); });
     return false;
 }
 

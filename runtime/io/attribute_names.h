@@ -12,7 +12,7 @@
 namespace rapid {
 
 inline constexpr std::string_view group_prefix = "group_";
-inline constexpr std::size_t most_numbers = 16;  // per point in an array; larger arrays are not read as attributes
+inline constexpr std::size_t max_numbers = 16;  // per point in an array; larger arrays are not read as attributes
 
 // Returns the number of components of the type: 1, 3 or 4.
 std::size_t component_count(AttributeType type);

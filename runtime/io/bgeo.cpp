@@ -19,7 +19,7 @@
 #include <map>
 
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/point_file.h"
@@ -148,20 +148,20 @@ void check_count(std::size_t points)
 // The points in the form of records: strings are replaced by their index, an int32.
 struct Recorded {
     PointSet points;
-    std::map<std::string, std::vector<Token>> texts;  // strings of each attribute, by index
+    std::map<std::string, std::vector<Token>> strings;  // strings of each attribute, by index
 };
 
 Recorded recorded(const PointSet& points)
 {
     Recorded result{points, {}};
-    for (const std::string& name : names_of_texts(points)) {
+    for (const std::string& name : string_column_names(points)) {
         TextTable table = text_table(points.column<Token>(name));
-        for (const Token text : table.texts)
+        for (const Token text : table.strings)
             if (text.text().size() > longest_text)
                 throw Error(fmt::format("the attribute \"{}\" has a text of {} bytes; .bgeo holds at most {}", name,
                                         text.text().size(), longest_text));
-        result.points.set(name, std::move(table.places));
-        result.texts[name] = std::move(table.texts);
+        result.points.set(name, std::move(table.indices));
+        result.strings[name] = std::move(table.strings);
     }
     return result;
 }
@@ -179,10 +179,10 @@ std::string header_section(const Recorded& recorded, const std::vector<std::stri
         const AnyColumn& column = *points.find(name);
         header.string(name);
         header.int16(component_count(type_of(column)));
-        if (const auto texts = recorded.texts.find(name); texts != recorded.texts.end()) {
+        if (const auto strings = recorded.strings.find(name); strings != recorded.strings.end()) {
             header.int32(IndexType);
-            header.int32(texts->second.size());
-            for (const Token text : texts->second) header.string(text.text());
+            header.int32(strings->second.size());
+            for (const Token text : strings->second) header.string(text.text());
             continue;
         }
         header.int32(houdini_type(name, type_of(column)));
@@ -260,7 +260,7 @@ private:
 // A stream supports no strings, because they precede the points that use them.
 std::unique_ptr<PointStream> stream_bgeo(OutputFile& file, const PointSet& like)
 {
-    if (!names_of_texts(like).empty()) return nullptr;
+    if (!string_column_names(like).empty()) return nullptr;
     return std::make_unique<BgeoStream>(file, like);
 }
 
@@ -298,8 +298,8 @@ private:
 struct Dictionary {
     std::vector<RecordAttribute> attributes;
     std::size_t stride;
-    std::vector<std::vector<std::uint32_t>> defaults = {};  // of the attributes, as words
-    std::map<std::string, std::vector<Token>> texts = {};   // of the attributes that store indices of strings
+    std::vector<std::vector<std::uint32_t>> defaults = {};   // of the attributes, as words
+    std::map<std::string, std::vector<Token>> strings = {};  // of the attributes that store indices of strings
 };
 
 void set_default(PointSet& points, const std::string& name, const std::vector<std::uint32_t>& words)
@@ -339,17 +339,17 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
         } else if (type == TextType) {
             reader.take(size);  // default value
             stride += size;
-            LeftOut::add(fmt::format("the attribute \"{}\", a string", name));
+            SkippedContents::add(fmt::format("the attribute \"{}\", a string", name));
         } else if (type == IndexType) {
-            std::vector<Token> texts;
+            std::vector<Token> strings;
             for (std::uint32_t entries = reader.integer(4); entries > 0; --entries)
-                texts.push_back(token_of(reader.string(reader.integer(2))));
+                strings.push_back(token_of(reader.string(reader.integer(2))));
             if (size == 1) {
                 dictionary.attributes.push_back({name, ScalarType::Int32, {stride}});
                 dictionary.defaults.emplace_back();
-                dictionary.texts[name] = std::move(texts);
+                dictionary.strings[name] = std::move(strings);
             } else {
-                LeftOut::add(fmt::format("the attribute \"{}\", {} strings a point", name, size));
+                SkippedContents::add(fmt::format("the attribute \"{}\", {} strings a point", name, size));
             }
             stride += 4 * size;
         } else {
@@ -367,7 +367,7 @@ std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
 {
     const Dictionary dictionary = read_dictionary(reader, count, 0);
     for (const RecordAttribute& attribute : dictionary.attributes)
-        LeftOut::add(fmt::format("the attribute \"{}\" of no point", attribute.name));
+        SkippedContents::add(fmt::format("the attribute \"{}\" of no point", attribute.name));
     return dictionary.stride;
 }
 
@@ -399,15 +399,15 @@ bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t v
             closed += !is_line;
         }
     }
-    if (closed > 0) LeftOut::add(fmt::format("its {} closed polygons", closed));
+    if (closed > 0) SkippedContents::add(fmt::format("its {} closed polygons", closed));
     return true;
 }
 
-Column<Token> texts_of(const PointSet& points, const std::string& name, const std::vector<Token>& texts)
+Column<Token> strings_of(const PointSet& points, const std::string& name, const std::vector<Token>& strings)
 {
-    const auto* places = points.find<std::int32_t>(name);
-    if (!places) throw Error(fmt::format("the attribute \"{}\" is a string; it must be a number", name));
-    return texts_at(texts, *places);
+    const auto* indices = points.find<std::int32_t>(name);
+    if (!indices) throw Error(fmt::format("the attribute \"{}\" is a string; it must be a number", name));
+    return strings_at(strings, *indices);
 }
 
 void read_group(BigEndianReader& reader, PointSet& points)
@@ -458,13 +458,14 @@ PointSet read_bgeo(const std::filesystem::path& path)
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first attribute, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
-    for (const auto& [name, texts] : dictionary.texts) points.set(name, texts_of(points, name, texts));
+    for (const auto& [name, strings] : dictionary.strings) points.set(name, strings_of(points, name, strings));
     PointLines lines{std::move(points), {}, {}};
     reader.enter("primitives");
     const std::size_t vertex_bytes = stride_of_unread(reader, of_vertices);
     const std::size_t polygon_bytes = stride_of_unread(reader, of_primitives);
     if (!read_lines(reader, primitives, vertex_bytes, polygon_bytes, lines)) {
-        LeftOut::add(fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and its groups behind them" : ""));
+        SkippedContents::add(
+            fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and its groups behind them" : ""));
         return lines.points;
     }
     reader.enter("attributes of the whole");

@@ -100,8 +100,9 @@ std::string csv_lines(const CsvTable& table, const std::vector<std::size_t>& ord
 {
     std::size_t size = table.numbers * (number_chars + 1) * (end - begin);
     for (const AnyColumn* column : table.columns)
-        if (const auto* texts = std::get_if<Column<Token>>(column))
-            for (std::size_t i = begin; i < end; ++i) size += 2 * (*texts)[order.empty() ? i : order[i]].text().size();
+        if (const auto* strings = std::get_if<Column<Token>>(column))
+            for (std::size_t i = begin; i < end; ++i)
+                size += 2 * (*strings)[order.empty() ? i : order[i]].text().size();
     std::string text(size, '\0');
     char* to = text.data();
     for (std::size_t i = begin; i < end; ++i) {
@@ -186,7 +187,7 @@ struct CsvColumn {
     std::vector<double> numbers;
     std::vector<std::int64_t> whole;
     bool is_whole = true;
-    std::vector<Token> texts = {};  // if it holds strings instead
+    std::vector<Token> strings = {};  // if it holds strings instead
     bool is_text = false;
 
     bool float_would_round() const
@@ -232,7 +233,7 @@ bool is_text(const char* at, const char* stop)
 }
 
 // Marks columns as strings if the first line has no number there. may_be_text: columns for which this is allowed.
-void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std::vector<CsvColumn>& columns)
+void find_strings(std::string_view line, const std::vector<bool>& may_be_text, std::vector<CsvColumn>& columns)
 {
     const char *at = line.data(), *stop = line.data() + line.size();
     std::string text;
@@ -247,16 +248,16 @@ void find_texts(std::string_view line, const std::vector<bool>& may_be_text, std
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
                                      const std::vector<std::string>& names, const std::vector<bool>& may_be_text)
 {
-    constexpr double bytes_a_number = sizeof(double) + sizeof(std::int64_t);  // per number, until all lines are read
-    const double bytes = bytes_a_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
+    constexpr double bytes_per_number = sizeof(double) + sizeof(std::int64_t);  // per number, until all lines are read
+    const double bytes = bytes_per_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
     if (!fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
-                            "split the file, or write .bgeo in its place");
+        throw memory_exceeded(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
+                              "split the file, or write .bgeo in its place");
     std::vector<CsvColumn> columns(names.size());
-    if (!starts.empty()) find_texts(text.substr(starts[0]), may_be_text, columns);
+    if (!starts.empty()) find_strings(text.substr(starts[0]), may_be_text, columns);
     for (CsvColumn& column : columns) {
         if (column.is_text) {
-            column.texts.resize(starts.size());
+            column.strings.resize(starts.size());
             continue;
         }
         column.numbers.resize(starts.size());
@@ -265,7 +266,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
     std::vector<std::atomic<bool>> broken(names.size());  // columns with a non-integer number
     for_each_chunk(starts.size(), [&](std::size_t begin, std::size_t end) {
         std::string word;
-        TokensOfTexts token_of_word;
+        StringTokens token_of_word;
         for (std::size_t i = begin; i < end; ++i) {
             const char* at = text.data() + starts[i];
             const char* const stop = text.data() + text.size();
@@ -280,7 +281,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                     if (!at)
                         throw csv_error(
                             i + 2, fmt::format("{} has no closing quote; the file ends early or is damaged", names[c]));
-                    columns[c].texts[i] = token_of_word(word);
+                    columns[c].strings[i] = token_of_word(word);
                     continue;
                 }
                 double& number = columns[c].numbers[i];
@@ -353,7 +354,7 @@ PointSet read_csv(const std::filesystem::path& path)
         const std::vector<std::size_t>& which = attribute.columns;
         const CsvColumn& first = columns[which[0]];
         if (first.is_text) {
-            points.set(attribute.name, Column<Token>(std::span<const Token>(first.texts)));
+            points.set(attribute.name, Column<Token>(std::span<const Token>(first.strings)));
         } else if (which.size() == 3) {
             points.set(attribute.name, joined<Vec3f, float>(columns, which));
         } else if (which.size() == 4) {

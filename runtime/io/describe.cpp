@@ -39,26 +39,26 @@ void extend(AttributeSummary& summary, const Column<T>& column)
     }
 }
 
-constexpr std::size_t most_texts = 8;  // that are shown
+constexpr std::size_t max_texts = 8;  // that are shown
 
 void extend(AttributeSummary& summary, const Column<Token>& column)
 {
-    std::vector<std::string_view> texts;
-    for (const Token text : text_table(column).texts) texts.push_back(text.text());
-    std::sort(texts.begin(), texts.end());
-    summary.uniform = texts.size() <= 1;
-    summary.texts = texts.size();
-    texts.resize(std::min(texts.size(), most_texts));
-    summary.first_texts.assign(texts.begin(), texts.end());
+    std::vector<std::string_view> strings;
+    for (const Token text : text_table(column).strings) strings.push_back(text.text());
+    std::sort(strings.begin(), strings.end());
+    summary.uniform = strings.size() <= 1;
+    summary.strings = strings.size();
+    strings.resize(std::min(strings.size(), max_texts));
+    summary.first_strings.assign(strings.begin(), strings.end());
 }
 
 // Returns a text such as "bark" "leaf" ... of 40 texts.
 std::string text_list(const AttributeSummary& a)
 {
     std::string list;
-    for (const std::string& text : a.first_texts)
+    for (const std::string& text : a.first_strings)
         list += fmt::format("{}\"{}\"", list.empty() ? "" : " ", printable_name(text));
-    return a.texts > a.first_texts.size() ? list + fmt::format(" ... of {} texts", a.texts) : list;
+    return a.strings > a.first_strings.size() ? list + fmt::format(" ... of {} texts", a.strings) : list;
 }
 
 std::string number_list(const std::vector<double>& values)
@@ -119,7 +119,7 @@ std::string to_text(const PointSummary& summary)
         if (!a.min.empty())
             text += a.uniform ? fmt::format("  {} everywhere", number_list(a.min))
                               : fmt::format("  {}  to  {}", number_list(a.min), number_list(a.max));
-        if (a.texts > 0) text += fmt::format("  {}{}", text_list(a), a.uniform ? " everywhere" : "");
+        if (a.strings > 0) text += fmt::format("  {}{}", text_list(a), a.uniform ? " everywhere" : "");
         if (a.not_finite > 0) text += fmt::format("  ({} not finite)", a.not_finite);
         text += '\n';
     }
@@ -142,7 +142,7 @@ std::string to_json(const PointSummary& summary)
         json.begin_object();
         json.members("name", a.name, "type", type_name(a.type), "uniform", a.uniform, "min", a.min, "max", a.max,
                      "not_finite", a.not_finite);
-        if (a.type == AttributeType::String) json.members("texts", a.texts, "first_texts", a.first_texts);
+        if (a.type == AttributeType::String) json.members("texts", a.strings, "first_texts", a.first_strings);
         json.end();
     });
     json.list("groups", summary.groups,

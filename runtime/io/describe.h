@@ -12,11 +12,11 @@ namespace rapid {
 struct AttributeSummary {
     std::string name;
     AttributeType type;
-    bool uniform;                               // all points have bit-identical values
-    std::vector<double> min, max;               // per component; empty if no value is finite
-    std::size_t not_finite = 0;                 // points with a NaN or an infinity
-    std::size_t texts = 0;                      // number of distinct strings
-    std::vector<std::string> first_texts = {};  // the first few in order
+    bool uniform;                                 // all points have bit-identical values
+    std::vector<double> min, max;                 // per component; empty if no value is finite
+    std::size_t not_finite = 0;                   // points with a NaN or an infinity
+    std::size_t strings = 0;                      // number of distinct strings
+    std::vector<std::string> first_strings = {};  // the first few in order
 };
 
 struct GroupSummary {

@@ -58,7 +58,7 @@ const Format& format_of(const std::filesystem::path& path)
 
 void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame)
 {
-    format.write(file, format.holds_texts ? points : without_texts(points), frame);
+    format.write(file, format.holds_strings ? points : without_strings(points), frame);
 }
 
 PointSet read_points(const std::filesystem::path& path)

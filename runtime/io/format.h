@@ -25,9 +25,9 @@ struct Format {
     // True if one file contains all frames of a sequence (film.h).
     bool film = false;
     // True if the format holds only the positions of points.
-    bool places_alone = false;
+    bool positions_only = false;
     // True if the format holds string attributes; otherwise write_as() drops them.
-    bool holds_texts = true;
+    bool holds_strings = true;
     // True for text with independent lines and no stated length: a file cut after a line is another whole file.
     bool lines_stand_alone = false;
 };

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_waiting = 100;  // pictures; each may hold several megabytes of shapes
+constexpr std::size_t max_waiting = 100;  // pictures; each may hold several megabytes of shapes
 
 }  // namespace
 
@@ -128,7 +128,7 @@ void FrameWriter::write(const Job& job)
             if (job.before) pictures.fit = *job.before;
             if (job.points.empty() && !pictures.fit.settled()) {
                 pictures.waiting.emplace_back(&target, job);
-                if (pictures.waiting.size() == most_waiting) write_without_points(pictures);
+                if (pictures.waiting.size() == max_waiting) write_without_points(pictures);
                 continue;
             }
             view = std::make_shared<PictureView>(pictures.fit.next(job.points, job.frame));

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/points/column_files.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/subset.h"
@@ -93,8 +93,8 @@ std::vector<Bucket> buckets_of(const std::vector<PointSet>& parts)
     std::vector<Bucket> buckets;
     std::vector<std::size_t> at(parts.size(), 0);
     std::size_t first = 0;
-    for (std::size_t place = 0; place < std::max<std::size_t>(1, largest->size()); place += of_largest) {
-        const std::size_t next = place + of_largest;
+    for (std::size_t index = 0; index < std::max<std::size_t>(1, largest->size()); index += of_largest) {
+        const std::size_t next = index + of_largest;
         Bucket bucket{at, {}, first, 0};
         for (std::size_t k = 0; k < parts.size(); ++k) {
             const Strided<std::int64_t> ids = parts[k].id().read();
@@ -140,7 +140,7 @@ void find_sources(const std::vector<std::int64_t>& ids, std::vector<std::uint32_
     }
     // Usually ids are dense, so each has its own slot.
     constexpr std::uint32_t none = UINT32_MAX;
-    thread_local OfThread<std::vector<std::uint32_t>> kept;
+    thread_local PerThread<std::vector<std::uint32_t>> kept;
     std::vector<std::uint32_t>& by_id = *kept;
     by_id.assign(range + 1, none);
     for (std::uint32_t i = 0; i < ids.size(); ++i) by_id[static_cast<std::size_t>(ids[i] - *least)] = i;
@@ -169,7 +169,7 @@ Gather gather_into(std::span<T> values, const std::vector<PointSet>& parts, cons
         if (const Column<T>* column = columns_of(part)) from.push_back(column->read());
     RAPID_ASSERT(from.size() == parts.size());
     return [values, from](const Bucket& bucket, const std::vector<std::uint32_t>& sources) {
-        thread_local OfThread<std::vector<T>> kept_read, kept_gathered;
+        thread_local PerThread<std::vector<T>> kept_read, kept_gathered;
         std::vector<T>&read = *kept_read, &gathered = *kept_gathered;
         read_bucket(from, bucket, read);
         gathered.clear();
@@ -193,7 +193,7 @@ AnyColumn column_of(const AnyColumn& column)
 }
 
 // Returns the parts with one type per column.
-std::vector<PointSet> of_one_type(const std::vector<PointSet>& parts, const std::vector<std::string>& names)
+std::vector<PointSet> with_common_types(const std::vector<PointSet>& parts, const std::vector<std::string>& names)
 {
     std::vector<PointSet> result = parts;
     for (const std::string& name : parts.front().column_names()) {
@@ -215,7 +215,7 @@ PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::
     RAPID_ASSERT(!given.empty() && given.size() == names.size());
     for (std::size_t k = 0; k < given.size(); ++k) check_ids(given[k], k, given.size(), names[k]);
     check_columns(given, names);
-    const std::vector<PointSet> parts = of_one_type(given, names);
+    const std::vector<PointSet> parts = with_common_types(given, names);
     const std::vector<Bucket> buckets = buckets_of(parts);
     const std::size_t size = buckets.back().first + buckets.back().size;
 
@@ -242,8 +242,8 @@ PointSet merge_parts(const std::vector<PointSet>& given, const std::vector<std::
     std::vector<Strided<std::int64_t>> ids_of_parts;
     for (const PointSet& part : parts) ids_of_parts.push_back(part.id().read());
     tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
-        thread_local OfThread<std::vector<std::int64_t>> kept_ids;
-        thread_local OfThread<std::vector<std::uint32_t>> kept_sources;
+        thread_local PerThread<std::vector<std::int64_t>> kept_ids;
+        thread_local PerThread<std::vector<std::uint32_t>> kept_sources;
         std::vector<std::int64_t>& ids = *kept_ids;
         std::vector<std::uint32_t>& sources = *kept_sources;
         read_bucket(ids_of_parts, buckets[b], ids);

@@ -16,7 +16,7 @@
 
 #include "runtime/base/parallel.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -84,12 +84,13 @@ void write_array(ZipWriter& zip, const std::string& name, const std::string& hea
     zip.end();
 }
 
-void write_texts(ZipWriter& zip, const std::string& name, const Column<Token>& column)
+void write_strings(ZipWriter& zip, const std::string& name, const Column<Token>& column)
 {
     const TextTable table = text_table(column);
-    std::vector<std::u32string> texts;
+    std::vector<std::u32string> strings;
     std::size_t longest = 1;
-    for (const Token text : table.texts) longest = std::max(longest, texts.emplace_back(characters_of(text)).size());
+    for (const Token text : table.strings)
+        longest = std::max(longest, strings.emplace_back(characters_of(text)).size());
     const std::string header = npy_header(fmt::format("<U{}", longest), column.size(), 1);
     const std::size_t bytes = longest * sizeof(char32_t);
     zip.begin(name + std::string(suffix), header.size() + column.size() * bytes);
@@ -98,7 +99,7 @@ void write_texts(ZipWriter& zip, const std::string& name, const Column<Token>& c
     constexpr std::size_t most = std::size_t{1} << 20;
     std::string piece;
     for (std::size_t i = 0; i < column.size(); ++i) {
-        const std::u32string& text = texts[static_cast<std::size_t>(table.places[i])];
+        const std::u32string& text = strings[static_cast<std::size_t>(table.indices[i])];
         piece.append(reinterpret_cast<const char*>(text.data()), text.size() * sizeof(char32_t));
         for (std::size_t left = bytes - text.size() * sizeof(char32_t), some; left > 0; left -= some) {
             some = std::min(left, most);
@@ -123,8 +124,8 @@ void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
     ZipWriter zip(file);
     for (const std::string& name : attributes) {
         const AnyColumn& column = *points.find(name);
-        if (const auto* texts = std::get_if<Column<Token>>(&column)) {
-            write_texts(zip, name, *texts);
+        if (const auto* strings = std::get_if<Column<Token>>(&column)) {
+            write_strings(zip, name, *strings);
             continue;
         }
         RecordWriter array(ByteOrder::Little, RecordWriter::Wide);
@@ -225,7 +226,7 @@ struct NumberType {
     std::size_t characters = 0;
 };
 
-constexpr std::size_t most_characters = 1 << 20;
+constexpr std::size_t max_characters = 1 << 20;
 
 std::optional<NumberType> text_type(std::string_view descr)
 {
@@ -233,7 +234,7 @@ std::optional<NumberType> text_type(std::string_view descr)
     std::size_t characters = 0;
     const auto parsed = std::from_chars(descr.data() + 2, descr.data() + descr.size(), characters);
     if (parsed.ec != std::errc() || parsed.ptr != descr.data() + descr.size()) return {};
-    if (characters < 1 || characters > most_characters) return {};
+    if (characters < 1 || characters > max_characters) return {};
     return NumberType{wide ? ScalarType::UInt32 : ScalarType::UInt8,
                       descr[0] == '>' ? ByteOrder::Big : ByteOrder::Little, false, characters};
 }
@@ -272,7 +273,7 @@ std::optional<Array> array_in(std::span<const unsigned char> bytes)
     const std::optional<NumberType> type = number_type(header.descr);
     if (!header.complete || !type || header.shape.empty() || header.shape.size() > 2) return {};
     const std::uint64_t rows = header.shape[0], numbers = header.shape.size() == 2 ? header.shape[1] : 1;
-    if (numbers < 1 || numbers > (type->characters > 0 ? 1 : most_numbers)) return {};
+    if (numbers < 1 || numbers > (type->characters > 0 ? 1 : max_numbers)) return {};
     const std::span<const unsigned char> data = bytes.subspan(begin + length);
     const std::size_t row = numbers * scalar_bytes(type->scalar) * std::max<std::size_t>(1, type->characters);
     if (rows > data.size() / row)
@@ -282,14 +283,14 @@ std::optional<Array> array_in(std::span<const unsigned char> bytes)
 }
 
 // Reads strings. Shorter ones end with zeros.
-Column<Token> texts_in(const Array& array)
+Column<Token> strings_in(const Array& array)
 {
     Column<Token> column;
     const std::span<Token> to = column.append_for_writing(array.rows);
     const std::size_t bytes = scalar_bytes(array.type.scalar);
     const unsigned char* at = array.bytes.data();
     std::string text;
-    TokensOfTexts token_of_row;
+    StringTokens token_of_row;
     for (Token& token : to) {
         text.clear();
         for (std::size_t k = 0; k < array.type.characters; ++k, at += bytes) {
@@ -308,7 +309,7 @@ Column<Token> texts_in(const Array& array)
 
 void read_array(PointSet& points, const std::string& name, const Array& array)
 {
-    if (array.type.characters > 0) return points.set(name, array.rows > 0 ? texts_in(array) : Column<Token>());
+    if (array.type.characters > 0) return points.set(name, array.rows > 0 ? strings_in(array) : Column<Token>());
     RecordAttribute attribute;
     attribute.type = array.type.scalar;
     attribute.group = array.type.truth && array.numbers == 1;
@@ -331,7 +332,7 @@ PointSet read_npz(const std::filesystem::path& path)
             if (const std::optional<Array> array = array_in(bytes))
                 use(*array);
             else
-                LeftOut::add(
+                SkippedContents::add(
                     fmt::format("the array \"{}\", which is not of numbers or texts of each point", member.name));
         } catch (const Error& error) {
             throw Error(fmt::format("\"{}\": {}", member.name, error.what()), error.kind());
@@ -357,8 +358,8 @@ PointSet read_npz(const std::filesystem::path& path)
         const std::string name = member.name.substr(0, member.name.size() - suffix.size());
         with_array(member, [&](const Array& array) {
             if (array.rows != points.size())
-                return LeftOut::add(fmt::format("the array \"{}\" of {} rows; there are {} points", member.name,
-                                                array.rows, points.size()));
+                return SkippedContents::add(fmt::format("the array \"{}\" of {} rows; there are {} points", member.name,
+                                                        array.rows, points.size()));
             read_array(points, name, array);
             has_id |= name == "id" && array.numbers == 1 && !array.type.truth && array.type.characters == 0;
         });

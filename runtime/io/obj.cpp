@@ -78,11 +78,11 @@ private:
 
 // Throws Error if that many positions do not fit in memory. A line takes at least two bytes per position. A growing
 // list briefly takes three times its size, before the columns are created.
-void check_memory(std::size_t places)
+void check_memory(std::size_t positions)
 {
-    constexpr double bytes_a_place = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);
-    if (const double bytes = bytes_a_place * static_cast<double>(places); !fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("lines of at least {} places", places), bytes, "split the file");
+    constexpr double bytes_per_position = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);
+    if (const double bytes = bytes_per_position * static_cast<double>(positions); !fits_in_memory(bytes))
+        throw memory_exceeded(fmt::format("lines of at least {} places", positions), bytes, "split the file");
 }
 
 // Parses a complete word. Throws Error if it is not a number.
@@ -113,7 +113,7 @@ PointSet read_obj(const std::filesystem::path& path)
     const InputFile file(path);
     std::string_view text = file.text();
     const bool ends = text.ends_with('\n');
-    std::vector<Vec3f> vertices, places;
+    std::vector<Vec3f> vertices, positions;
     std::vector<std::int32_t> curves;
     std::int32_t curve = 0;
     for (std::size_t number = 1; !text.empty(); ++number) {
@@ -133,19 +133,19 @@ PointSet read_obj(const std::filesystem::path& path)
             vertices.push_back(P);
         } else if (kind == "l") {
             for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
-                if (places.size() == places.capacity()) check_memory(places.size());
-                places.push_back(vertices[vertex_of(word, vertices.size(), number)]);
+                if (positions.size() == positions.capacity()) check_memory(positions.size());
+                positions.push_back(vertices[vertex_of(word, vertices.size(), number)]);
                 curves.push_back(curve);
             }
             ++curve;
         }
     }
     if (vertices.empty()) throw Error("is no .obj file with vertices");
-    if (curve == 0) places = vertices, curves.assign(vertices.size(), 0);
+    if (curve == 0) positions = vertices, curves.assign(vertices.size(), 0);
 
     PointSet points;
-    points.append(places.size());
-    points.P() = Column<Vec3f>(std::span<const Vec3f>(places));
+    points.append(positions.size());
+    points.P() = Column<Vec3f>(std::span<const Vec3f>(positions));
     const std::span<std::int64_t> id = points.id().overwrite();
     for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
     points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
@@ -156,7 +156,7 @@ RAPID_FORMAT(Format{.extension = ".obj",
                     .doc = "Wavefront lines: places alone, with trails as polylines",
                     .write = write_obj,
                     .read = read_obj,
-                    .places_alone = true,
+                    .positions_only = true,
                     .lines_stand_alone = true});
 
 }  // namespace

@@ -12,8 +12,8 @@
 #include <optional>
 
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/ply_file.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -165,12 +165,12 @@ PointSet read_ply(const std::filesystem::path& path)
     const bool has_trails = points->find_group(trail_places_group) != nullptr;  // the points define the trails
     for (const PlyElement& element : file.elements())
         if (element.name != "vertex" && element.count > 0 && !(has_trails && element.name == "edge"))
-            LeftOut::add(fmt::format("its {} elements \"{}\"", element.count, element.name));
+            SkippedContents::add(fmt::format("its {} elements \"{}\"", element.count, element.name));
     return without_trail_places(std::move(*points));
 }
 
 RAPID_FORMAT(Format{".ply", "binary PLY: points for viewers and mesh tools; id as int32; no texts", write_ply, read_ply,
-                    /*film=*/false, /*places_alone=*/false, /*holds_texts=*/false});
+                    /*film=*/false, /*positions_only=*/false, /*holds_strings=*/false});
 
 }  // namespace
 }  // namespace rapid

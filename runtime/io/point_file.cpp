@@ -24,7 +24,7 @@ std::unique_ptr<PointStream> begin_stream(const Format& format, OutputFile& file
 
 // Calls f and adds the file to its errors.
 template <class F>
-auto of_file(const std::filesystem::path& path, const F& f)
+auto with_file_name(const std::filesystem::path& path, const F& f)
 {
     try {
         return f();
@@ -57,21 +57,21 @@ void append_points(PointSet& to, const PointSet& from)
 PointFile::PointFile(const std::filesystem::path& path, const PointSet& like)
     : path_(path),
       format_(format_of(path)),
-      file_(of_file(path, [&] { return OutputFile(path); })),
-      stream_(of_file(path, [&] { return begin_stream(format_, file_, like); })),
-      kept_(like)
+      file_(with_file_name(path, [&] { return OutputFile(path); })),
+      stream_(with_file_name(path, [&] { return begin_stream(format_, file_, like); })),
+      collected_(like)
 {
 }
 
 void PointFile::append(const PointSet& points)
 {
-    of_file(path_, [&] { stream_ ? stream_->append(points) : keep(points); });
+    with_file_name(path_, [&] { stream_ ? stream_->append(points) : keep(points); });
 }
 
 void PointFile::finish()
 {
-    of_file(path_, [&] {
-        stream_ ? stream_->finish() : write_as(format_, file_, kept_, {});
+    with_file_name(path_, [&] {
+        stream_ ? stream_->finish() : write_as(format_, file_, collected_, {});
         file_.finish();
     });
 }
@@ -79,12 +79,12 @@ void PointFile::finish()
 void PointFile::keep(const PointSet& points)
 {
     // Columns may grow to twice their size, and writing takes a part of them.
-    const double bytes = static_cast<double>(kept_.bytes() + points.bytes());
+    const double bytes = static_cast<double>(collected_.bytes() + points.bytes());
     if (!fits_in_memory(bytes))
-        throw beyond_memory(
-            fmt::format("{} points, which {} takes all at once,", kept_.size() + points.size(), format_.extension),
+        throw memory_exceeded(
+            fmt::format("{} points, which {} takes all at once,", collected_.size() + points.size(), format_.extension),
             bytes, "write .csv or .bgeo, which take them as they come");
-    append_points(kept_, points);
+    append_points(collected_, points);
 }
 
 }  // namespace rapid

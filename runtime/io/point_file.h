@@ -49,8 +49,8 @@ private:
     const std::filesystem::path path_;
     const Format& format_;
     OutputFile file_;
-    std::unique_ptr<PointStream> stream_;  // null: points are stored in `kept_`
-    PointSet kept_;
+    std::unique_ptr<PointStream> stream_;  // null: points are stored in `collected_`
+    PointSet collected_;
 };
 
 }  // namespace rapid

@@ -20,7 +20,7 @@
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/deflate.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
@@ -235,10 +235,10 @@ Channels read_channels(LittleEndianReader& reader)
         const std::size_t begin = static_cast<std::size_t>(offset), size = static_cast<std::size_t>(numbers);
         channels.stride = std::max(channels.stride, begin + size * scalar_bytes(scalar));
         names.push_back(attribute_of_channel(name));
-        if (size <= most_numbers)
+        if (size <= max_numbers)
             channels.attributes.push_back(attribute_of(name, scalar, size, begin));
         else
-            LeftOut::add(fmt::format("the channel \"{}\" of {} numbers a point", name, numbers));
+            SkippedContents::add(fmt::format("the channel \"{}\" of {} numbers a point", name, numbers));
     }
     check_column_names(names, "");
     return channels;
@@ -267,13 +267,13 @@ PointSet read_prt(const std::filesystem::path& path)
     if (!placed) throw Error("there is no channel Position of three floats");
 
     const std::size_t n = static_cast<std::size_t>(count);
-    const std::size_t held = reader.rest().size() * most_deflate_expansion / channels.stride;
+    const std::size_t held = reader.rest().size() * max_deflate_expansion / channels.stride;
     if (n > held)
         throw Error(fmt::format("the file ends early: its header promises {} points, it holds at most {}", n, held));
     const std::size_t bytes = n * channels.stride;
     // Accounts for the records and for the points made from them.
     if (const double both = 2.0 * static_cast<double>(bytes); !fits_in_memory(both))
-        throw beyond_memory(fmt::format("{} points, decompressed,", n), both, "write fewer points to the file");
+        throw memory_exceeded(fmt::format("{} points, decompressed,", n), both, "write fewer points to the file");
     const std::unique_ptr<unsigned char[]> records(new unsigned char[bytes]);
     uLongf found = bytes;
     const bool is_empty = n == 0 && reader.rest().empty();  // no data was compressed
@@ -288,7 +288,7 @@ PointSet read_prt(const std::filesystem::path& path)
 }
 
 RAPID_FORMAT(Format{".prt", "Krakatoa's particles, compressed; all types but texts", write_prt, read_prt,
-                    /*film=*/false, /*places_alone=*/false, /*holds_texts=*/false});
+                    /*film=*/false, /*positions_only=*/false, /*holds_strings=*/false});
 
 }  // namespace
 }  // namespace rapid

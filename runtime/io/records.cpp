@@ -9,8 +9,8 @@
 #include <memory>
 #include <numeric>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 
 namespace rapid {
 namespace {
@@ -217,7 +217,7 @@ void RecordWriter::write(OutputFile& file, std::uint64_t offset, std::size_t poi
     // The records of a chunk, 32 to 128 bytes each, and their columns stay in the second-level cache.
     for_each_chunk(points, [&](std::size_t begin, std::size_t end) {
         // The buffer is kept per thread, so that its pages are touched only once.
-        thread_local OfThread<std::vector<unsigned char>> kept;
+        thread_local PerThread<std::vector<unsigned char>> kept;
         std::vector<unsigned char>& records = *kept;
         records.resize((end - begin) * record_bytes_);
         interleave(begin, end, records.data());

@@ -15,14 +15,14 @@ PointSet select_attributes(const PointSet& points, const std::vector<std::string
             throw Error(
                 fmt::format("there is no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
         }
-    const auto wanted = [&](const std::string& name) {
+    const auto is_requested = [&](const std::string& name) {
         return name == "P" || name == "v" || name == "id" || std::find(names.begin(), names.end(), name) != names.end();
     };
     PointSet selected = points;
     for (const std::string& name : points.column_names())
-        if (!wanted(name)) selected.remove(name);
+        if (!is_requested(name)) selected.remove(name);
     for (const std::string& name : points.group_names())
-        if (!wanted(name)) selected.remove_group(name);
+        if (!is_requested(name)) selected.remove_group(name);
     return selected;
 }
 

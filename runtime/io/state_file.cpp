@@ -15,7 +15,7 @@
 
 #include "runtime/base/error.h"
 #include "runtime/base/json_text.h"
-#include "runtime/base/of_thread.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"
 #include "runtime/io/text_table.h"
@@ -24,9 +24,9 @@ namespace rapid {
 namespace {
 
 constexpr std::string_view state_magic = "\x89RAPID\r\n";
-constexpr int most_depth = 8;  // nesting in a header: copying JSON recurses per level
-constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // KeptColumn's
-static_assert(std::size(types) == std::variant_size_v<KeptColumn>);
+constexpr int max_depth = 8;  // nesting in a header: copying JSON recurses per level
+constexpr std::string_view types[] = {"float", "vec3", "int32", "int64", "quat", "string", "uint8"};  // SavedColumn's
+static_assert(std::size(types) == std::variant_size_v<SavedColumn>);
 constexpr std::string_view type_of_bytes = "bytes";
 
 // Pieces are compressed and read on all threads. Blosc groups the bytes of numbers by significance, which shrinks ids
@@ -37,7 +37,7 @@ constexpr std::size_t sample_bytes = std::size_t{1} << 16;
 constexpr double worthwhile = 0.5;  // largest compressed fraction of a sample
 constexpr int level = 1;
 constexpr const char* codec = "lz4";
-constexpr std::uint64_t most_codec_expansion = 1024;  // more than any codec achieves
+constexpr std::uint64_t max_codec_expansion = 1024;  // more than any codec achieves
 
 // A block before compression.
 struct Raw {
@@ -56,7 +56,7 @@ struct Piece {
 // Compresses into a buffer for the worst case, one per thread. The returned piece is copied to its exact size.
 Piece packed(std::span<const char> bytes, std::size_t scalar)
 {
-    thread_local OfThread<std::vector<char>> kept;
+    thread_local PerThread<std::vector<char>> kept;
     std::vector<char>& room = *kept;
     room.resize(piece_bytes + BLOSC_MAX_OVERHEAD);
     const int size = blosc_compress_ctx(level, BLOSC_SHUFFLE, scalar, bytes.size(), bytes.data(), room.data(),
@@ -98,7 +98,7 @@ template <class T>
 constexpr std::size_t number_bytes = sizeof(T) % sizeof(float) == 0 && !std::is_integral_v<T> ? sizeof(float)
                                                                                               : sizeof(T);
 
-Raw raw_of(const KeptColumn& column)
+Raw raw_of(const SavedColumn& column)
 {
     return std::visit(
         []<class T>(const Column<T>& values) -> Raw {
@@ -107,21 +107,21 @@ Raw raw_of(const KeptColumn& column)
         column);
 }
 
-std::size_t values_of(const KeptColumn& column)
+std::size_t values_of(const SavedColumn& column)
 {
     return std::visit([](const auto& values) { return values.size(); }, column);
 }
 
 // Replaces table indices by strings in string columns.
-void take_texts(const CheckedJson& blocks, SavedState& state)
+void take_strings(const CheckedJson& blocks, SavedState& state)
 {
     for (std::size_t k = 0; k < state.columns.size(); ++k) {
         const auto found = blocks[k + 1].find("texts");
         if (found == blocks[k + 1].end()) continue;
-        std::vector<Token> texts;
+        std::vector<Token> strings;
         try {
-            for (const CheckedJson& text : *found) texts.push_back(token_of(text.get<std::string>()));
-            state.columns[k] = texts_at(texts, std::get<Column<std::int32_t>>(state.columns[k]));
+            for (const CheckedJson& text : *found) strings.push_back(token_of(text.get<std::string>()));
+            state.columns[k] = strings_at(strings, std::get<Column<std::int32_t>>(state.columns[k]));
         } catch (const CheckedJson::exception&) {
             damaged("its header can't be read");
         } catch (const std::bad_variant_access&) {
@@ -142,24 +142,24 @@ void write_to(const std::function<void(const void* data, std::size_t bytes)>& wr
 {
     std::vector<Raw> blocks = {{state.bytes.data(), state.bytes.size(), sizeof(double)}};
     // For a string column the block contains table indices and the header the strings.
-    std::vector<KeptColumn> columns = state.columns;
-    std::vector<std::vector<Token>> texts(columns.size());
+    std::vector<SavedColumn> columns = state.columns;
+    std::vector<std::vector<Token>> strings(columns.size());
     for (std::size_t k = 0; k < columns.size(); ++k)
         if (const auto* tokens = std::get_if<Column<Token>>(&columns[k])) {
             TextTable table = text_table(*tokens);
-            texts[k] = std::move(table.texts);
-            columns[k] = std::move(table.places);
+            strings[k] = std::move(table.strings);
+            columns[k] = std::move(table.indices);
         }
-    for (const KeptColumn& column : columns) blocks.push_back(raw_of(column));
-    std::vector<std::pair<std::size_t, std::size_t>> places;  // block and offset of each piece
+    for (const SavedColumn& column : columns) blocks.push_back(raw_of(column));
+    std::vector<std::pair<std::size_t, std::size_t>> locations;  // block and offset of each piece
     for (std::size_t b = 0; b < blocks.size(); ++b)
-        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) places.emplace_back(b, k * piece_bytes);
+        for (std::size_t k = 0; k < blocks[b].pieces(); ++k) locations.emplace_back(b, k * piece_bytes);
     std::vector<std::uint8_t> is_packed(blocks.size());
     tbb::parallel_for(std::size_t{0}, blocks.size(),
                       [&](std::size_t b) { is_packed[b] = is_worth_packing(blocks[b]); });
-    std::vector<Piece> pieces(places.size());
-    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t k) {
-        const auto& [b, at] = places[k];
+    std::vector<Piece> pieces(locations.size());
+    tbb::parallel_for(std::size_t{0}, locations.size(), [&](std::size_t k) {
+        const auto& [b, at] = locations[k];
         const std::span<const char> bytes(blocks[b].data + at, std::min(piece_bytes, blocks[b].bytes - at));
         pieces[k] = is_packed[b] ? packed(bytes, blocks[b].scalar) : Piece{nullptr, bytes};
     });
@@ -173,7 +173,7 @@ void write_to(const std::function<void(const void* data, std::size_t bytes)>& wr
                         {"pieces", std::move(sizes)}});
         if (b == 0 || !std::holds_alternative<Column<Token>>(state.columns[b - 1])) continue;
         CheckedJson& of_block = list.back()["texts"] = CheckedJson::array();
-        for (const Token text : texts[b - 1]) of_block.push_back(text.text());
+        for (const Token text : strings[b - 1]) of_block.push_back(text.text());
     }
 
     ContentHash hash;
@@ -231,7 +231,7 @@ StateFile::StateFile(Content content) : content_(std::move(content))
     try {
         header_ = CheckedJson::parse(all.substr(begin, static_cast<std::size_t>(length)),
                                      [](int depth, CheckedJson::parse_event_t, CheckedJson&) {
-                                         if (depth > most_depth) damaged("its header is nested too deep");
+                                         if (depth > max_depth) damaged("its header is nested too deep");
                                          return true;
                                      });
         if (!header_.is_object()) damaged("its header can't be read");
@@ -249,18 +249,18 @@ SavedState StateFile::state() const
     std::size_t at = blocks_at_;
     const std::string_view all = text();
     const std::size_t end = all.size() - sizeof(std::uint64_t);
-    struct Place {
+    struct PieceLocation {
         std::string_view piece;
         char* to;
         std::size_t bytes;
     };
-    std::vector<Place> places;
+    std::vector<PieceLocation> locations;
     // Allocates no more memory than a file of this size can decompress to.
-    std::uint64_t left = (end - at) * most_codec_expansion;
-    const auto add = [&](const CheckedJson& block, std::size_t bytes_a_value, const auto& allocate) {
+    std::uint64_t left = (end - at) * max_codec_expansion;
+    const auto add = [&](const CheckedJson& block, std::size_t bytes_per_value, const auto& allocate) {
         const std::uint64_t values = block.at("values").get<std::uint64_t>();
-        if (values > left / bytes_a_value) damaged("a block does not fit its header");
-        const std::size_t bytes = static_cast<std::size_t>(values) * bytes_a_value;
+        if (values > left / bytes_per_value) damaged("a block does not fit its header");
+        const std::size_t bytes = static_cast<std::size_t>(values) * bytes_per_value;
         left -= bytes;
         char* const to = allocate(static_cast<std::size_t>(values));
         std::size_t done = 0;
@@ -268,7 +268,7 @@ SavedState StateFile::state() const
             const std::uint64_t size = piece.get<std::uint64_t>();
             if (size > end - at) damaged("it is shorter than its header says");
             const std::size_t filled = std::min(piece_bytes, bytes - done);
-            places.push_back({all.substr(at, static_cast<std::size_t>(size)), to + done, filled});
+            locations.push_back({all.substr(at, static_cast<std::size_t>(size)), to + done, filled});
             at += static_cast<std::size_t>(size);
             done += filled;
         }
@@ -282,7 +282,7 @@ SavedState StateFile::state() const
         for (std::size_t k = 1; k < blocks.size(); ++k) {
             const auto found = std::find(std::begin(types), std::end(types), blocks[k].at("type").get<std::string>());
             if (found == std::end(types)) damaged("its header can't be read");
-            const bool is_of_texts = *found == type_name(AttributeType::String);
+            const bool is_of_strings = *found == type_name(AttributeType::String);
             std::visit(
                 [&]<class T>(Column<T>& column) {
                     add(blocks[k], sizeof(T), [&](std::size_t size) {
@@ -290,15 +290,15 @@ SavedState StateFile::state() const
                     });
                 },
                 state.columns.emplace_back(
-                    is_of_texts ? KeptColumn(Column<std::int32_t>())
-                                : column_of_type<KeptColumn>(static_cast<std::size_t>(found - std::begin(types)))));
+                    is_of_strings ? SavedColumn(Column<std::int32_t>())
+                                  : column_of_type<SavedColumn>(static_cast<std::size_t>(found - std::begin(types)))));
         }
     } catch (const CheckedJson::exception&) {
         damaged("its header can't be read");
     }
-    tbb::parallel_for(std::size_t{0}, places.size(),
-                      [&](std::size_t k) { unpack(places[k].piece, places[k].to, places[k].bytes); });
-    take_texts(header_.at("blocks"), state);
+    tbb::parallel_for(std::size_t{0}, locations.size(),
+                      [&](std::size_t k) { unpack(locations[k].piece, locations[k].to, locations[k].bytes); });
+    take_strings(header_.at("blocks"), state);
     return state;
 }
 

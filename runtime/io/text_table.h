@@ -12,14 +12,14 @@
 namespace rapid {
 
 struct TextTable {
-    std::vector<Token> texts;
-    Column<std::int32_t> places;  // index of each point's string
+    std::vector<Token> strings;
+    Column<std::int32_t> indices;  // index of each point's string
 };
 TextTable text_table(const Column<Token>& column);
 
 // Calls token_of() for the strings of a file. The last 65,536 are cached, because the process-wide table is locked for
 // each access.
-class TokensOfTexts {
+class StringTokens {
 public:
     Token operator()(std::string_view text);
 
@@ -29,11 +29,11 @@ private:
 
 // Builds a column from a table that was read. Index -1 means the empty string. Throws Error if an index is out of
 // range.
-Column<Token> texts_at(const std::vector<Token>& texts, const Column<std::int32_t>& places);
+Column<Token> strings_at(const std::vector<Token>& strings, const Column<std::int32_t>& indices);
 
 // Returns the points without string columns, for formats that do not support them.
-PointSet without_texts(const PointSet& points);
+PointSet without_strings(const PointSet& points);
 // Returns the names of the string columns.
-std::vector<std::string> names_of_texts(const PointSet& points);
+std::vector<std::string> string_column_names(const PointSet& points);
 
 }  // namespace rapid

@@ -27,8 +27,8 @@
 #include "runtime/base/error.h"
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/scalars.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
@@ -49,7 +49,7 @@ struct UsdArray {
     bool quaternion;           // real part first
     std::int64_t least, most;  // range of integers
     std::vector<unsigned char> bytes;
-    bool texts = false;
+    bool strings = false;
 
     std::size_t rows() const { return bytes.size() / (tuple * scalar_bytes(type)); }
 };
@@ -77,7 +77,7 @@ std::optional<UsdArray> array_of(std::string_view type)
     };
     if (type == "string" || type == "token") {
         UsdArray array = integers_of(ScalarType::UInt32, std::uint32_t{});
-        array.texts = true;
+        array.strings = true;
         return array;
     }
     if (type == "bool") return integers_of(ScalarType::UInt8, std::int32_t{});
@@ -271,8 +271,8 @@ private:
         constexpr std::string_view samples = ".timeSamples";
         std::optional<UsdArray> array = array_of(type);
         // Strings other than primvars describe how the prim is placed and drawn.
-        if (!array || (array->texts && !name.starts_with("primvars:"))) {
-            if (type.ends_with("[]")) LeftOut::add(fmt::format("{} of the type {}", name, type));
+        if (!array || (array->strings && !name.starts_with("primvars:"))) {
+            if (type.ends_with("[]")) SkippedContents::add(fmt::format("{} of the type {}", name, type));
             return skip_value();
         }
         if (!names_.insert(name).second) throw wrong(fmt::format("{} is there twice", name));
@@ -343,8 +343,8 @@ private:
     void check_memory(const UsdArray& array) const
     {
         if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
-            throw beyond_memory(fmt::format("an array of at least {} rows", array.rows()), bytes,
-                                "write .bgeo in its place");
+            throw memory_exceeded(fmt::format("an array of at least {} rows", array.rows()), bytes,
+                                  "write .bgeo in its place");
     }
 
     void read_number(UsdArray& array)
@@ -363,7 +363,7 @@ private:
             at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
             return number;
         };
-        if (array.texts) return put(token_of(text_value()).number);
+        if (array.strings) return put(token_of(text_value()).number);
         switch (array.type) {
             case ScalarType::Int32:
                 return put(parse(std::int32_t{}));
@@ -595,12 +595,12 @@ std::string attribute_of_property(std::string_view name)
 }
 
 // Returns one string for all points, or one per point.
-Column<Token> texts_of(const UsdArray& array, std::size_t size)
+Column<Token> strings_of(const UsdArray& array, std::size_t size)
 {
-    std::vector<Token> texts(array.rows());
-    if (!texts.empty()) std::memcpy(static_cast<void*>(texts.data()), array.bytes.data(), array.bytes.size());
-    if (texts.size() != size) return Column<Token>(size, texts[0], Token());
-    return Column<Token>(std::span<const Token>(texts));
+    std::vector<Token> strings(array.rows());
+    if (!strings.empty()) std::memcpy(static_cast<void*>(strings.data()), array.bytes.data(), array.bytes.size());
+    if (strings.size() != size) return Column<Token>(size, strings[0], Token());
+    return Column<Token>(std::span<const Token>(strings));
 }
 
 PointSet read_usda(const std::filesystem::path& path)
@@ -618,11 +618,12 @@ PointSet read_usda(const std::filesystem::path& path)
         const bool constant = array.rows() == 1;
         if (array.name == "extent") continue;  // not a value per point
         if (array.rows() != points.size() && !constant) {
-            LeftOut::add(fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
+            SkippedContents::add(
+                fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
             continue;
         }
-        if (array.texts) {
-            points.set(attribute_of_property(array.name), texts_of(array, points.size()));
+        if (array.strings) {
+            points.set(attribute_of_property(array.name), strings_of(array, points.size()));
             names.push_back(array.name);
             continue;
         }

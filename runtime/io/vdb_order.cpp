@@ -23,10 +23,10 @@ using openvdb::Coord;
 // Per-thread buffers for the time of writing one file. Not thread_local, because in a library that is loaded later
 // glibc allocates those on a thread's first use, and terminates the process if that fails.
 template <class T>
-using OfThreads = tbb::enumerable_thread_specific<T>;
+using PerWorker = tbb::enumerable_thread_specific<T>;
 
 // Points per block; at most 64 blocks, each with its own list of leaves.
-constexpr std::size_t least_block = 65536, most_blocks = 64;
+constexpr std::size_t min_block = 65536, max_blocks = 64;
 // Points of columns in files that are sorted together in memory.
 constexpr std::size_t cell_points = 131072;
 // Points that are distributed to cells together.
@@ -150,7 +150,7 @@ struct Lookup {
 Lookup look_up(const Strided<Vec3f>& P, std::size_t size, const Voxels& voxels)
 {
     Lookup result{{}, Column<std::int32_t>(size), {}};
-    const std::size_t of_block = std::max(least_block, (size + most_blocks - 1) / most_blocks);
+    const std::size_t of_block = std::max(min_block, (size + max_blocks - 1) / max_blocks);
     for (std::size_t begin = 0; begin < size; begin += of_block)
         result.blocks.push_back({begin, std::min(size, begin + of_block), {}, {}});
     const std::span<std::int32_t> numbers = result.numbers.overwrite();
@@ -206,7 +206,7 @@ Column<std::int64_t> sorted_entries(const Strided<Vec3f>& P, const Voxels& voxel
         for (std::size_t i = block.begin; i < block.end; ++i)
             entries[block.counts[static_cast<std::size_t>(numbers[i])]++] = entry(place_in_leaf(voxels.of(P[i])), i);
     });
-    OfThreads<std::vector<std::int64_t>> sorted;
+    PerWorker<std::vector<std::int64_t>> sorted;
     tbb::parallel_for(std::size_t{0}, lookup.leaves.size(), [&](std::size_t k) {
         VdbLeaf& leaf = lookup.leaves[k];
         sort_leaf(entries.subspan(leaf.first, leaf.size), leaf, sorted.local());
@@ -271,7 +271,7 @@ template <class... T>
 struct StretchesOf<std::variant<Column<T>...>> {
     using Type = std::tuple<Stretch<T>..., Stretch<std::uint8_t>>;
 };
-using Stretches = OfThreads<StretchesOf<AnyColumn>::Type>;
+using Stretches = PerWorker<StretchesOf<AnyColumn>::Type>;
 
 template <class T>
 MovedColumn moved(const Column<T>& column, Column<T>& into, Stretches& stretches)
@@ -366,7 +366,7 @@ PointSet sorted_points(const PointSet& points, const Voxels& voxels, Lookup& loo
         }
 
     const Strided<Vec3f> P = std::as_const(result).P().read();
-    OfThreads<std::vector<std::int64_t>> sorted;
+    PerWorker<std::vector<std::int64_t>> sorted;
     tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
         const Cell& cell = cells[c];
         LeafNumbers numbers_of;

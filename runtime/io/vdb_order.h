@@ -28,7 +28,7 @@ public:
     const std::vector<VdbLeaf>& leaves() const { return leaves_; }
     // Returns the points. The k-th one in order is at place(k).
     const PointSet& points() const { return points_; }
-    std::size_t place(std::size_t k) const { return is_sorted_ ? k : static_cast<std::uint32_t>(entries_[k]); }
+    std::size_t index(std::size_t k) const { return is_sorted_ ? k : static_cast<std::uint32_t>(entries_[k]); }
 
 private:
     PointSet points_;

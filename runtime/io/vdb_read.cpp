@@ -12,9 +12,9 @@
 
 #include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/message.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/id_order.h"
 #include "runtime/io/text_table.h"
 #include "runtime/io/vdb.h"
@@ -26,7 +26,7 @@
 namespace rapid {
 namespace {
 
-// Points in a message between processes (files/read_apart.h).
+// Points in a message between processes (files/read_sandboxed.h).
 
 template <class T>
 void send_column(const Column<T>& column, MessageWriter& message)
@@ -52,17 +52,17 @@ Column<T> receive_column(std::size_t points, MessageReader& message)
 void send_column(const Column<Token>& column, MessageWriter& message)
 {
     const TextTable table = text_table(column);
-    message.put(table.texts.size());
-    for (const Token text : table.texts) message.put_text(std::string(text.text()));
-    send_column(table.places, message);
+    message.put(table.strings.size());
+    for (const Token text : table.strings) message.put_text(std::string(text.text()));
+    send_column(table.indices, message);
 }
 
 template <>
 Column<Token> receive_column(std::size_t points, MessageReader& message)
 {
-    std::vector<Token> texts;
-    for (auto left = message.take<std::size_t>(); left > 0; --left) texts.push_back(token_of(message.take_text()));
-    return texts_at(texts, receive_column<std::int32_t>(points, message));
+    std::vector<Token> strings;
+    for (auto left = message.take<std::size_t>(); left > 0; --left) strings.push_back(token_of(message.take_text()));
+    return strings_at(strings, receive_column<std::int32_t>(points, message));
 }
 
 AnyColumn receive_any(std::uint8_t type, std::size_t points, MessageReader& message)
@@ -237,21 +237,21 @@ void read_attribute(PointSet& points, const std::vector<LeafRange>& ranges, cons
 using ReadAttribute = void (*)(PointSet&, const std::vector<LeafRange>&, const std::string&, const std::string&,
                                vdb::Index);
 
-void read_texts(PointSet& points, const std::vector<LeafRange>& ranges, const std::string& name)
+void read_strings(PointSet& points, const std::vector<LeafRange>& ranges, const std::string& name)
 {
     Column<Token>& column = column_for<Token>(points, name);
     if (ranges.empty()) return;
-    std::map<vdb::Index, Token> texts;  // by number in the file
-    texts[0] = Token();
+    std::map<vdb::Index, Token> strings;  // by number in the file
+    strings[0] = Token();
     const vdb::points::StringMetaCache list(ranges[0].leaf->attributeSet().descriptor().getMetadata());
-    for (const auto& [text, number] : list.map()) texts[number] = token_of(text);
+    for (const auto& [text, number] : list.map()) strings[number] = token_of(text);
     const std::span<Token> values = column.write();
     for_each_leaf(ranges, [&](const Leaf& leaf, std::size_t at) {
         const auto& array = vdb::points::StringAttributeArray::cast(leaf.constAttributeArray(name));
         const vdb::points::AttributeHandle<vdb::Index, vdb::points::StringCodec<false>> numbers(array);
         for (vdb::Index k = 0; k < leaf.getLastValue(); ++k) {
-            const auto found = texts.find(numbers.get(k));
-            if (found == texts.end())
+            const auto found = strings.find(numbers.get(k));
+            if (found == strings.end())
                 throw Error(fmt::format("the attribute \"{}\" has the text {}; there is none", name, numbers.get(k)));
             values[at + k] = found->second;
         }
@@ -301,12 +301,12 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
             continue;
         }
         if (vdb::points::isString(array) && array.stride() == 1) {
-            read_texts(points, ranges, name);
+            read_strings(points, ranges, name);
             continue;
         }
         const auto reader = readers().find(type);
         if (reader == readers().end() || !array.hasConstantStride()) {
-            LeftOut::add(fmt::format("the attribute \"{}\" of the type {}", name, type));
+            SkippedContents::add(fmt::format("the attribute \"{}\" of the type {}", name, type));
             continue;
         }
         for (vdb::Index component = 0; component < array.stride(); ++component)
@@ -328,13 +328,13 @@ void read_grid(const PointDataGrid& grid, std::size_t first, PointSet& points, b
 struct VdbPoints {
     PointSet points;
     bool has_id = false;
-    std::vector<std::string> left_out = {};
+    std::vector<std::string> skipped = {};
 };
 
 VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
 {
     initialize_openvdb();
-    const LeftOut left_out;
+    const SkippedContents skipped;
     try {
         VdbFile file(path);
         std::vector<PointDataGrid::ConstPtr> grids;
@@ -343,7 +343,7 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
         for (const vdb::GridBase::Ptr& grid : file.grids()) {
             if (!grid->isType<PointDataGrid>()) {
                 const std::string what = fmt::format("\"{}\" ({})", grid->getName(), grid->type());
-                LeftOut::add("the grid " + what);
+                SkippedContents::add("the grid " + what);
                 others += (others.empty() ? "" : ", ") + what;
                 continue;
             }
@@ -361,7 +361,7 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
             read_grid(*grid, first, read.points, read.has_id);
             for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) first += leaf->getLastValue();
         }
-        read.left_out = left_out.list();
+        read.skipped = skipped.list();
         return read;
     } catch (const vdb::Exception& error) {
         throw Error(fmt::format("can't be read: {}", error.what()));
@@ -371,26 +371,26 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
 void send(const VdbPoints& read, MessageWriter& message)
 {
     message.put(read.has_id);
-    message.put(read.left_out.size());
-    for (const std::string& what : read.left_out) message.put_text(what);
+    message.put(read.skipped.size());
+    for (const std::string& what : read.skipped) message.put_text(what);
     send_points(read.points, message);
 }
 
 VdbPoints receive(MessageReader& message)
 {
     const bool has_id = message.take<std::uint8_t>() != 0;
-    std::vector<std::string> left_out;
-    for (auto left = message.take<std::size_t>(); left > 0; --left) left_out.push_back(message.take_text());
-    return {receive_points(message), has_id, std::move(left_out)};
+    std::vector<std::string> skipped;
+    for (auto left = message.take<std::size_t>(); left > 0; --left) skipped.push_back(message.take_text());
+    return {receive_points(message), has_id, std::move(skipped)};
 }
 
-const ApartReader<VdbPoints> reader("points of .vdb", read_grids, send, receive);
+const SandboxedReader<VdbPoints> reader("points of .vdb", read_grids, send, receive);
 
 PointSet read_vdb(const std::filesystem::path& path)
 {
     check_readable(path);
-    auto [points, has_id, left_out] = reader(path);
-    for (const std::string& what : left_out) LeftOut::add(what);
+    auto [points, has_id, skipped] = reader(path);
+    for (const std::string& what : skipped) SkippedContents::add(what);
     if (points.empty()) return points;
     if (has_id) return reordered(points, id_order(points.id()));
     std::span<std::int64_t> ids = points.id().overwrite();

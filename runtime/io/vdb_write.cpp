@@ -71,15 +71,15 @@ PointDataTree::Ptr empty_tree(const PointSet& points)
 using TextNumbers = std::vector<vdb::Index>;
 
 // Stores the grid's list of strings in its metadata, in order of first use.
-TextNumbers list_texts(PointDataTree& tree, const PointSet& points)
+TextNumbers list_strings(PointDataTree& tree, const PointSet& points)
 {
     TextNumbers numbers;
-    const std::vector<std::string> names = names_of_texts(points);
+    const std::vector<std::string> names = string_column_names(points);
     if (names.empty()) return numbers;
     vdb::MetaMap& metadata = vdb::points::makeDescriptorUnique(tree)->getMetadata();
     vdb::points::StringMetaInserter list(metadata);
     for (const std::string& name : names)
-        for (const Token text : text_table(points.column<Token>(name)).texts) {
+        for (const Token text : text_table(points.column<Token>(name)).strings) {
             if (numbers.size() <= text.number) numbers.resize(std::size_t{text.number} + 1, 0);
             if (text != Token()) numbers[text.number] = list.insert(std::string(text.text()));
         }
@@ -104,7 +104,7 @@ Attribute attribute_of_positions(const VdbOrder& order, double voxel)
     result.copy = [&order, P = order.points().P().read(), per_metre = 1 / voxel](const VdbLeaf& leaf, std::uint32_t n,
                                                                                  char* to) {
         for (std::uint32_t k = 0; k < n; ++k) {
-            const Vec3f& here = P[order.place(leaf.first + k)];
+            const Vec3f& here = P[order.index(leaf.first + k)];
             vdb::Vec3f offset;
             for (int axis = 0; axis < 3; ++axis) {
                 const double index = here[axis] * per_metre;
@@ -132,14 +132,14 @@ Attribute attribute_of(const VdbOrder& order, const Column<T>& column, const Tex
     result.bytes = sizeof(Value);
     result.is_uniform = [&order, values = column.read()](const VdbLeaf& leaf) {
         if (values.stride == 0) return true;
-        const T& first = values[order.place(leaf.first)];
+        const T& first = values[order.index(leaf.first)];
         for (std::uint32_t k = 1; k < leaf.size; ++k)
-            if (std::memcmp(&values[order.place(leaf.first + k)], &first, sizeof(T)) != 0) return false;
+            if (std::memcmp(&values[order.index(leaf.first + k)], &first, sizeof(T)) != 0) return false;
         return true;
     };
     result.copy = [&order, &numbers, values = column.read()](const VdbLeaf& leaf, std::uint32_t n, char* to) {
         for (std::uint32_t k = 0; k < n; ++k) {
-            const Value value = value_in_file(values[order.place(leaf.first + k)], numbers);
+            const Value value = value_in_file(values[order.index(leaf.first + k)], numbers);
             std::memcpy(to + k * sizeof value, &value, sizeof value);
         }
     };
@@ -157,13 +157,13 @@ Attribute attribute_of_groups(const VdbOrder& order, const std::vector<std::pair
     Attribute result;
     result.bytes = 1;
     result.is_uniform = [&order, value](const VdbLeaf& leaf) {
-        const std::uint8_t first = value(order.place(leaf.first));
+        const std::uint8_t first = value(order.index(leaf.first));
         for (std::uint32_t k = 1; k < leaf.size; ++k)
-            if (value(order.place(leaf.first + k)) != first) return false;
+            if (value(order.index(leaf.first + k)) != first) return false;
         return true;
     };
     result.copy = [&order, value](const VdbLeaf& leaf, std::uint32_t n, char* to) {
-        for (std::uint32_t k = 0; k < n; ++k) to[k] = static_cast<char>(value(order.place(leaf.first + k)));
+        for (std::uint32_t k = 0; k < n; ++k) to[k] = static_cast<char>(value(order.index(leaf.first + k)));
     };
     return result;
 }
@@ -508,7 +508,7 @@ void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame)
     try {
         const double voxel = std::ldexp(1.0, voxel_exponent(points));
         const PointDataTree::Ptr model = empty_tree(points);
-        const TextNumbers numbers = list_texts(*model, points);
+        const TextNumbers numbers = list_strings(*model, points);
         if (points.empty()) {
             PointDataGrid grid(model);
             write_grid(file, grid, voxel, frame);

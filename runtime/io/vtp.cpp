@@ -30,8 +30,8 @@
 #include "runtime/files/base64.h"
 #include "runtime/files/deflate.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/scalars.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
@@ -62,7 +62,7 @@ public:
     const pugi::xml_document& document() const { return document_; }
 
     // Reads an array of `rows` strings, each terminated by a zero byte. Throws Error if it is missing or too short.
-    std::vector<Token> texts(pugi::xml_node node, std::size_t rows) const;
+    std::vector<Token> strings(pugi::xml_node node, std::size_t rows) const;
 
     // Reads an array with `rows` rows. Returns nothing for arrays that can't be attributes: strings, bits, more than 16
     // numbers per row. Throws Error if the array is missing or too short.
@@ -74,9 +74,9 @@ private:
     // Returns the data of an array, from the XML or the appended section, and whether they are Base64.
     std::pair<std::string_view, bool> data_of(pugi::xml_node node, std::string_view text) const;
     // Returns the raw bytes in `text`, which follow their count.
-    std::span<const unsigned char> raw(std::string_view text, std::size_t wanted) const;
+    std::span<const unsigned char> raw(std::string_view text, std::size_t needed) const;
     // Returns the same bytes if they are encoded or compressed.
-    std::vector<unsigned char> decode(std::string_view text, bool base64, std::size_t wanted) const;
+    std::vector<unsigned char> decode(std::string_view text, bool base64, std::size_t needed) const;
     std::size_t header_number(std::span<const unsigned char> bytes, std::size_t index) const;
 
     pugi::xml_document document_;
@@ -173,16 +173,16 @@ std::size_t VtkFile::header_number(std::span<const unsigned char> bytes, std::si
     return load_scalar<std::uint32_t>(bytes.data() + 4 * index, order_);
 }
 
-std::span<const unsigned char> VtkFile::raw(std::string_view text, std::size_t wanted) const
+std::span<const unsigned char> VtkFile::raw(std::string_view text, std::size_t needed) const
 {
     const std::size_t header = wide_header_ ? 8 : 4;
     const auto* bytes = reinterpret_cast<const unsigned char*>(text.data());
-    if (text.size() < header || header_number({bytes, header}, 0) < wanted || wanted > text.size() - header)
+    if (text.size() < header || header_number({bytes, header}, 0) < needed || needed > text.size() - header)
         throw ends_early();
-    return {bytes + header, wanted};
+    return {bytes + header, needed};
 }
 
-std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, std::size_t wanted) const
+std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, std::size_t needed) const
 {
     const std::size_t number = wide_header_ ? 8 : 4;
     // Returns the next bytes. In Base64 the header and the data are encoded separately, and the header as a whole.
@@ -196,8 +196,8 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
     std::size_t length = 0;
     if (!compressed_) {
         // A byte count, then the data, encoded together.
-        if (header_number(bytes_at(number, length), 0) < wanted || wanted > text.size()) throw ends_early();
-        std::vector<unsigned char> bytes = bytes_at(number + wanted, length);
+        if (header_number(bytes_at(number, length), 0) < needed || needed > text.size()) throw ends_early();
+        std::vector<unsigned char> bytes = bytes_at(number + needed, length);
         bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(number));
         return bytes;
     }
@@ -215,11 +215,11 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
         packed += bytes;
         if (packed > text.size()) throw ends_early();
     }
-    if (wanted / most_deflate_expansion > packed) throw ends_early();
+    if (needed / max_deflate_expansion > packed) throw ends_early();
     const std::vector<unsigned char> data = bytes_at(packed, length);
-    if (const auto all = static_cast<double>(wanted); !fits_in_memory(all))
-        throw beyond_memory("an array, decompressed,", all, "write fewer points to the file");
-    std::vector<unsigned char> result(wanted);
+    if (const auto all = static_cast<double>(needed); !fits_in_memory(all))
+        throw memory_exceeded("an array, decompressed,", all, "write fewer points to the file");
+    std::vector<unsigned char> result(needed);
     std::size_t from = 0, to = 0;
     for (std::size_t b = 0; b < blocks; ++b) {
         const std::size_t size = b + 1 == blocks && last > 0 ? last : block;
@@ -232,7 +232,7 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
         from += packed_size;
         to += size;
     }
-    if (to < wanted) throw ends_early();
+    if (to < needed) throw ends_early();
     return result;
 }
 
@@ -249,7 +249,7 @@ std::size_t VtkFile::bytes_of(std::string_view text, bool base64) const
     if (!compressed_) return header_number(header(1), 0);
     const std::vector<unsigned char> sizes = header(3);
     const std::size_t blocks = header_number(sizes, 0), block = header_number(sizes, 1), last = header_number(sizes, 2);
-    if (blocks > text.size() / number || block > text.size() * most_deflate_expansion) throw ends_early();
+    if (blocks > text.size() / number || block > text.size() * max_deflate_expansion) throw ends_early();
     return blocks == 0 ? 0 : (blocks - 1) * block + (last > 0 ? last : block);
 }
 
@@ -264,7 +264,7 @@ std::pair<std::string_view, bool> VtkFile::data_of(pugi::xml_node node, std::str
     return {appended_.substr(*offset), appended_base64_};
 }
 
-std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
+std::vector<Token> VtkFile::strings(pugi::xml_node node, std::size_t rows) const
 {
     try {
         const std::string_view text = without_space(node.text().get());
@@ -286,15 +286,15 @@ std::vector<Token> VtkFile::texts(pugi::xml_node node, std::size_t rows) const
                 bytes = decode(data, base64, size);
             }
         }
-        std::vector<Token> texts;
-        TokensOfTexts token_of_row;
-        for (auto at = bytes.begin(); texts.size() < rows;) {
+        std::vector<Token> strings;
+        StringTokens token_of_row;
+        for (auto at = bytes.begin(); strings.size() < rows;) {
             const auto end = std::find(at, bytes.end(), 0);
             if (end == bytes.end()) throw ends_early();
-            texts.push_back(token_of_row(std::string(at, end)));
+            strings.push_back(token_of_row(std::string(at, end)));
             at = end + 1;
         }
-        return texts;
+        return strings;
     } catch (const Error& error) {
         throw Error(fmt::format("the array \"{}\" of {} texts: {}", node.attribute("Name").value(), rows, error.what()),
                     error.kind());
@@ -308,7 +308,7 @@ std::optional<VtkArray> VtkFile::array(pugi::xml_node node, std::size_t rows) co
     const std::optional<ScalarType> type = scalar_type(node.attribute("type").value());
     const pugi::xml_attribute components = node.attribute("NumberOfComponents");
     const std::size_t numbers = components ? whole_number(components.value()).value_or(0) : 1;
-    if (!type || numbers < 1 || numbers > most_numbers) return {};
+    if (!type || numbers < 1 || numbers > max_numbers) return {};
     VtkArray array{*type, numbers, order_, {}, {}};
     const std::size_t row = numbers * scalar_bytes(*type);
     try {
@@ -355,8 +355,8 @@ public:
           connectivity_(AnyColumn(Column<std::int64_t>(points.size()))),
           offsets_(AnyColumn(Column<std::int64_t>(!points.empty(), static_cast<std::int64_t>(points.size()))))
     {
-        const std::span<std::int64_t> places = std::get<Column<std::int64_t>>(connectivity_).write();
-        std::iota(places.begin(), places.end(), std::int64_t{0});
+        const std::span<std::int64_t> indices = std::get<Column<std::int64_t>>(connectivity_).write();
+        std::iota(indices.begin(), indices.end(), std::int64_t{0});
     }
 
     void write(OutputFile& file, const FrameInfo& frame)
@@ -371,8 +371,8 @@ public:
         for (const Array& array : arrays_) {
             const std::uint64_t bytes = array.bytes();
             file.write_at(at, &bytes, sizeof bytes);
-            if (array.texts)
-                write_texts(file, at + sizeof bytes, *array.texts);
+            if (array.strings)
+                write_strings(file, at + sizeof bytes, *array.strings);
             else
                 array.records.write(file, at + sizeof bytes, array.size);
             at += sizeof bytes + bytes;
@@ -384,24 +384,24 @@ private:
     struct Array {
         RecordWriter records;
         std::size_t size;
-        const Column<Token>* texts = nullptr;
+        const Column<Token>* strings = nullptr;
 
         std::uint64_t bytes() const
         {
-            if (!texts) return records.record_bytes() * size;
+            if (!strings) return records.record_bytes() * size;
             std::uint64_t sum = size;  // a zero byte after each
-            for (std::size_t i = 0; i < size; ++i) sum += (*texts)[i].text().size();
+            for (std::size_t i = 0; i < size; ++i) sum += (*strings)[i].text().size();
             return sum;
         }
     };
 
-    static void write_texts(OutputFile& file, std::uint64_t at, const Column<Token>& texts)
+    static void write_strings(OutputFile& file, std::uint64_t at, const Column<Token>& strings)
     {
         std::string piece;
-        for (std::size_t i = 0; i < texts.size(); ++i) {
-            piece += texts[i].text();
+        for (std::size_t i = 0; i < strings.size(); ++i) {
+            piece += strings[i].text();
             piece += '\0';
-            if (i + 1 < texts.size() && piece.size() < (std::size_t{1} << 20)) continue;
+            if (i + 1 < strings.size() && piece.size() < (std::size_t{1} << 20)) continue;
             file.write_at(at, piece.data(), piece.size());
             at += piece.size();
             piece.clear();
@@ -458,7 +458,7 @@ private:
         const std::size_t size = std::visit([](const auto& c) { return c.size(); }, column);
         const AttributeType type = type_of(column);
         Array& array = add(to, name, vtk_type(type), component_count(type), size);
-        if ((array.texts = std::get_if<Column<Token>>(&column)) == nullptr) array.records.add(name, column);
+        if ((array.strings = std::get_if<Column<Token>>(&column)) == nullptr) array.records.add(name, column);
     }
 
     Array& add(pugi::xml_node to, const std::string& name, std::string_view type, std::size_t numbers, std::size_t size)
@@ -499,7 +499,7 @@ RecordAttribute attribute_of_array(const std::string& name, const VtkArray& arra
     return attribute;
 }
 
-Column<Token> text_column(const std::vector<Token>& texts) { return Column<Token>(std::span<const Token>(texts)); }
+Column<Token> text_column(const std::vector<Token>& strings) { return Column<Token>(std::span<const Token>(strings)); }
 
 pugi::xml_node only_piece(const pugi::xml_document& document)
 {
@@ -539,9 +539,9 @@ PointSet read_vtp(const std::filesystem::path& path)
     for (const pugi::xml_node node : piece.child("PointData").children("DataArray")) {
         const std::optional<VtkArray> array = vtk.array(node, *n);
         if (!array) {
-            LeftOut::add(fmt::format("the array \"{}\" of the type {}, {} numbers a point",
-                                     node.attribute("Name").value(), node.attribute("type").value(),
-                                     node.attribute("NumberOfComponents").as_string("1")));
+            SkippedContents::add(fmt::format("the array \"{}\" of the type {}, {} numbers a point",
+                                             node.attribute("Name").value(), node.attribute("type").value(),
+                                             node.attribute("NumberOfComponents").as_string("1")));
             continue;
         }
         names.emplace_back(node.attribute("Name").value());
@@ -551,16 +551,16 @@ PointSet read_vtp(const std::filesystem::path& path)
         const std::string name = node.attribute("Name").value();
         if (node.attribute("type").value() != std::string_view("String") ||
             node.attribute("NumberOfComponents").as_uint(1) != 1) {
-            LeftOut::add(fmt::format("the array \"{}\" of the type {}", name, node.attribute("type").value()));
+            SkippedContents::add(fmt::format("the array \"{}\" of the type {}", name, node.attribute("type").value()));
             continue;
         }
         names.push_back(name);
-        points.set(name, text_column(vtk.texts(node, *n)));
+        points.set(name, text_column(vtk.strings(node, *n)));
     }
     for (const auto& [count, what] : {std::pair("NumberOfLines", "lines"), std::pair("NumberOfStrips", "strips"),
                                       std::pair("NumberOfPolys", "polygons")})
         if (const unsigned found = piece.attribute(count).as_uint(); found > 0)
-            LeftOut::add(fmt::format("its {} {}", found, what));
+            SkippedContents::add(fmt::format("its {} {}", found, what));
     check_column_names(names, "");
     if (!has_id) number_points(points);
     return points;

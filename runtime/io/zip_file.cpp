@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t longest_name = 0xffff;
 
 // Computes a position for Minizip, which seeks relative to one of these origins.
-std::uint64_t place_of(std::uint64_t offset, int origin, std::uint64_t position, std::uint64_t end)
+std::uint64_t seek_target(std::uint64_t offset, int origin, std::uint64_t position, std::uint64_t end)
 {
     if (origin == ZLIB_FILEFUNC_SEEK_CUR) return position + offset;
     return origin == ZLIB_FILEFUNC_SEEK_END ? end + offset : offset;
@@ -54,7 +54,7 @@ struct ZipWriter::Archive {
     static long seek(void* opaque, void*, ZPOS64_T offset, int origin)
     {
         Archive& archive = of(opaque);
-        archive.position = place_of(offset, origin, archive.position, archive.end);
+        archive.position = seek_target(offset, origin, archive.position, archive.end);
         return 0;
     }
     void check(int result) const
@@ -131,7 +131,7 @@ struct ZipReader::Archive {
     static long seek(void* opaque, void*, ZPOS64_T offset, int origin)
     {
         Archive& archive = of(opaque);
-        const std::uint64_t place = place_of(offset, origin, archive.position, archive.bytes.size());
+        const std::uint64_t place = seek_target(offset, origin, archive.position, archive.bytes.size());
         if (place > archive.bytes.size()) return -1;
         archive.position = place;
         return 0;
@@ -189,7 +189,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
             throw Error(fmt::format("\"{}\" is compressed by method {}; it must be stored or deflated", text,
                                     info.compression_method));
         held += std::min<std::uint64_t>(info.compressed_size, bytes.size() + 1);
-        const std::uint64_t expansion = info.compression_method == 0 ? 1 : most_deflate_expansion;
+        const std::uint64_t expansion = info.compression_method == 0 ? 1 : max_deflate_expansion;
         if (held > bytes.size() || info.uncompressed_size > info.compressed_size * expansion)
             throw Error(fmt::format("\"{}\" holds less than its directory promises; the file is damaged", text));
         members_.push_back({text, place.pos_in_zip_directory, place.num_of_file, info.uncompressed_size});
@@ -203,15 +203,16 @@ std::vector<unsigned char> ZipReader::read(const Member& member)
 {
     const auto wrong = [&] { return Error(fmt::format("\"{}\" is damaged", member.name)); };
     if (const auto bytes = static_cast<double>(member.bytes); !fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("\"{}\", decompressed,", member.name), bytes, "write fewer points to the file");
+        throw memory_exceeded(fmt::format("\"{}\", decompressed,", member.name), bytes,
+                              "write fewer points to the file");
     const unz64_file_pos place = {member.position, member.number};
     if (::unzGoToFilePos64(archive_->zip, &place) != UNZ_OK || ::unzOpenCurrentFile(archive_->zip) != UNZ_OK)
         throw wrong();
     std::vector<unsigned char> data(member.bytes);
     constexpr std::size_t most = 1 << 30;  // a read returns an int
     for (std::size_t done = 0; done < data.size();) {
-        const std::size_t wanted = std::min(most, data.size() - done);
-        const int read = ::unzReadCurrentFile(archive_->zip, data.data() + done, static_cast<unsigned>(wanted));
+        const std::size_t needed = std::min(most, data.size() - done);
+        const int read = ::unzReadCurrentFile(archive_->zip, data.data() + done, static_cast<unsigned>(needed));
         if (read <= 0) {
             ::unzCloseCurrentFile(archive_->zip);
             throw wrong();

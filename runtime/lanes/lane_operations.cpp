@@ -17,21 +17,21 @@
 namespace rapid {
 namespace {
 
-constexpr double most_float = std::numeric_limits<float>::max();
+constexpr double max_float = std::numeric_limits<float>::max();
 
 using Tile = LaneTile;
 using Now = LaneInstruction;
 
 // t = f(a), or f(a, b), pack by pack. Comparisons return flags.
 template <class F>
-bool of_one(Tile& tile, const Now& now)
+bool unary(Tile& tile, const Now& now)
 {
     const Doubles* const a = tile.slot(now.a);
     tile.fill(now.to, [&](std::size_t k) { return F()(a[k]); });
     return true;
 }
 template <class F>
-bool of_two(Tile& tile, const Now& now)
+bool binary(Tile& tile, const Now& now)
 {
     const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b);
     tile.fill(now.to, [&](std::size_t k) { return std::bit_cast<Doubles>(F()(a[k], b[k])); });
@@ -40,7 +40,7 @@ bool of_two(Tile& tile, const Now& now)
 
 // t = g(f(a, b), c), or g(c, f(a, b)).
 template <class F, class G>
-bool of_three(Tile& tile, const Now& now)
+bool ternary(Tile& tile, const Now& now)
 {
     const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b), *const c = tile.slot(now.c);
     tile.fill(now.to, [&](std::size_t k) { return G()(F()(a[k], b[k]), c[k]); });
@@ -123,10 +123,10 @@ struct Extreme {
         return ((a == a) & (b == b)) ? F()(a, b) + 0.0 : sum;
     }
 };
-struct Least {
+struct Min {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return least(a, b); }
 };
-struct Most {
+struct Max {
     Doubles operator()(const Doubles& a, const Doubles& b) const { return most(a, b); }
 };
 
@@ -343,7 +343,7 @@ bool index(Tile& tile, const Now& now)
 bool check_float(Tile& tile, const Now& now)
 {
     const Doubles *const a = tile.slot(now.a), *const b = tile.slot(now.b);
-    return !tile.any_of([&](std::size_t k) { return as_flags(a[k]) & ~(magnitude(b[k]) <= most_float); });
+    return !tile.any_of([&](std::size_t k) { return as_flags(a[k]) & ~(magnitude(b[k]) <= max_float); });
 }
 bool check_integer(const Tile& tile, const Now& now, double least, double most)
 {
@@ -363,46 +363,46 @@ bool fail(Tile& tile, const Now& now)
 }
 
 constexpr std::pair<std::string_view, LaneOperation> operations[] = {
-    {"Add", of_two<std::plus<>>},
-    {"Subtract", of_two<std::minus<>>},
-    {"Multiply", of_two<std::multiplies<>>},
-    {"Divide", of_two<std::divides<>>},
-    {"AddAdd", of_three<std::plus<>, std::plus<>>},
-    {"AddSubtract", of_three<std::plus<>, std::minus<>>},
-    {"AddSubtractFrom", of_three<std::plus<>, SubtractFrom>},
-    {"AddMultiply", of_three<std::plus<>, std::multiplies<>>},
-    {"SubtractAdd", of_three<std::minus<>, std::plus<>>},
-    {"SubtractSubtract", of_three<std::minus<>, std::minus<>>},
-    {"SubtractSubtractFrom", of_three<std::minus<>, SubtractFrom>},
-    {"SubtractMultiply", of_three<std::minus<>, std::multiplies<>>},
-    {"MultiplyAdd", of_three<std::multiplies<>, std::plus<>>},
-    {"MultiplySubtract", of_three<std::multiplies<>, std::minus<>>},
-    {"MultiplySubtractFrom", of_three<std::multiplies<>, SubtractFrom>},
-    {"MultiplyMultiply", of_three<std::multiplies<>, std::multiplies<>>},
-    {"Modulo", of_two<Modulo>},
-    {"Negate", of_one<std::negate<>>},
-    {"SquareRoot", of_one<SquareRoot>},
-    {"Absolute", of_one<Absolute>},
-    {"Floor", of_one<ByLane<Floor>>},
-    {"Ceiling", of_one<ByLane<Ceiling>>},
-    {"Least", of_two<Extreme<Least>>},
-    {"Most", of_two<Extreme<Most>>},
-    {"Sine", of_one<Sine>},
-    {"Cosine", of_one<Cosine>},
-    {"Exponential", of_one<Exponential>},
-    {"Logarithm", of_one<Logarithm>},
-    {"Power", of_two<Power>},
+    {"Add", binary<std::plus<>>},
+    {"Subtract", binary<std::minus<>>},
+    {"Multiply", binary<std::multiplies<>>},
+    {"Divide", binary<std::divides<>>},
+    {"AddAdd", ternary<std::plus<>, std::plus<>>},
+    {"AddSubtract", ternary<std::plus<>, std::minus<>>},
+    {"AddSubtractFrom", ternary<std::plus<>, SubtractFrom>},
+    {"AddMultiply", ternary<std::plus<>, std::multiplies<>>},
+    {"SubtractAdd", ternary<std::minus<>, std::plus<>>},
+    {"SubtractSubtract", ternary<std::minus<>, std::minus<>>},
+    {"SubtractSubtractFrom", ternary<std::minus<>, SubtractFrom>},
+    {"SubtractMultiply", ternary<std::minus<>, std::multiplies<>>},
+    {"MultiplyAdd", ternary<std::multiplies<>, std::plus<>>},
+    {"MultiplySubtract", ternary<std::multiplies<>, std::minus<>>},
+    {"MultiplySubtractFrom", ternary<std::multiplies<>, SubtractFrom>},
+    {"MultiplyMultiply", ternary<std::multiplies<>, std::multiplies<>>},
+    {"Modulo", binary<Modulo>},
+    {"Negate", unary<std::negate<>>},
+    {"SquareRoot", unary<SquareRoot>},
+    {"Absolute", unary<Absolute>},
+    {"Floor", unary<ByLane<Floor>>},
+    {"Ceiling", unary<ByLane<Ceiling>>},
+    {"Least", binary<Extreme<Min>>},
+    {"Most", binary<Extreme<Max>>},
+    {"Sine", unary<Sine>},
+    {"Cosine", unary<Cosine>},
+    {"Exponential", unary<Exponential>},
+    {"Logarithm", unary<Logarithm>},
+    {"Power", binary<Power>},
     {"Call1", call1},
     {"Call2", call2},
-    {"Less", of_two<std::less<>>},
-    {"LessOrEqual", of_two<std::less_equal<>>},
-    {"Equal", of_two<std::equal_to<>>},
-    {"And", of_two<And>},
-    {"AndNot", of_two<AndNot>},
-    {"Or", of_two<Or>},
+    {"Less", binary<std::less<>>},
+    {"LessOrEqual", binary<std::less_equal<>>},
+    {"Equal", binary<std::equal_to<>>},
+    {"And", binary<And>},
+    {"AndNot", binary<AndNot>},
+    {"Or", binary<Or>},
     {"Choose", choose},
-    {"Round", of_one<Round>},
-    {"Whole", of_one<Whole>},
+    {"Round", unary<Round>},
+    {"Whole", unary<Whole>},
     {"Random", random},
     {"LoadFloat", load<float>},
     {"LoadDouble", load<double>},

@@ -23,8 +23,8 @@ public:
     const LaneChunk& chunk;
     const std::size_t first, size;  // points of the tile in the chunk; lanes after the last point hold arbitrary values
 
-    Doubles* slot(std::uint16_t place) const { return slots_[place].pack; }
-    double* numbers(std::uint16_t place) const { return slots_[place].numbers(); }
+    Doubles* slot(std::uint16_t index) const { return slots_[index].pack; }
+    double* numbers(std::uint16_t index) const { return slots_[index].numbers(); }
 
     // Sets slot `to` to value(k), pack by pack.
     template <class Value>
@@ -45,9 +45,9 @@ public:
 
     bool visits_all() const { return size == points && !chunk.members; }
     bool visits(std::size_t i) const { return is_set(LaneProgram::visited, i); }
-    bool is_set(std::uint16_t place, std::size_t i) const
+    bool is_set(std::uint16_t index, std::size_t i) const
     {
-        return std::bit_cast<std::uint64_t>(numbers(place)[i]) != 0;
+        return std::bit_cast<std::uint64_t>(numbers(index)[i]) != 0;
     }
 
 private:

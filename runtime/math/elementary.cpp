@@ -54,7 +54,7 @@ DoubleDouble<double> exactly(std::uint64_t n)
 }
 
 // Returns the number of quarter turns, modulo 4, and the remaining angle (Payne and Hanek 1983). Precondition: the
-// angle is finite, and |angle| > elementary::most_angle.
+// angle is finite, and |angle| > elementary::max_angle.
 elementary::Quarters<double> quarters_of_large(double angle)
 {
     int exponent = 0;
@@ -88,7 +88,7 @@ using elementary::Quarters;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Returns false also for NaN and infinity.
-bool is_reduced(double x) { return std::abs(x) <= elementary::most_angle; }
+bool is_reduced(double x) { return std::abs(x) <= elementary::max_angle; }
 
 Quarters<double> quarters_of(double x)
 {
@@ -102,7 +102,7 @@ Doubles sine_of_lanes(const Doubles& x, std::int64_t quarters)
     Doubles value = by_registers(
         x, [&](const Register& part)
                __attribute__((always_inline)) { return elementary::sine(Quarters<Register>(part), quarters); });
-    if (!any(!(magnitude(x) <= elementary::most_angle))) return value;
+    if (!any(!(magnitude(x) <= elementary::max_angle))) return value;
     for (std::uint32_t l = 0; l < lanes; ++l)
         if (!is_reduced(x[l])) value[l] = elementary::sine(quarters_of(x[l]), quarters);
     return value;

@@ -110,7 +110,7 @@ inline DoubleDouble<double> square_root(const DoubleDouble<double>& a)
 
 namespace elementary {
 
-constexpr double most_angle = 0x1p20;    // rad; larger angles need quarters_of_large()
+constexpr double max_angle = 0x1p20;     // rad; larger angles need quarters_of_large()
 constexpr double to_integer = 0x1.8p52;  // adding and subtracting it rounds; the integer is in the last bits
 
 // Returns p[0] + p[1] x + p[2] x² + ...

@@ -223,7 +223,7 @@ public:
 
 private:
     int size_;
-    std::array<Octave, NoiseOptions::most_octaves> all_;
+    std::array<Octave, NoiseOptions::max_octaves> all_;
 };
 
 // Returns a position in the lattice of an octave.

@@ -16,10 +16,10 @@ namespace rapid {
 
 struct NoiseOptions {
     double time = 0;  // s; the field costs half at whole times, such as 0
-    int octaves = 1;  // from 1 to most_octaves
+    int octaves = 1;  // from 1 to max_octaves
     std::uint32_t seed = 0;
 
-    static constexpr int most_octaves = 16;
+    static constexpr int max_octaves = 16;
 };
 
 // Returns a value in [-1, 1] with mean 0 and, for one octave, a root mean square of 0.19. gradient: 1/m; may be null.

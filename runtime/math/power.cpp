@@ -8,13 +8,13 @@ namespace rapid {
 namespace {
 
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
-constexpr double least_normal = std::numeric_limits<double>::min(), largest = std::numeric_limits<double>::max();
+constexpr double min_normal = std::numeric_limits<double>::min(), largest = std::numeric_limits<double>::max();
 
 bool has_logarithm(double x) { return x > 0 && x < HUGE_VAL; }
 
 DoubleDouble<double> parts_of_logarithm(double x)
 {
-    return x < least_normal ? elementary::parts_of_logarithm(x * 0x1p54, -54) : elementary::parts_of_logarithm(x);
+    return x < min_normal ? elementary::parts_of_logarithm(x * 0x1p54, -54) : elementary::parts_of_logarithm(x);
 }
 
 // Returns the logarithm of 0, infinity, NaN and negative numbers.
@@ -61,7 +61,7 @@ void replace_lanes(Doubles& value, const Flags& marked, const F& f)
 double logarithm(double x)
 {
     if (!has_logarithm(x)) return beyond_logarithms(x);
-    return x < least_normal ? elementary::logarithm(x * 0x1p54, -54) : elementary::logarithm(x);
+    return x < min_normal ? elementary::logarithm(x * 0x1p54, -54) : elementary::logarithm(x);
 }
 
 double logarithm10(double x)
@@ -101,7 +101,7 @@ Doubles logarithm(const Doubles& x)
 {
     Doubles value = by_registers(
         x, [](const Register& part) __attribute__((always_inline)) { return elementary::logarithm(part); });
-    replace_lanes(value, ~((x >= least_normal) & (x <= largest)), [&](std::uint32_t l) { return logarithm(x[l]); });
+    replace_lanes(value, ~((x >= min_normal) & (x <= largest)), [&](std::uint32_t l) { return logarithm(x[l]); });
     return value;
 }
 
@@ -115,7 +115,7 @@ Doubles power(const Doubles& x, const Doubles& y)
             return elementary::power(elementary::parts_of_logarithm(base), exponent);
         });
     const Flags is_usual =
-        (x >= least_normal) & (x <= largest) & (magnitude(y) <= 1e300) & (y != 1) & (y != 2) & (y != 0.5) & (y != -1);
+        (x >= min_normal) & (x <= largest) & (magnitude(y) <= 1e300) & (y != 1) & (y != 2) & (y != 0.5) & (y != -1);
     replace_lanes(value, ~is_usual, [&](std::uint32_t l) { return power(x[l], y[l]); });
     return value;
 }

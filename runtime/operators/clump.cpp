@@ -19,7 +19,7 @@
 namespace rapid {
 namespace {
 
-constexpr double bytes_a_bond = 320;  // a row, its entry in the index of bonds, and the search for it
+constexpr double bytes_per_bond = 320;  // a row, its entry in the index of bonds, and the search for it
 
 struct Bond {
     static constexpr int points = 2;
@@ -47,8 +47,8 @@ struct Bond {
 // The bonds of a node, over a run. New ones are searched for once per frame, at its beginning.
 class Bonds : public Rows<Bond> {
 public:
-    double strength = 0;                           // N, in this frame
-    std::set<std::array<std::int64_t, 2>> parted;  // broken, not yet apart: by id, the smaller first
+    double strength = 0;                                 // N, in this frame
+    std::set<std::array<std::int64_t, 2>> broken_pairs;  // broken, not yet apart: by id, the smaller first
 
     // Input of the last search: if all points sleep, it is unchanged and finds nothing new.
     struct Searched {
@@ -69,13 +69,13 @@ public:
     void serialize(Archive& keep)
     {
         Rows<Bond>::serialize(keep);
-        keep(strength, parted, searched);
+        keep(strength, broken_pairs, searched);
     }
 
     void solve_velocities(Substep& step) override
     {
         Rows<Bond>::solve_velocities(step);
-        break_above(strength, step, [&](const Ids& ids) { parted.insert(ids); });
+        break_above(strength, step, [&](const Ids& ids) { broken_pairs.insert(ids); });
     }
 };
 
@@ -113,21 +113,22 @@ private:
         }
         if (now == memory->searched) return;
         Pairs near;
-        ContactSearch().find(at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, {}, 8), near,
-                             {fmt::format("radius = {:g} m", largest / touch), "give a smaller radius", bytes_a_bond});
+        ContactSearch().find(
+            at, {reach.data(), 1}, RadiusGrids({reach.data(), 1}, n, {}, 8), near,
+            {fmt::format("radius = {:g} m", largest / touch), "give a smaller radius", bytes_per_bond});
 
         std::set<std::array<std::int64_t, 2>> touching;
         for (std::size_t i = 0; i < n; ++i)
             for (const std::uint32_t j : near.of(i)) {
                 const std::array<std::int64_t, 2> pair{std::min(id[i], id[j]), std::max(id[i], id[j])};
-                if (memory->parted.count(pair)) {
+                if (memory->broken_pairs.count(pair)) {
                     touching.insert(pair);
                 } else if (!memory->has(pair)) {
                     const double touch_at = double(given[i]) + double(given[j]);
                     memory->add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
                 }
             }
-        memory->parted = std::move(touching);
+        memory->broken_pairs = std::move(touching);
         memory->searched = std::move(now);
     }
 };

@@ -17,13 +17,13 @@ namespace rapid {
 namespace {
 
 // The parameter `record`: false, true (every contact), or a minimum impact speed.
-struct LeastSpeed {
+struct MinSpeed {
     static constexpr std::string_view param_type = "false or number";
 
     std::optional<double> speed;
 };
 
-void read_value(const Param& param, const Value& value, LeastSpeed& least)
+void read_value(const Param& param, const Value& value, MinSpeed& least)
 {
     if (const bool* flag = value.get<bool>())
         least.speed = *flag ? std::optional<double>(0) : std::nullopt;
@@ -50,7 +50,7 @@ struct ColliderShape {
     throw Error(
         fmt::format("{} = {} has no inside to keep out of, as it is open: {} of its edges have one face; {}, then take "
                     "rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
-                    param.name, describe(value), open, how_to_close_a_mesh));
+                    param.name, describe(value), open, open_mesh_remedy));
 }
 
 void read_value(const Param& param, const Value& value, ColliderShape& shape)
@@ -73,7 +73,7 @@ struct Collide {
     ColliderShape shape;
     MotionPtr transform;
     std::string method, response;
-    LeastSpeed record;
+    MinSpeed record;
     PerPoint<float> bounce, friction;
     std::optional<PerPoint<float>> radius, adhesion;
     PerPoint<float> viscosity;

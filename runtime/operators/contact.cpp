@@ -14,7 +14,7 @@ namespace rapid {
 namespace {
 
 // Above this, points born in one another may fly apart: 10 m/s at 5, 2,700 at 8, for 1 and 10 kg in 0.02 m.
-constexpr double most_scaling = 4;
+constexpr double max_scaling = 4;
 
 class ContactConstraint : public RememberingConstraint<ContactConstraint, Contacts> {
 public:
@@ -56,7 +56,7 @@ struct ContactNode {
                 "largest difference of radii within one search grid; the default is half of the largest radius in it")
             .param(&ContactNode::max_grids, "max_grids", 8.0, between(1, 254), "",
                    "maximum number of search grids for different radii")
-            .param(&ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, most_scaling), "",
+            .param(&ContactNode::mass_scaling, "mass_scaling", 0.0, between(0, max_scaling), "",
                    "makes a point count as e^mass_scaling times lighter than the one below it, so that tall stacks "
                    "hold with few substeps")
             .param(&ContactNode::record, "record", false, any_number(), "",

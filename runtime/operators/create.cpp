@@ -18,7 +18,7 @@
 namespace rapid {
 namespace {
 
-constexpr int most_subframes = 10000;
+constexpr int max_subframes = 10000;
 
 struct Create {
     double fps;
@@ -37,7 +37,7 @@ struct Create {
             .constant()
             .param(&Create::seed, "seed", 0.0, at_least(0), "", "seed of all random numbers of this simulation")
             .constant()
-            .param(&Create::subframes, "subframes", 1.0, between(1, most_subframes), "",
+            .param(&Create::subframes, "subframes", 1.0, between(1, max_subframes), "",
                    "evaluations of the whole graph per frame, with scripts, emitters and colliders; not the solver's "
                    "substeps")
             .constant()

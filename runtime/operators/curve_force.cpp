@@ -108,19 +108,19 @@ struct CurveForce {
         for (std::size_t i = 0; i < chunk.size(); ++i) {
             if (curve.step && chunk.time[i] != time) curve.step->at(time = chunk.time[i], P, v);
             const Nearest nearest = nearest_to(chunk.P[i], *lines, curve.step ? P : curve.P, v);
-            if (nearest.beyond) continue;
+            if (nearest.is_beyond_end) continue;
             const double part = radius ? 1 - nearest.distance2 / std::pow(double(reach[i]), 2) : 1;
             if (part <= 0) continue;
             forces.add_drag(i, rate[i] * part * part, along[i] * nearest.direction + nearest.v);
-            forces.add_spring(i, towards[i] * part * part, nearest.place);
+            forces.add_spring(i, towards[i] * part * part, nearest.position);
         }
     }
 
 private:
     struct Nearest {
-        Vec3d place, direction, v = Vec3d::Zero();
+        Vec3d position, direction, v = Vec3d::Zero();
         double distance2 = std::numeric_limits<double>::infinity();
-        bool beyond = false;  // an end of an open curve
+        bool is_beyond_end = false;  // an end of an open curve
     };
 
     // Returns the curve's unit direction at one of its points. on_line: the direction of the line.
@@ -128,8 +128,8 @@ private:
                               const std::vector<Vec3d>& P)
     {
         const auto at = [&](std::int32_t k) -> const Vec3d& { return P[static_cast<std::size_t>(k >= 0 ? k : i)]; };
-        const auto place = static_cast<std::size_t>(i);
-        const Vec3d d = at(lines.after[place]) - at(lines.before[place]);
+        const auto position = static_cast<std::size_t>(i);
+        const Vec3d d = at(lines.after[position]) - at(lines.before[position]);
         return d.norm() > 0 ? Vec3d(d.normalized()) : on_line;  // the curve turns back there
     }
 
@@ -144,19 +144,19 @@ private:
             return of[static_cast<std::size_t>(k)];
         };
         for (const CurveLines::Line& line : lines.lines) {
-            const Vec3d &a = at(P, line.a), way = at(P, line.b) - a;
-            const double length2 = way.squaredNorm(), u = length2 > 0 ? (from - a).dot(way) / length2 : 0;
-            const Vec3d place = a + std::clamp(u, 0.0, 1.0) * way;
-            const double d2 = (from - place).squaredNorm();
-            if (d2 < found.distance2) found.place = place, found.distance2 = d2, on = line, part = u;
+            const Vec3d &a = at(P, line.a), segment = at(P, line.b) - a;
+            const double length2 = segment.squaredNorm(), u = length2 > 0 ? (from - a).dot(segment) / length2 : 0;
+            const Vec3d position = a + std::clamp(u, 0.0, 1.0) * segment;
+            const double d2 = (from - position).squaredNorm();
+            if (d2 < found.distance2) found.position = position, found.distance2 = d2, on = line, part = u;
         }
-        found.beyond = (part < 0 && lines.before[static_cast<std::size_t>(on.a)] < 0) ||
-                       (part > 1 && lines.after[static_cast<std::size_t>(on.b)] < 0);
+        found.is_beyond_end = (part < 0 && lines.before[static_cast<std::size_t>(on.a)] < 0) ||
+                              (part > 1 && lines.after[static_cast<std::size_t>(on.b)] < 0);
         part = std::clamp(part, 0.0, 1.0);
-        const Vec3d way = (at(P, on.b) - at(P, on.a)).normalized();
+        const Vec3d segment = (at(P, on.b) - at(P, on.a)).normalized();
         const Vec3d direction =
-            (1 - part) * direction_at(on.a, way, lines, P) + part * direction_at(on.b, way, lines, P);
-        found.direction = direction.norm() > 0 ? Vec3d(direction.normalized()) : way;
+            (1 - part) * direction_at(on.a, segment, lines, P) + part * direction_at(on.b, segment, lines, P);
+        found.direction = direction.norm() > 0 ? Vec3d(direction.normalized()) : segment;
         if (!v.empty()) found.v = at(v, on.a) + part * (at(v, on.b) - at(v, on.a));
         return found;
     }

@@ -45,7 +45,7 @@ struct Delete {
     }
 
     bool removes_points() const { return true; }
-    bool asks_places() const { return where && where->asks_places(); }
+    bool reads_indices() const { return where && where->reads_indices(); }
 
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {

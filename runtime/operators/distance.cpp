@@ -21,17 +21,17 @@ struct PointPair {
 
 void read_value(const Param& param, const Value& value, PointPair& pair)
 {
-    std::vector<int> places;
-    read_value(param, value, places);
-    if (places.size() != 2)
-        throw Error(
-            fmt::format("{} has an entry of {} numbers; each must be two places, {{i, j}}", param.name, places.size()));
-    pair = {places[0], places[1]};
+    std::vector<int> indices;
+    read_value(param, value, indices);
+    if (indices.size() != 2)
+        throw Error(fmt::format("{} has an entry of {} numbers; each must be two places, {{i, j}}", param.name,
+                                indices.size()));
+    pair = {indices[0], indices[1]};
 }
 
 namespace {
 
-constexpr double bytes_a_tie = 256;  // a row, and the search for it
+constexpr double bytes_per_tie = 256;  // a row, and the search for it
 
 // Length, m, below which the square of a length underflows, so that dividing by its root is unsafe.
 constexpr double no_length = 1e-150;
@@ -187,7 +187,7 @@ private:
         const Strided<std::uint8_t> members = members_of(points, group);
         Pairs near;
         ContactSearch().find(at, {&reach, 0}, RadiusGrids({&reach, 0}, at.size(), 0, 1), near,
-                             {fmt::format("within = {:g}", *within), "give a smaller within", bytes_a_tie});
+                             {fmt::format("within = {:g}", *within), "give a smaller within", bytes_per_tie});
         for (std::size_t i = 0; i < at.size(); ++i)
             for (const std::uint32_t j : near.of(i))
                 if (members[i] && members[j]) add(i, j);

@@ -30,8 +30,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t batch_size = 256;     // births processed together, in the first-level cache
-constexpr double most_births = 2147483647;  // in a frame
+constexpr std::size_t batch_size = 256;    // births processed together, in the first-level cache
+constexpr double max_births = 2147483647;  // in a frame
 
 // The newborn points' part of the columns with individual values, shape [n]; other columns are empty.
 struct NewbornColumns {
@@ -39,7 +39,7 @@ struct NewbornColumns {
     std::span<std::int64_t> id;
     std::span<float> dt, age, birthtime, life;
     // Copy inherited attributes to the newborn from number `first` on.
-    std::vector<std::function<void(std::size_t first, std::span<const Birthplace> places)>> inherit;
+    std::vector<std::function<void(std::size_t first, std::span<const Birthplace> birthplaces)>> inherit;
     // Draw the values that differ between births.
     std::vector<DrawValues> draw;
 };
@@ -75,7 +75,7 @@ struct Emit : Newborn {
         declare_source(type);
         type.param(&Emit::rate, "rate", Value(), at_least(0), "1/s", "births per second")
             .param(&Emit::count, "count", Value(), at_least(0), "", "births per frame")
-            .param(&Emit::impulse, "impulse", Value(), between(0, most_births), "",
+            .param(&Emit::impulse, "impulse", Value(), between(0, max_births), "",
                    "births in single frames, {[frame] = count}; those of the first frame have not moved yet")
             .param(&Emit::age, "age", Value(), at_least(0), "s",
                    "age at the end of the frame of birth, instead of birth: a number, {min, max}, or an attribute of "
@@ -106,7 +106,7 @@ struct Emit : Newborn {
             .param(
                 &Emit::alpha, "alpha", 0.5, any_number(), "",
                 "tangents of the spline as a fraction of the path over two frames; 0.5 keeps a uniform motion uniform")
-            .param(&Emit::cut, "cut", Value(), between(-most_births, most_births), "",
+            .param(&Emit::cut, "cut", Value(), between(-max_births, max_births), "",
                    "frames to which the source jumps, without births in between; by default large jumps are detected "
                    "and reported")
             .param(&Emit::inherit_velocity, "inherit_velocity", 1.0, any_number(), "",
@@ -216,9 +216,9 @@ private:
             return clock_.at_once(has_impulse_by(*impulse, now.frame.number) ? trial_births : 0, clock.fps);
         if (!rate) return births_of_frame(step, clock);
         const double steps = clock.steps_per_second();
-        if (*rate / steps > most_births)
+        if (*rate / steps > max_births)
             throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate,
-                                    *rate / steps, most_births));
+                                    *rate / steps, max_births));
         return clock_.at_rate(*rate, step, steps);
     }
 
@@ -258,11 +258,11 @@ private:
     // Throws Error if the newborn points, plus a copy of the existing ones, do not fit in memory.
     void require_room(const PointSet& points, std::size_t n) const
     {
-        const double bytes = static_cast<double>(n) * bytes_a_birth + static_cast<double>(points.bytes());
+        const double bytes = static_cast<double>(n) * bytes_per_birth + static_cast<double>(points.bytes());
         if (fits_in_memory(bytes)) return;
         const char* amount = rate ? "rate" : count ? "count" : "impulse";
-        throw beyond_memory(fmt::format("{} births in a frame, behind {} points,", n, points.size()), bytes,
-                            fmt::format("give a smaller {}", amount));
+        throw memory_exceeded(fmt::format("{} births in a frame, behind {} points,", n, points.size()), bytes,
+                              fmt::format("give a smaller {}", amount));
     }
 
     void make_columns(PointSet& points, const BirthAges& ages, const Evaluation& now) const;
@@ -270,7 +270,7 @@ private:
                 const Evaluation& now) const;
     NewbornColumns newborn_columns(PointSet& points, std::size_t n, const BirthAges& ages,
                                    const BirthVelocity& velocity, const Evaluation& now) const;
-    void fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> places,
+    void fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> birthplaces,
               const BirthAges& ages, const BirthVelocity& velocity, const Evaluation& now) const;
 
     Subset subset_;
@@ -325,9 +325,9 @@ void Emit::emit(Flow& flow, Births births, const Evaluation& now)
     append(points, n, ages, velocities, now);
     const NewbornColumns newborn = newborn_columns(points, n, ages, velocities, now);
     for_each_chunk(n, [&](std::size_t chunk_begin, std::size_t chunk_end) {
-        std::array<Birthplace, batch_size> places;
+        std::array<Birthplace, batch_size> birthplaces;
         for (std::size_t begin = chunk_begin; begin < chunk_end; begin += batch_size)
-            fill(newborn, chosen, begin, std::span(places).first(std::min(batch_size, chunk_end - begin)), ages,
+            fill(newborn, chosen, begin, std::span(birthplaces).first(std::min(batch_size, chunk_end - begin)), ages,
                  velocities, now);
         const Items in_frame = chosen.in_frame(0);
         for (std::size_t i = chunk_begin; i < chunk_end; ++i)
@@ -400,8 +400,9 @@ NewbornColumns Emit::newborn_columns(PointSet& points, std::size_t n, const Birt
                 using T = std::decay_t<decltype(column[0])>;
                 if (column.is_uniform()) return;
                 newborn.inherit.push_back([this, values = column.read(), to = points.column<T>(name).write().last(n)](
-                                              std::size_t first, std::span<const Birthplace> places) {
-                    for (std::size_t i = 0; i < places.size(); ++i) to[first + i] = source_.value(values, places[i]);
+                                              std::size_t first, std::span<const Birthplace> birthplaces) {
+                    for (std::size_t i = 0; i < birthplaces.size(); ++i)
+                        to[first + i] = source_.value(values, birthplaces[i]);
                 });
             },
             *source_.values().find(name));
@@ -409,10 +410,11 @@ NewbornColumns Emit::newborn_columns(PointSet& points, std::size_t n, const Birt
 }
 
 // Fills a batch of births, from index `first` of the chosen ones on, column by column.
-void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first, std::span<Birthplace> places,
-                const BirthAges& ages, const BirthVelocity& velocities, const Evaluation& now) const
+void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t first,
+                std::span<Birthplace> birthplaces, const BirthAges& ages, const BirthVelocity& velocities,
+                const Evaluation& now) const
 {
-    const std::size_t size = places.size();
+    const std::size_t size = birthplaces.size();
     const Items numbers = chosen.numbers(first);
     std::array<Draws, batch_size> draw_buffer;
     std::array<double, batch_size> age_buffer;
@@ -421,11 +423,11 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
 
     const bool own_age = !ages.common();
     if (own_age || velocities.is_random() || !newborn.life.empty()) uniform4(now.random, numbers, draw_use, draws);
-    source_.place(now.random, numbers, /*in_order=*/!rate, places);
-    for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, places);
+    source_.place(now.random, numbers, /*in_order=*/!rate, birthplaces);
+    for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, birthplaces);
     for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, numbers);
 
-    if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), places, draws, L);
+    if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), birthplaces, draws, L);
     if (own_age) {
         for (std::size_t i = 0; i < size; ++i) {
             const double gamma = std::min(L[i], ages.frame_length());
@@ -438,18 +440,18 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
     if (source_.moves()) {
         std::array<double, batch_size> t;
         for (std::size_t i = 0; i < size; ++i) t[i] = at_beginning_ ? 0 : std::max(0.0, 1 - L[i] / now.frame.dt);
-        source_.path().carry(std::span(t).first(size), velocities.needs_normals(), places,
+        source_.path().carry(std::span(t).first(size), velocities.needs_normals(), birthplaces,
                              std::span(source_motion).first(size));
         for (std::size_t i = 0; i < size; ++i) source_motion[i] /= now.frame.dt;
     }
-    for (std::size_t i = 0; i < size; ++i) newborn.P[first + i] = places[i].P;
+    for (std::size_t i = 0; i < size; ++i) newborn.P[first + i] = birthplaces[i].P;
     if (!newborn.life.empty())
         for (std::size_t i = 0; i < size; ++i)
             newborn.life[first + i] = static_cast<float>(life->at(draws[i][life_draw]));
     if (newborn.v.empty()) return;
     std::array<Draws, batch_size> speed_draws;
     if (!speed.is_single()) uniform4(now.random, numbers, speed_use, std::span(speed_draws).first(size));
-    velocities.find(places, draws, speed_draws, source_motion, newborn.v.subspan(first, size));
+    velocities.find(birthplaces, draws, speed_draws, source_motion, newborn.v.subspan(first, size));
 }
 
 }  // namespace

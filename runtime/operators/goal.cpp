@@ -72,7 +72,7 @@ struct Goal {
 
     void check() const
     {
-        if (to.object) GoalPlaces(to, by);
+        if (to.object) GoalPositions(to, by);
     }
 
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
@@ -80,8 +80,8 @@ struct Goal {
         Flow flow = std::move(inputs[0]);
         PointSet& points = flow.points;
         const Strided<std::uint8_t> members = members_of(points, group);
-        std::optional<Column<Vec3f>> places_before;
-        if (to.object) places_before = find_places(points, members, flow.simulation->clock(), now);
+        std::optional<Column<Vec3f>> positions_before;
+        if (to.object) positions_before = find_positions(points, members, flow.simulation->clock(), now);
         const Strided<Vec3f> goal = std::as_const(points).column<Vec3f>(to.object ? "goal" : to.attribute).read();
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         const Strided<Vec3f> P = std::as_const(points).P().read();
@@ -100,9 +100,9 @@ struct Goal {
                 const Vec3d at = P[i].cast<double>(), d = goal[i].cast<double>() - at;
                 // A point that was at its target moves with it: the target's velocity is that of the path through the
                 // frame.
-                const bool is_held = *left <= 1e-6 * time && places_before &&
-                                     (at - (*places_before)[i].cast<double>()).norm() <= 1e-3 * d.norm();
-                go(d, *left, dt, double{mass[i]}, is_held ? Vec3d(d / dt) : Vec3d::Zero(), v[i], force[i]);
+                const bool is_held = *left <= 1e-6 * time && positions_before &&
+                                     (at - (*positions_before)[i].cast<double>()).norm() <= 1e-3 * d.norm();
+                move_towards(d, *left, dt, double{mass[i]}, is_held ? Vec3d(d / dt) : Vec3d::Zero(), v[i], force[i]);
             }
         });
         return flow;
@@ -121,39 +121,40 @@ private:
     }
 
     // d: from the point to its target; there: its velocity when its time is over.
-    static void go(const Vec3d& d, double left, double dt, double mass, const Vec3d& there, Vec3f& v, Vec3f& force)
+    static void move_towards(const Vec3d& d, double left, double dt, double mass, const Vec3d& there, Vec3f& v,
+                             Vec3f& force)
     {
         const double u = left > dt ? dt / left : 1;
         const Vec3d before = v.cast<double>();
-        Vec3d way = d * (u * u * (3 - 2 * u)), after = there;
+        Vec3d displacement = d * (u * u * (3 - 2 * u)), after = there;
         if (u < 1) {
-            way += before * (dt * (1 - u) * (1 - u));
+            displacement += before * (dt * (1 - u) * (1 - u));
             after = d * (6 * u * (1 - u) / left) + before * ((1 - u) * (1 - 3 * u));
         }
-        v = (way * (2 / dt) - after).cast<float>();
+        v = (displacement * (2 / dt) - after).cast<float>();
         force += ((after - v.cast<double>()) * (mass / dt)).cast<float>();
     }
 
     // Finds the target positions, and returns those of the previous frame.
-    Column<Vec3f> find_places(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of,
-                              const Evaluation& now)
+    Column<Vec3f> find_positions(PointSet& points, Strided<std::uint8_t> members, const FrameClock& of,
+                                 const Evaluation& now)
     {
         if (known_ != to.object) {
             known_ = to.object;
-            places_ = GoalPlaces(to, by);
+            positions_ = GoalPositions(to, by);
         }
         points.add({"goal", Vec3f(Vec3f::Zero())});
         if (to.is_taken(by)) points.add({goal_number, std::int64_t{-1}});
         const Column<Vec3f> before = points.column<Vec3f>("goal");
         Column<Vec3f> column = before;
-        places_->find(points, members, of, now, column.write());
+        positions_->find(points, members, of, now, column.write());
         points.set("goal", std::move(column));
         return before;
     }
 
     // A cache for the target of the last frame.
     ObjectPtr known_;
-    std::optional<GoalPlaces> places_;
+    std::optional<GoalPositions> positions_;
 };
 RAPID_NODE(Goal);
 

@@ -66,7 +66,7 @@ struct Group {
         if (name.empty()) throw Error("name = \"\" names no group; give it at least one letter");
     }
 
-    bool asks_places() const { return where && where->asks_places(); }
+    bool reads_indices() const { return where && where->reads_indices(); }
 
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const
     {

@@ -101,7 +101,7 @@ bool keeps_order(const Plan& plan, const PlannedNode& merge)
 }
 
 // Limit of ids in a snapshot: they are processed one by one, in a few seconds at most.
-constexpr std::int64_t most_adopted = std::int64_t{1} << 31;
+constexpr std::int64_t max_adopted = std::int64_t{1} << 31;
 
 // The ids of the points in the result.
 class IdSet {
@@ -168,7 +168,7 @@ struct Merge {
     }
     void resume(const NodeSimulations& simulations) const
     {
-        std::int64_t left = most_adopted;
+        std::int64_t left = max_adopted;
         for (const Run& run : adopted_) {
             StateReader::expect(run.input < simulations.inputs.size() && run.first >= 0 && run.size >= 0 &&
                                 run.first <= INT64_MAX - run.size && run.adopted >= 0 && run.size <= left &&

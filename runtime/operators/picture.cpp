@@ -12,7 +12,7 @@ namespace {
 
 // Both are between the same two keys: a value that one of them leaves unset stays unset between them.
 template <class T>
-std::optional<T> on_the_way(const std::optional<T>& a, const std::optional<T>& b, double part)
+std::optional<T> interpolated_optional(const std::optional<T>& a, const std::optional<T>& b, double part)
 {
     if (!a || !b) return part < 1 ? a : b;
     return T(*a + part * (*b - *a));
@@ -32,9 +32,9 @@ CameraPtr CameraTrack::at(double frame) const
     const double t = (frame - static_cast<double>(first)) / static_cast<double>(last - first);
     const double part = t * t * (3 - 2 * t);  // at rest at both keys
     auto camera = std::make_shared<CameraObject>();
-    camera->position = on_the_way(a->position, b->position, part);
-    camera->target = on_the_way(a->target, b->target, part);
-    camera->fov = on_the_way(a->fov, b->fov, part);
+    camera->position = interpolated_optional(a->position, b->position, part);
+    camera->target = interpolated_optional(a->target, b->target, part);
+    camera->fov = interpolated_optional(a->fov, b->fov, part);
     camera->group = part < 1 ? a->group : b->group;
     return camera;
 }

@@ -136,10 +136,10 @@ struct PinBody {
 };
 
 // A position as a function of time, through a step: c0 + x (c1 + x (c2 + x c3)), with x from 0 to 1.
-class PlaceCurve {
+class PositionCurve {
 public:
     // Interpolates positions at x = 0, 1/3, 2/3 and 1.
-    explicit PlaceCurve(const std::array<Vec3d, 4>& at)
+    explicit PositionCurve(const std::array<Vec3d, 4>& at)
         : c0_(at[0]),
           c1_(-5.5 * at[0] + 9 * at[1] - 4.5 * at[2] + at[3]),
           c2_(9 * at[0] - 22.5 * at[1] + 18 * at[2] - 4.5 * at[3]),
@@ -157,7 +157,8 @@ private:
 class PinCoupling : public Coupling, public Holding {
 public:
     // compliance: m/N, 0 if pins are rigid; h: s, the frame's length.
-    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PlaceCurve> curve, double compliance, double h)
+    PinCoupling(std::shared_ptr<Pins> pins, PinBody body, std::optional<PositionCurve> curve, double compliance,
+                double h)
         : pins_(std::move(pins)),
           body_(std::move(body)),
           curve_(std::move(curve)),
@@ -299,7 +300,7 @@ private:
 
     std::shared_ptr<Pins> pins_;
     PinBody body_;
-    std::optional<PlaceCurve> curve_;
+    std::optional<PositionCurve> curve_;
     double compliance_;  // m/N
     bool rigid_;
     double h_;  // s, the frame's length
@@ -312,21 +313,21 @@ private:
 class PinConstraint : public RememberingConstraint<PinConstraint, Pins>, public Placed {
 public:
     std::optional<PerPoint<Vec3f>> place;  // at the end of the step
-    std::optional<PlaceCurve> curve;       // if it is a function of time
+    std::optional<PositionCurve> curve;    // if it is a function of time
     PinBody body;
     double compliance = 0;
 
     std::shared_ptr<const Constraint> through(const AtParts& at) const override
     {
-        std::array<Vec3d, parts.size()> places;
+        std::array<Vec3d, parts.size()> positions;
         for (std::size_t k = 0; k < at.size(); ++k) {
             const auto* pin = dynamic_cast<const PinConstraint*>(at[k].get());
             if (!pin || !pin->place || !pin->place->attribute.empty()) return nullptr;
-            places[k] = pin->place->constant.cast<double>();
+            positions[k] = pin->place->constant.cast<double>();
         }
         auto result = std::make_shared<PinConstraint>(*this);
-        const auto moves = [&](const Vec3d& to) { return to != places[0]; };
-        if (std::any_of(places.begin(), places.end(), moves)) result->curve.emplace(places);
+        const auto moves = [&](const Vec3d& to) { return to != positions[0]; };
+        if (std::any_of(positions.begin(), positions.end(), moves)) result->curve.emplace(positions);
         return result;
     }
 

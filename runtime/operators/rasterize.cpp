@@ -11,7 +11,7 @@
 #include "runtime/graph/coupling.h"
 #include "runtime/operators/written_points.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
-#include "runtime/shapes/level_set/least_voxel.h"
+#include "runtime/shapes/level_set/min_voxel.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {
@@ -25,7 +25,7 @@ NodeType Rasterize::declare()
                "pattern of the files, with #### for the frame; a file has the grid density and one grid per attribute")
         .required()
         .constant()
-        .param(&Rasterize::voxel, "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
+        .param(&Rasterize::voxel, "voxel", 0.1, at_least(min_voxel), "m", "edge of a voxel")
         .constant()
         .param(&Rasterize::radius, "radius", Value(), above(0), "m",
                "radius over which a point is spread, at least a voxel; the default is 1.5 voxels")

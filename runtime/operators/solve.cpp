@@ -22,7 +22,7 @@ namespace rapid {
 namespace {
 
 // Far above the need of any scene: a run with more would not end and would show no sign of it.
-constexpr int most_substeps = 1 << 20, most_iterations = 10000;
+constexpr int substep_limit = 1 << 20, max_iterations = 10000;
 
 struct Solve {
     int substeps, iterations, max_substeps;
@@ -41,15 +41,15 @@ struct Solve {
             .takes("life")
             .takes("airresist")
             .takes("targetv")
-            .param(&Solve::substeps, "substeps", 1.0, between(1, most_substeps), "", "number of substeps per frame")
-            .param(&Solve::iterations, "iterations", 1.0, between(1, most_iterations), "",
+            .param(&Solve::substeps, "substeps", 1.0, between(1, substep_limit), "", "number of substeps per frame")
+            .param(&Solve::iterations, "iterations", 1.0, between(1, max_iterations), "",
                    "iterations of the constraints per substep")
             .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
                    "time at rest after which points with constraints sleep until something acts on them; math.huge for "
                    "never")
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m per frame",
                    "maximum error per frame; each point takes 1, 2, 4, ... substeps, as its estimated error needs")
-            .param(&Solve::max_substeps, "max_substeps", 64.0, between(1, most_substeps), "",
+            .param(&Solve::max_substeps, "max_substeps", 64.0, between(1, substep_limit), "",
                    "maximum number of substeps, with a tolerance")
             .writes("P")
             .writes("v");
@@ -108,7 +108,7 @@ struct Solve {
             observers_.each([&](StepObserver& observer) { observer.end(step, moved); });
         }
         now.figures.died += age_points(flow.points, group, now.frame.dt, [&](std::span<const std::uint8_t> stays) {
-            observers_.each([&](StepObserver& observer) { observer.bury(step, stays); });
+            observers_.each([&](StepObserver& observer) { observer.before_removal(step, stays); });
         });
         // The state stores how long points have been still and what holds them; the output has no such columns. The
         // copy shares the other columns, which belong to the state alone once the flow has been used.

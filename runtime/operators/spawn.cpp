@@ -22,15 +22,15 @@ namespace rapid {
 namespace {
 
 // Throws Error if the newborn points, plus a copy of the existing ones, do not fit in memory.
-void require_room(const PointSet& points, const std::vector<Brood>& broods)
+void require_room(const PointSet& points, const std::vector<Children>& all_children)
 {
-    if (broods.empty()) return;
-    const std::size_t n = broods.back().first + broods.back().count;
-    const double bytes = static_cast<double>(n) * bytes_a_birth + static_cast<double>(points.bytes());
+    if (all_children.empty()) return;
+    const std::size_t n = all_children.back().first + all_children.back().count;
+    const double bytes = static_cast<double>(n) * bytes_per_birth + static_cast<double>(points.bytes());
     if (fits_in_memory(bytes)) return;
-    throw beyond_memory(
-        fmt::format("{} births in a frame, of {} parents, behind {} points,", n, broods.size(), points.size()), bytes,
-        "give a smaller rate or count, or a limit");
+    throw memory_exceeded(
+        fmt::format("{} births in a frame, of {} parents, behind {} points,", n, all_children.size(), points.size()),
+        bytes, "give a smaller rate or count, or a limit");
 }
 
 bool emits(const BirthPlan& plan)
@@ -41,33 +41,34 @@ bool emits(const BirthPlan& plan)
 }
 
 // Returns one birth of a living parent, for a trial, in which no point moves and no event occurs.
-std::vector<Brood> sample_of(const ParentPaths& parents)
+std::vector<Children> sample_of(const ParentPaths& parents)
 {
     for (std::uint32_t i = 0; i < parents.size(); ++i) {
         if (!parents[i].takes_part || !parents[i].is_alive) continue;
-        Brood brood{};
-        brood.parent = i;
-        brood.hit = Brood::no_hit;
-        brood.count = 1;
-        brood.begin = brood.end = parents[i].end;
-        return {brood};
+        Children children{};
+        children.parent = i;
+        children.hit = Children::no_hit;
+        children.count = 1;
+        children.begin = children.end = parents[i].end;
+        return {children};
     }
     return {};
 }
 
 // Removes points of this chain immediately. The evaluator removes those of another chain, from all sets not yet taken.
-void remove_parents(Flow& flow, const Flow& from, const ParentPaths& parents, const std::vector<Brood>& broods,
+void remove_parents(Flow& flow, const Flow& from, const ParentPaths& parents, const std::vector<Children>& all_children,
                     const Evaluation& now)
 {
     if (from.simulation != flow.simulation) {
-        for (const Brood& brood : broods)
-            if (parents[brood.parent].is_alive) from.simulation->condemned.push_back(parents.id(parents[brood.parent]));
+        for (const Children& children : all_children)
+            if (parents[children.parent].is_alive)
+                from.simulation->condemned.push_back(parents.id(parents[children.parent]));
         return;
     }
     std::vector<std::uint8_t> keep(flow.points.size(), 1);
     const IdIndex index(std::as_const(flow.points).id());
-    for (const Brood& brood : broods)
-        if (const std::uint32_t i = index[parents.id(parents[brood.parent])]; i != IdIndex::none) keep[i] = 0;
+    for (const Children& children : all_children)
+        if (const std::uint32_t i = index[parents.id(parents[children.parent])]; i != IdIndex::none) keep[i] = 0;
     now.figures.died += static_cast<std::uint64_t>(std::count(keep.begin(), keep.end(), 0));
     flow.points.keep(keep);
 }
@@ -122,7 +123,7 @@ struct Spawn : Newborn {
     void uses(Uses& uses) const
     {
         for (const AttributeSpec& spec : made(uses)) uses.makes.push_back(spec);
-        const std::vector<std::string> names = of_parents();
+        const std::vector<std::string> names = parent_attributes();
         uses.reads_of_source.insert(uses.reads_of_source.end(), names.begin(), names.end());
         if (!is_zero(speed)) uses.takes_of_source.emplace_back("N");
         if (!source_group.empty()) uses.reads_groups_of_source.push_back(source_group);
@@ -159,7 +160,7 @@ struct Spawn : Newborn {
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
     {
-        bear(inputs[0], inputs[1], now);
+        emit_children(inputs[0], inputs[1], now);
         return std::move(inputs[0]);
     }
 
@@ -168,8 +169,8 @@ struct Spawn : Newborn {
         const std::uint64_t born = now.figures.born;
         Flow flow = start(inputs, now);
         if (now.at_start) return flow;
-        has_borne_ |= now.figures.born > born;
-        if (flow.simulation->trial && !has_borne_) ++now.figures.idle;
+        has_emitted_ |= now.figures.born > born;
+        if (flow.simulation->trial && !has_emitted_) ++now.figures.idle;
         return flow;
     }
 
@@ -183,7 +184,7 @@ struct Spawn : Newborn {
 
 private:
     // Returns the attributes that newborn points get from their parents.
-    std::vector<std::string> of_parents() const
+    std::vector<std::string> parent_attributes() const
     {
         std::vector<std::string> names = inherit;
         if (split)
@@ -195,10 +196,10 @@ private:
 
     std::vector<AttributeSpec> made(const Uses& uses) const;
     BirthPlan plan_of_step(const Flow& flow, const Flow& parent_flow, const Evaluation& now) const;
-    void bear(Flow& flow, const Flow& parent_flow, const Evaluation& now);
+    void emit_children(Flow& flow, const Flow& parent_flow, const Evaluation& now);
 
     ParentClock clock_;
-    bool has_borne_ = false;  // read in trials
+    bool has_emitted_ = false;  // read in trials
 };
 RAPID_NODE(Spawn);
 RAPID_COUPLING("spawn", Spawn);
@@ -208,7 +209,7 @@ RAPID_COUPLING("spawn", Spawn);
 std::vector<AttributeSpec> Spawn::made(const Uses& uses) const
 {
     std::vector<AttributeSpec> specs = given();
-    for (const std::string& name : of_parents()) {
+    for (const std::string& name : parent_attributes()) {
         const auto of_source = std::find_if(uses.source_makes.begin(), uses.source_makes.end(),
                                             [&](const AttributeSpec& spec) { return spec.name == name; });
         if (of_source != uses.source_makes.end()) {
@@ -238,7 +239,7 @@ BirthPlan Spawn::plan_of_step(const Flow& flow, const Flow& parent_flow, const E
     return plan;
 }
 
-void Spawn::bear(Flow& flow, const Flow& parent_flow, const Evaluation& now)
+void Spawn::emit_children(Flow& flow, const Flow& parent_flow, const Evaluation& now)
 {
     const StepRecord& record = *parent_flow.simulation->record;
     if (on && on->kind == BirthEvent::Hit && !record.has_contacts)
@@ -247,18 +248,18 @@ void Spawn::bear(Flow& flow, const Flow& parent_flow, const Evaluation& now)
     const bool waits = parent_flow.simulation == flow.simulation && !now.at_start;
     const ParentPaths parents(parent_flow.points, record, source_group);
     const BirthPlan plan = plan_of_step(flow, parent_flow, now);
-    std::vector<Brood> broods;
+    std::vector<Children> all_children;
     // A chain whose parents have already lived when it begins emits from its next frame on.
-    if (!now.at_start || record.h == 0) broods = clock_.births(parents, plan, now);
+    if (!now.at_start || record.h == 0) all_children = clock_.births(parents, plan, now);
     const bool is_trial = flow.simulation->trial;
-    const bool is_sample = is_trial && !now.at_start && broods.empty() && emits(plan);
-    if (is_sample) broods = sample_of(parents);
+    const bool is_sample = is_trial && !now.at_start && all_children.empty() && emits(plan);
+    if (is_sample) all_children = sample_of(parents);
 
-    const Traits traits{*this, of_parents(), inherit_velocity, split, waits ? now.frame.dt : 0};
-    const Offspring offspring(parents, broods, traits, now);
+    const Traits traits{*this, parent_attributes(), inherit_velocity, split, waits ? now.frame.dt : 0};
+    const Offspring offspring(parents, all_children, traits, now);
     offspring.make_columns(flow.points);
-    require_room(flow.points, broods);
-    if (kill_parent && !is_sample) remove_parents(flow, parent_flow, parents, broods, now);
+    require_room(flow.points, all_children);
+    if (kill_parent && !is_sample) remove_parents(flow, parent_flow, parents, all_children, now);
     const std::size_t born =
         offspring.append_to(flow.points, flow.simulation->next_id, is_trial ? trial_births : SIZE_MAX);
     now.figures.born += born;

@@ -45,7 +45,7 @@ struct Trail {
     {
         return node<Trail>("trail", "Records the positions of each point in its last frames as trail1, trail2, ...")
             .varies()
-            .param(&Trail::places, "places", 12.0, between(1, most_trail_places), "",
+            .param(&Trail::places, "places", 12.0, between(1, max_trail_places), "",
                    "number of frames that are recorded")
             .constant();
     }

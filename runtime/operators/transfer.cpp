@@ -109,13 +109,13 @@ private:
               const Pose& pose, const Evaluation& now) const
     {
         // The nearest position of each point; its element is below 0 if the point keeps its values.
-        std::vector<Birthplace> places(points.size());
+        std::vector<Birthplace> birthplaces(points.size());
         const Strided<std::uint8_t> members = members_of(points, group);
         const Strided<Vec3f> P = std::as_const(points).P().read();
         const Eigen::Affine3d to_rest = pose.affine().inverse();
         for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                if (members[i]) places[i] = nearest(*mesh, surface, to_rest * P[i].cast<double>(), pose.scale);
+                if (members[i]) birthplaces[i] = nearest(*mesh, surface, to_rest * P[i].cast<double>(), pose.scale);
         });
         for (const std::string& name : names()) {
             const AnyColumn* any = values.values().find(name);
@@ -127,7 +127,8 @@ private:
                     const std::span<T> to = points.column<T>(name).write();
                     for_each_chunk(to.size(), [&](std::size_t begin, std::size_t end) {
                         for (std::size_t i = begin; i < end; ++i)
-                            if (places[i].element >= 0) to[i] = turned(name, values.value(column, places[i]), pose);
+                            if (birthplaces[i].element >= 0)
+                                to[i] = turned(name, values.value(column, birthplaces[i]), pose);
                     });
                 },
                 *any);

@@ -48,7 +48,7 @@ struct Turbulence {
             .param(&Turbulence::amplitude, "amplitude", 1.0, any_number(), "m/s²", "root mean square acceleration")
             .param(&Turbulence::size, "size", 1.0, above(0), "m", "size of the largest eddies")
             .param(&Turbulence::speed, "speed", 0.0, at_least(0), "1/s", "rate at which the field changes")
-            .param(&Turbulence::octaves, "octaves", 3.0, between(1, NoiseOptions::most_octaves), "",
+            .param(&Turbulence::octaves, "octaves", 3.0, between(1, NoiseOptions::max_octaves), "",
                    "number of scales, each with eddies half as large and half as strong")
             .param(&Turbulence::seed, "seed", 0.0, at_least(0), "", "seed of the field")
             .varies();

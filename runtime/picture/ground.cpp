@@ -34,7 +34,7 @@ float Ground::line(float x, float pixel) const
     return seen * std::clamp(1.5f - 4 * pixel / spacing, 0.0f, 1.0f);
 }
 
-ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& behind,
+ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& background,
                            const Light& light) const
 {
     const float slope = std::max(0.02f, std::abs(normal.dot(ray.normalized())));
@@ -48,12 +48,12 @@ ShadedSample Ground::shade(const Vec3f& P, float t, float focal, const Vec3f& ra
     };
     const float lines = std::max(line(along.dot(u), width(u)), line(along.dot(v), width(v)));
     const float fade = std::exp(-(P - center).squaredNorm() / (extent * extent));
-    if (!solid) return {behind + (grid_colour - behind) * (0.55f * lines * fade), Vec3f::Zero()};
+    if (!solid) return {background + (grid_colour - background) * (0.55f * lines * fade), Vec3f::Zero()};
 
-    const float seen = std::abs(light.direction().dot(normal)) * light.past_meshes(P, normal);
+    const float seen = std::abs(light.direction().dot(normal)) * light.mesh_transmittance(P, normal);
     const Vec3f lamp = ground_albedo * ((1 - light_from_sky) * seen * (1 - 0.45f * lines));
     const Vec3f ground = ground_albedo * (light_from_sky * (1 - 0.45f * lines)) + grid_colour * (0.45f * lines) + lamp;
-    return {behind + (ground - behind) * fade, lamp * fade};
+    return {background + (ground - background) * fade, lamp * fade};
 }
 
 }  // namespace rapid

@@ -16,12 +16,12 @@ namespace {
 constexpr int shadow_size = 1024;  // texels across the shadow map of the meshes
 constexpr int cells = 160;         // across the shadow grid of the points
 constexpr int slices = 64;         // of the grid, along the light
-constexpr float cells_a_texel = static_cast<float>(cells) / shadow_size;
+constexpr float cells_per_texel = static_cast<float>(cells) / shadow_size;
 constexpr std::size_t slice = std::size_t{cells} * cells;
 
 // Larger points are discs that cover several cells. A smaller one puts its whole cross section into one cell.
 constexpr float small_radius = 1.5f;  // cells
-constexpr float most_covered = 4;     // per large ball, enough to be opaque: exp(-0.7 · 4) is dark
+constexpr float max_covered = 4;      // per large ball, enough to be opaque: exp(-0.7 · 4) is dark
 
 // The cells that a point covers, in units of cells.
 struct ShadowDisc {
@@ -38,13 +38,13 @@ struct ShadowDisc {
         }
         const float dx = static_cast<float>(cell_x) + 0.5f - x, dy = static_cast<float>(cell_y) + 0.5f - y;
         const float part = std::clamp(radius + 0.5f - std::sqrt(dx * dx + dy * dy), 0.0f, 1.0f);
-        return part * taken * std::min(radius / small_radius, most_covered);
+        return part * taken * std::min(radius / small_radius, max_covered);
     }
 
     // Returns how many times the point covers its own centre, as read back from the blurred cells.
     float covers_itself() const
     {
-        if (radius > 5) return taken * std::min(radius / small_radius, most_covered);
+        if (radius > 5) return taken * std::min(radius / small_radius, max_covered);
         const std::array<float, 7> along_x = weights(x), along_y = weights(y);
         if (radius <= small_radius) return along_x[3] * along_y[3] * covers(static_cast<int>(x), static_cast<int>(y));
         float sum = 0;
@@ -120,7 +120,7 @@ void Light::Range::extend(int low, int high)
     end = none ? high + 1 : std::max(end, high + 1);
 }
 
-void Light::gather(const PointSet& points, std::span<const float> opacity, float least_radius)
+void Light::gather(const PointSet& points, std::span<const float> opacity, float min_radius)
 {
     constexpr float unit = 4096;
     constexpr std::size_t count = slice * slices;
@@ -139,21 +139,21 @@ void Light::gather(const PointSet& points, std::span<const float> opacity, float
     };
     for_each_row([&](std::size_t row) { std::fill_n(&covered_[row + x_.begin], x_.end - x_.begin, 0.0f); });
 
-    least_radius_ = least_radius;
+    min_radius_ = min_radius;
     const Strided<Vec3f> P = points.P().read();
     const Column<float>* pscale = points.find<float>("pscale");
-    const float cells_a_metre = lens_.focal * cells_a_texel;
+    const float cells_per_metre = lens_.focal * cells_per_texel;
     const std::size_t chunks = (points.size() + chunk_size - 1) / chunk_size;
     std::vector<std::array<Range, 3>> reached(chunks);
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
         std::array<Range, 3>& range = reached[begin / chunk_size];
         for (std::size_t i = begin; i < end; ++i) {
             const Vec3f s = lens_.project(P[i]);
-            const float x = s.x() * cells_a_texel, y = s.y() * cells_a_texel, z = s.z() / depth_range_ * slices;
+            const float x = s.x() * cells_per_texel, y = s.y() * cells_per_texel, z = s.z() / depth_range_ * slices;
             if (!(x >= 0 && y >= 0 && z >= 0 && x < cells && y < cells && z < slices)) continue;
             const float taken = opacity.empty() ? 1 : opacity[i];
             if (taken == 0) continue;
-            const float r = std::max(least_radius, pscale ? (*pscale)[i] : 0.0f) * cells_a_metre;
+            const float r = std::max(min_radius, pscale ? (*pscale)[i] : 0.0f) * cells_per_metre;
             const ShadowDisc disc{x, y, std::min(r, static_cast<float>(cells)), taken};
             const Eigen::Vector3i cell = Vec3f(x, y, z).cast<int>();
             const int reach = disc.reach();
@@ -226,7 +226,7 @@ void Light::blur_covered()
     });
 }
 
-float Light::past_meshes(const Vec3f& P, const Vec3f& n) const
+float Light::mesh_transmittance(const Vec3f& P, const Vec3f& n) const
 {
     if (mesh_depth_.empty()) return 1;
     // Tests slightly in front of the surface, because the raster of the shadow map would otherwise show on it.
@@ -249,7 +249,7 @@ float Light::past_meshes(const Vec3f& P, const Vec3f& n) const
 Vec3f Light::cell_of(const Vec3f& P) const
 {
     const Vec3f s = lens_.project(P);
-    return {s.x() * cells_a_texel - 0.5f, s.y() * cells_a_texel - 0.5f,
+    return {s.x() * cells_per_texel - 0.5f, s.y() * cells_per_texel - 0.5f,
             std::min(s.z() / depth_range_ * slices - 1, static_cast<float>(slices) - 1.001f)};
 }
 
@@ -262,20 +262,20 @@ bool Light::may_shade(const Box3f& box) const
     return box.intersects(Box3f(low, high));
 }
 
-float Light::past_points(const Vec3f& cell) const { return past_points(cell, 0, slices); }
+float Light::point_transmittance(const Vec3f& cell) const { return point_transmittance(cell, 0, slices); }
 
-float Light::past_other_points(const Vec3f& P, float radius, float taken) const
+float Light::transmittance_of_others(const Vec3f& P, float radius, float taken) const
 {
     if (z_.begin == z_.end) return 1;
     const Vec3f cell = cell_of(P);
-    const float cells_a_metre = lens_.focal * cells_a_texel;
-    const float r = std::min(std::max(least_radius_, radius) * cells_a_metre, static_cast<float>(cells));
-    return past_points(cell, ShadowDisc{cell.x() + 0.5f, cell.y() + 0.5f, r, taken}.covers_itself(),
-                       static_cast<int>(lens_.project(P).z() / depth_range_ * slices));
+    const float cells_per_metre = lens_.focal * cells_per_texel;
+    const float r = std::min(std::max(min_radius_, radius) * cells_per_metre, static_cast<float>(cells));
+    return point_transmittance(cell, ShadowDisc{cell.x() + 0.5f, cell.y() + 0.5f, r, taken}.covers_itself(),
+                               static_cast<int>(lens_.project(P).z() / depth_range_ * slices));
 }
 
 // own: coverage of the position by the point that is there, to be excluded; own_slice: its slice.
-float Light::past_points(const Vec3f& cell, float own, int own_slice) const
+float Light::point_transmittance(const Vec3f& cell, float own, int own_slice) const
 {
     if (z_.begin == z_.end) return 1;
     if (!(cell.x() >= 0 && cell.y() >= 0 && cell.z() >= 0 && cell.x() < cells - 1 && cell.y() < cells - 1)) return 1;

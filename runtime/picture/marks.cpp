@@ -12,8 +12,8 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/points/members.h"
 #include "runtime/points/trail.h"
 
@@ -158,7 +158,7 @@ struct PointLook {
     // Sets the radius if the mark may be in the picture.
     void size(Mark& m) const
     {
-        const auto least = static_cast<float>(view.least_radius);
+        const auto least = static_cast<float>(view.min_radius);
         const auto width = static_cast<float>(tiles.width), height = static_cast<float>(tiles.height);
         const float radius = std::min(std::max(least, m.metres * lens.focal / m.depth), 0.5f * height);
         const float reach = radius + 0.5f;
@@ -204,8 +204,8 @@ struct PointLook {
         // A colour brighter than white glows and receives no shadow.
         const float shining = m.additive ? 1 : glow(own);
         if (shining < 1) {
-            const float lamp = light.past_meshes(P[i], Vec3f::Zero()) *
-                               light.past_other_points(P[i], m.metres, (1 - shining) * m.opacity);
+            const float lamp = light.mesh_transmittance(P[i], Vec3f::Zero()) *
+                               light.transmittance_of_others(P[i], m.metres, (1 - shining) * m.opacity);
             const float lit = 0.30f + 0.80f * lamp;
             m.colour *= lit + shining * (1 - lit);
         }
@@ -281,15 +281,15 @@ private:
         const int bottom = clamped(std::ceil(m.y + std::max(0.0f, m.dy) + reach), y0_, y1_);
         for (int y = top; y < bottom; ++y)
             for (int x = left; x < right; ++x) {
-                const auto place = static_cast<std::size_t>((y - y0_) * tile_size + x - x0_);
-                Pixel& pixel = pixels_[place];
+                const auto offset = static_cast<std::size_t>((y - y0_) * tile_size + x - x0_);
+                Pixel& pixel = pixels_[offset];
                 if (pixel.open < 1.0f / 512) continue;
-                f(pixel, place, static_cast<float>(x) + 0.5f - m.x, static_cast<float>(y) + 0.5f - m.y);
+                f(pixel, offset, static_cast<float>(x) + 0.5f - m.x, static_cast<float>(y) + 0.5f - m.y);
             }
     }
 
     // Returns the fraction of the pixel's samples that no surface nearer than `depth` hides.
-    float past_surfaces(std::size_t pixel, float depth) const
+    float visible_fraction(std::size_t pixel, float depth) const
     {
         // Uses a vector, because g++ would branch at each sample.
         constexpr int samples = surface_samples * surface_samples;
@@ -320,7 +320,7 @@ private:
         const float reach = m.radius + 0.5f, inverse = 1 / m.radius;
         const float roundness = roundness_of(m);
         const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
-        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t offset, float dx, float dy) {
             const float squared = dx * dx + dy * dy;
             if (squared >= reach * reach) return;
             const float away = std::sqrt(squared);
@@ -328,7 +328,7 @@ private:
             // The surface of the ball is nearer than its centre.
             const float edge = std::min(1.0f, away * inverse);
             const float bulge = std::sqrt(1 - edge * edge);
-            if constexpr (hidden) cover *= past_surfaces(place, m.depth - bulge * m.metres);
+            if constexpr (hidden) cover *= visible_fraction(offset, m.depth - bulge * m.metres);
             if (roundness == 0) return add(pixel, m, cover, flat);
             const float shaded = shade(dx * inverse, dy * inverse, bulge);
             add(pixel, m, cover, m.colour * (0.85f + roundness * (shaded - 0.85f)));
@@ -349,7 +349,7 @@ private:
         };
         const float roundness = roundness_of(m);
         const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
-        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t offset, float dx, float dy) {
             const float side = ux * dy - uy * dx, w = std::abs(side), u = ux * dx + uy * dy;
             if (w >= R + 0.5f) return;
             const float half = area(w + 0.5f) - area(w - 0.5f);
@@ -357,7 +357,7 @@ private:
             if (time <= 0) return;
             float cover = m.opacity * std::min(time, 1.0f);
             if constexpr (hidden)
-                cover *= past_surfaces(place, m.depth + std::clamp(u * inverse, 0.0f, 1.0f) * m.ddepth - m.metres);
+                cover *= visible_fraction(offset, m.depth + std::clamp(u * inverse, 0.0f, 1.0f) * m.ddepth - m.metres);
             if (roundness == 0) return add(pixel, m, cover, flat);
             // Shades it like the nearest ball along the way.
             const float past = u - std::clamp(u, 0.0f, m.length);
@@ -373,11 +373,11 @@ private:
     {
         const float ux = m.dx / m.length, uy = m.dy / m.length, inverse = 1 / m.length;
         const Vec3f flat = m.additive ? m.colour : Vec3f(0.85f * m.colour);
-        for_each_pixel(m, [&](Pixel& pixel, std::size_t place, float dx, float dy) {
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t offset, float dx, float dy) {
             const float w = std::abs(ux * dy - uy * dx), u = ux * dx + uy * dy;
             if (u < 0 || u >= m.length || w >= m.radius + 0.5f) return;
             float cover = m.opacity * std::min(m.radius + 0.5f - w, 1.0f);
-            if constexpr (hidden) cover *= past_surfaces(place, m.depth + u * inverse * m.ddepth - m.metres);
+            if constexpr (hidden) cover *= visible_fraction(offset, m.depth + u * inverse * m.ddepth - m.metres);
             add(pixel, m, cover, flat);
         });
     }
@@ -460,7 +460,7 @@ Marks make_marks(const PointSet& points, const TileGrid& tiles, const PictureSce
 void draw_marks(const Marks& marks, const TileGrid& tiles, int tile, const SurfaceTile& surfaces, const Lens& lens,
                 const Light& light, std::span<Vec3f> colour)
 {
-    thread_local OfThread<std::vector<std::uint64_t>> kept;
+    thread_local PerThread<std::vector<std::uint64_t>> kept;
     std::vector<std::uint64_t>& order = *kept;
     order.assign(marks.of_tiles.begin() + marks.first[tile], marks.of_tiles.begin() + marks.first[tile + 1]);
     std::sort(order.begin(), order.end());

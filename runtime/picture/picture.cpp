@@ -54,7 +54,7 @@ Picture Painter::draw(const PointSet& points, const PictureOptions& options,
     Light& light = still_->light;
     const Lens lens = Lens::of_camera(view.camera, options.width, options.height);
     const double distance = (view.camera.target - view.camera.position).norm();
-    light.gather(points, shadow_opacity(points, *scene), static_cast<float>(view.least_radius * distance) / lens.focal);
+    light.gather(points, shadow_opacity(points, *scene), static_cast<float>(view.min_radius * distance) / lens.focal);
     const TileGrid tiles{options.width, options.height};
     const Marks marks = make_marks(points, tiles, *scene, view, light);
 
@@ -74,7 +74,7 @@ Picture Painter::draw(const PointSet& points, const PictureOptions& options,
         std::copy(still.colour.begin(), still.colour.end(), colour.begin());
         if (shaded)
             for (const SurfaceTile::Lit& lit : still.lit)
-                colour[lit.pixel] -= (1 - light.past_points(lit.cell)) * lit.lamp;
+                colour[lit.pixel] -= (1 - light.point_transmittance(lit.cell)) * lit.lamp;
         if (!empty) draw_marks(marks, tiles, tile, still, lens, light, colour);
         for (int y = top; y < tiles.bottom(tile); ++y)
             write_pixels({&colour[static_cast<std::size_t>((y - top) * tile_size)], static_cast<std::size_t>(across)},

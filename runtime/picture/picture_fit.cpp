@@ -46,9 +46,9 @@ Box3d trimmed_bounds(const PointSet& points, const std::string& group, double ah
     }
     Box3d bounds;
     if (lows[0].empty()) return bounds;
-    const auto left_out = static_cast<std::ptrdiff_t>(lows[0].size() / 200);
+    const auto excluded = static_cast<std::ptrdiff_t>(lows[0].size() / 200);
     for (int axis = 0; axis < 3; ++axis) {
-        const auto low = lows[axis].begin() + left_out, high = highs[axis].end() - 1 - left_out;
+        const auto low = lows[axis].begin() + excluded, high = highs[axis].end() - 1 - excluded;
         std::nth_element(lows[axis].begin(), low, lows[axis].end());
         bounds.min()[axis] = *low;
         std::nth_element(highs[axis].begin(), high, highs[axis].end());
@@ -88,8 +88,8 @@ Box3d scaled(const Box3d& box, double factor)
 // Returns a round spacing in metres that puts about eight lines across the scene.
 double spacing_of_lines(const Box3d& bounds)
 {
-    const double wanted = std::max(1e-6, bounds.diagonal().norm()) / 8;
-    const double decade = std::pow(10.0, std::floor(std::log10(wanted))), rest = wanted / decade;
+    const double ideal = std::max(1e-6, bounds.diagonal().norm()) / 8;
+    const double decade = std::pow(10.0, std::floor(std::log10(ideal))), rest = ideal / decade;
     return decade * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
 }
 
@@ -237,9 +237,9 @@ PictureView PictureFit::next(const PointSet& points, const FrameInfo& frame)
     view_->full_speed = std::max({first ? 0.0 : view_->full_speed, fast_speed(points), 0.7 * fall, 1e-6});
 
     // Few points are drawn as visible dots, many as fine grains.
-    most_points_ = std::max(most_points_, points.size());
-    const double dots = 2.6 * std::pow(std::max<double>(1000, static_cast<double>(most_points_)) / 1000, -0.16);
-    view_->least_radius = std::max(0.75, dots) * options.height / 720;
+    max_points_ = std::max(max_points_, points.size());
+    const double dots = 2.6 * std::pow(std::max<double>(1000, static_cast<double>(max_points_)) / 1000, -0.16);
+    view_->min_radius = std::max(0.75, dots) * options.height / 720;
     return *view_;
 }
 

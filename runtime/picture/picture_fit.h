@@ -23,7 +23,7 @@ public:
     PictureView next(const PointSet& points, const FrameInfo& frame);
 
     // Returns true if there have been points. Before that the view shows only the shapes and may still jump.
-    bool settled() const { return most_points_ > 0; }
+    bool settled() const { return max_points_ > 0; }
 
     // Serialises the complete state for the following views.
     template <class Archive>
@@ -33,10 +33,10 @@ public:
         keep(is_there);
         if (is_there) {
             if (!view_) view_.emplace();
-            keep(view_->camera.position, view_->camera.target, view_->camera.fov, view_->full_speed,
-                 view_->least_radius, view_->bounds.min(), view_->bounds.max(), view_->line_spacing);
+            keep(view_->camera.position, view_->camera.target, view_->camera.fov, view_->full_speed, view_->min_radius,
+                 view_->bounds.min(), view_->bounds.max(), view_->line_spacing);
         }
-        keep(seen_.min(), seen_.max(), goal_.min(), goal_.max(), time_, most_points_);
+        keep(seen_.min(), seen_.max(), goal_.min(), goal_.max(), time_, max_points_);
     }
 
 private:
@@ -46,7 +46,7 @@ private:
     Box3d seen_;  // bounds of everything so far, or of the framed group
     Box3d goal_;  // the bounds towards which those of the view glide
     double time_ = 0;
-    std::size_t most_points_ = 0;
+    std::size_t max_points_ = 0;
 };
 
 }  // namespace rapid

@@ -19,8 +19,8 @@ void require_picture_memory(int width, int height, bool colliders, double count,
 {
     require_picture_size(width, height);
     constexpr double of_picture = 3, of_file = 6;  // bytes per pixel: rows, plain and compressed
-    const double bytes = (surface_bytes_a_pixel(colliders) + of_picture + of_file) * count * width * height;
-    if (!fits_in_memory(bytes)) throw beyond_memory(fmt::format("pictures of {}x{}", width, height), bytes, remedy);
+    const double bytes = (surface_bytes_per_pixel(colliders) + of_picture + of_file) * count * width * height;
+    if (!fits_in_memory(bytes)) throw memory_exceeded(fmt::format("pictures of {}x{}", width, height), bytes, remedy);
 }
 
 }  // namespace rapid

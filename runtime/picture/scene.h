@@ -63,9 +63,9 @@ struct Camera {
 // The state that a sequence keeps so that neither the camera nor the colours jump.
 struct PictureView {
     Camera camera;
-    double full_speed = 1;    // m/s, the upper end of the colour ramp
-    double least_radius = 1;  // pixels
-    Box3d bounds;             // m, the box that the camera is fitted to
+    double full_speed = 1;  // m/s, the upper end of the colour ramp
+    double min_radius = 1;  // pixels
+    Box3d bounds;           // m, the box that the camera is fitted to
     // The part of the world that a given camera looks at, m. The ground is drawn there, wherever points go. Without it,
     // the ground is drawn at the bounds.
     std::optional<Box3d> ground = {};

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "runtime/base/of_thread.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/picture/ground.h"
 #include "runtime/picture/screen_mesh.h"
 #include "runtime/picture/tone.h"
@@ -27,7 +27,7 @@ const Vec3f emitter_glow(0.10f, 0.085f, 0.05f);
 ShadedSample shade_collider(const Vec3f& P, const Vec3f& n, const Vec3f& to_eye, const Light& light)
 {
     const float lamp = std::max(0.0f, n.dot(light.direction()));
-    const float seen = lamp > 0 ? lamp * light.past_meshes(P, n) : 0;
+    const float seen = lamp > 0 ? lamp * light.mesh_transmittance(P, n) : 0;
     const float from_sky = 0.6f + 0.4f * n.y();
     const float facing = std::clamp(n.dot(to_eye), 0.0f, 1.0f);
     const float rim = (1 - facing) * (1 - facing) * (1 - facing) * (1 - facing);
@@ -74,7 +74,7 @@ struct DrawnBody {
     }
 };
 
-constexpr int samples_a_pixel = surface_samples * surface_samples;
+constexpr int samples_per_pixel = surface_samples * surface_samples;
 
 // The nearest surface at a sample.
 struct Sample {
@@ -107,7 +107,7 @@ public:
         }
         for (const PictureScene::Plane& plane : scene.planes) {
             const Ground ground(plane, view, true);
-            if (!ground.stands_before(lens_.origin)) grounds_.push_back(ground);
+            if (!ground.hides_scene(lens_.origin)) grounds_.push_back(ground);
         }
         if (scene.planes.empty() && options.grid && scene.grid)
             grounds_.emplace_back(PictureScene::Plane(), view, false);
@@ -118,7 +118,7 @@ public:
     const TileGrid& tiles() const { return tiles_; }
 
 private:
-    using Pixel = std::array<Sample*, samples_a_pixel>;
+    using Pixel = std::array<Sample*, samples_per_pixel>;
 
     bool has_body(int tile) const
     {
@@ -131,9 +131,9 @@ private:
     SurfaceTile draw_open(int tile) const
     {
         SurfaceTile result = empty_tile();
-        std::array<Sample, samples_a_pixel> samples;
+        std::array<Sample, samples_per_pixel> samples;
         Pixel pixel;
-        for (int k = 0; k < samples_a_pixel; ++k) pixel[k] = &samples[k];
+        for (int k = 0; k < samples_per_pixel; ++k) pixel[k] = &samples[k];
         for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
             for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) {
                 draw_background(x, y, pixel);
@@ -145,7 +145,7 @@ private:
     SurfaceTile draw_bodies(int tile) const
     {
         constexpr int across = tile_size * surface_samples;
-        thread_local OfThread<std::vector<Sample>> kept;
+        thread_local PerThread<std::vector<Sample>> kept;
         std::vector<Sample>& samples = *kept;
         samples.resize(across * across);
         const RasterPart part{tiles_.left(tile) * surface_samples, tiles_.top(tile) * surface_samples,
@@ -157,7 +157,7 @@ private:
             for (int y = tiles_.top(tile); y < tiles_.bottom(tile); ++y)
                 for (int x = tiles_.left(tile); x < tiles_.right(tile); ++x) {
                     Pixel pixel;
-                    for (int k = 0; k < samples_a_pixel; ++k)
+                    for (int k = 0; k < samples_per_pixel; ++k)
                         pixel[k] = &sample(x * surface_samples + k % surface_samples,
                                            y * surface_samples + k / surface_samples);
                     f(x, y, pixel);
@@ -194,7 +194,7 @@ private:
             P = lens_.origin + middle * t;
             shaded = nearest->shade(P, t, lens_.focal / surface_samples, middle, open, light_);
         }
-        for (int k = 0; k < samples_a_pixel; ++k) {
+        for (int k = 0; k < samples_per_pixel; ++k) {
             const int sx = x * surface_samples + k % surface_samples, sy = y * surface_samples + k / surface_samples;
             const bool solid = nearest && nearest->solid;
             const float depth = solid ? nearest->depth(lens_.origin, ray(2 * sx + 1, 2 * sy + 1)) : infinite;
@@ -272,7 +272,7 @@ private:
         SurfaceTile tile;
         tile.colour.resize(tile_pixels, Vec3f::Zero());
         tile.bytes.resize(3 * tile_pixels);
-        tile.depth.resize(tile_pixels * samples_a_pixel, infinite);
+        tile.depth.resize(tile_pixels * samples_per_pixel, infinite);
         tile.nearest = infinite;
         tile.farthest = 0;
         return tile;
@@ -295,9 +295,9 @@ private:
     void add_pixel(SurfaceTile& result, int tile, int x, int y, const Pixel& samples) const
     {
         const auto pixel = static_cast<std::size_t>((y - tiles_.top(tile)) * tile_size + x - tiles_.left(tile));
-        for (int k = 0; k < samples_a_pixel; ++k) {
-            result.colour[pixel] += samples[k]->colour / samples_a_pixel;
-            result.depth[pixel * samples_a_pixel + k] = samples[k]->depth;
+        for (int k = 0; k < samples_per_pixel; ++k) {
+            result.colour[pixel] += samples[k]->colour / samples_per_pixel;
+            result.depth[pixel * samples_per_pixel + k] = samples[k]->depth;
             result.nearest = std::min(result.nearest, samples[k]->depth);
             result.farthest = std::max(result.farthest, samples[k]->depth);
         }
@@ -312,7 +312,7 @@ private:
         std::size_t entry = 0;  // entry of `before`
         for (const Sample* sample : samples) {
             if (sample->lamp.isZero(0)) continue;
-            const Vec3f lamp = sample->lamp / samples_a_pixel;
+            const Vec3f lamp = sample->lamp / samples_per_pixel;
             if (!before || sample->P != before->P) entry = entry_of(tile, first, pixel, light_.cell_of(sample->P));
             tile.lit[entry].lamp += lamp;
             before = sample;

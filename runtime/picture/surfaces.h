@@ -48,7 +48,7 @@ struct SurfaceTile {
 
 // Returns the memory of the tiles per pixel. With colliders, it applies to a pixel that shows one and that the lamp may
 // reach.
-constexpr double surface_bytes_a_pixel(bool colliders)
+constexpr double surface_bytes_per_pixel(bool colliders)
 {
     constexpr double open = sizeof(Vec3f) + 3;
     constexpr double covered = surface_samples * surface_samples * sizeof(float) + sizeof(SurfaceTile::Lit);

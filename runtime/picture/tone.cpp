@@ -20,14 +20,14 @@ float tone(float light) { return light < 0.8f ? light : 1 - 0.2f * std::exp(-(li
 // 255 srgb(tone(t²)) at equal steps of t up to 2, where it rounds to 255. Linear interpolation between them has an
 // error of less than a fiftieth of a step of the dither.
 constexpr int steps = 4096;
-constexpr float most_root = 2;
+constexpr float max_root = 2;
 
 const std::vector<float>& curve()
 {
     static const std::vector<float> values = [] {
         std::vector<float> table(steps + 2);
         for (int i = 0; i < steps + 2; ++i) {
-            const float t = most_root * static_cast<float>(i) / steps;
+            const float t = max_root * static_cast<float>(i) / steps;
             table[static_cast<std::size_t>(i)] = 255 * srgb(tone(t * t));
         }
         return table;
@@ -67,12 +67,11 @@ void write_block(const float* light, const DitherRow& dither, const float* table
         Floats root, low, high;
         for (std::uint32_t l = 0; l < lanes; ++l) root[l] = std::sqrt(given[l]);
         // The comparison maps NaN to 0.
-        const Floats at =
-            (given > 0 ? (root > most_root ? Floats{} + most_root : root) : Floats{}) * (steps / most_root);
+        const Floats at = (given > 0 ? (root > max_root ? Floats{} + max_root : root) : Floats{}) * (steps / max_root);
         const FloatFlags step = __builtin_convertvector(at, FloatFlags);
         for (std::uint32_t l = 0; l < lanes; ++l) low[l] = table[step[l]], high[l] = table[step[l] + 1];
-        const Floats wanted = low + (at - __builtin_convertvector(step, Floats)) * (high - low);
-        const Floats dithered = wanted + load_pack(dither.data() + k);
+        const Floats target = low + (at - __builtin_convertvector(step, Floats)) * (high - low);
+        const Floats dithered = target + load_pack(dither.data() + k);
         const FloatFlags values = __builtin_convertvector(dithered > 255 ? Floats{} + 255 : dithered, FloatFlags);
         const Bytes bytes = __builtin_convertvector(values, Bytes);
         std::memcpy(rgb + k, &bytes, sizeof bytes);
@@ -83,7 +82,7 @@ void write_block(const float* light, const DitherRow& dither, const float* table
 
 std::uint8_t display_byte(float light)
 {
-    const float at = (light > 0 ? std::min(std::sqrt(light), most_root) : 0.0f) * (steps / most_root);
+    const float at = (light > 0 ? std::min(std::sqrt(light), max_root) : 0.0f) * (steps / max_root);
     const auto step = static_cast<std::size_t>(at);
     const float low = curve()[step], high = curve()[step + 1];
     return static_cast<std::uint8_t>(low + (at - static_cast<float>(step)) * (high - low) + 0.5f);

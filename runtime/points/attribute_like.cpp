@@ -28,7 +28,7 @@ const AttributeSpec* conventional_attribute(std::string_view name)
     return nullptr;
 }
 
-std::string text_of_making(const std::string& name, int numbers)
+std::string advice_for_making(const std::string& name, int numbers)
 {
     const AttributeSpec* usual = conventional_attribute(name);
     if (!usual) usual = known_attribute(name);
@@ -70,11 +70,11 @@ std::string no_attribute(const std::string& name, const std::vector<std::string>
     if (const std::string known(name_of_synonym(name)); !known.empty()) {
         const bool is_there = std::find(names.begin(), names.end(), known) != names.end();
         const std::string remedy =
-            is_there ? "" : fmt::format(": add :attribute{{ {} }} before it", text_of_making(known));
+            is_there ? "" : fmt::format(": add :attribute{{ {} }} before it", advice_for_making(known));
         return fmt::format("no attribute \"{}\"; the {} of points is {}{}", name, name, known, remedy);
     }
     const std::string near = conventional_attribute(name) || known_attribute(name) ? "" : nearest_name(name, names);
-    const std::string made = text_of_making(name, numbers);
+    const std::string made = advice_for_making(name, numbers);
     return near.empty() ? fmt::format("no attribute \"{}\"; add :attribute{{ {} }} before it", name, made)
                         : fmt::format("no attribute \"{}\"; did you mean \"{}\"? (or add :attribute{{ {} }} before it)",
                                       name, near, made);

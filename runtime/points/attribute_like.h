@@ -14,7 +14,7 @@ const AttributeSpec* conventional_attribute(std::string_view name);
 
 // Returns the parameters with which a node `attribute` creates this attribute: "Cd = {1, 1, 1}", "heat = 0". numbers:
 // the components of a value if the name does not determine them: 3 for a vec3, 4 for a quaternion, otherwise 1.
-std::string text_of_making(const std::string& name, int numbers = 1);
+std::string advice_for_making(const std::string& name, int numbers = 1);
 
 // Returns the error message for an attribute that no node creates, with a suggestion from `names`.
 std::string no_attribute(const std::string& name, const std::vector<std::string>& names, int numbers = 1);

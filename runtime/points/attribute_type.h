@@ -16,7 +16,7 @@ struct TypeList {
     using Column = std::variant<rapid::Column<T>...>;
     using Value = std::variant<T...>;
     // Columns of a saved state, which also stores groups.
-    using KeptColumn = std::variant<rapid::Column<T>..., rapid::Column<std::uint8_t>>;
+    using SavedColumn = std::variant<rapid::Column<T>..., rapid::Column<std::uint8_t>>;
 };
 using AttributeTypes = TypeList<float, Vec3f, std::int32_t, std::int64_t, Quatf, Token>;
 
@@ -37,7 +37,7 @@ inline constexpr std::size_t components_of = std::is_same_v<T, Vec3f>   ? 3
                                              : std::is_same_v<T, Quatf> ? 4
                                                                         : 1;
 
-// Returns an empty column (AnyColumn, KeptColumn) of the type at this index of its list. Precondition: the index is
+// Returns an empty column (AnyColumn, SavedColumn) of the type at this index of its list. Precondition: the index is
 // valid.
 template <class Any>
 Any column_of_type(std::size_t place)

@@ -70,11 +70,11 @@ void Buffer::reserve(std::size_t bytes)
     if (bytes <= capacity_) return;
     if (bytes > max_bytes) throw std::bad_alloc();
     // Grows by half: untouched pages are free, and a column that is appended to every frame is rarely remapped.
-    const std::size_t wanted = capacity_ == 0 ? bytes : std::max(bytes, capacity_ + capacity_ / 2);
+    const std::size_t needed = capacity_ == 0 ? bytes : std::max(bytes, capacity_ + capacity_ / 2);
 
     if (mapped_) {
         const std::size_t offset = static_cast<char*>(data_) - static_cast<char*>(block_);
-        const std::size_t grown = whole_pages(wanted + offset);
+        const std::size_t grown = whole_pages(needed + offset);
         void* moved = block_;
         if (!resize_in_file(moved, block_bytes_, grown)) {
             moved = mremap(block_, block_bytes_, grown, MREMAP_MAYMOVE);
@@ -89,18 +89,18 @@ void Buffer::reserve(std::size_t bytes)
     }
 
     Buffer grown;
-    if (wanted >= mapped_from) {
+    if (needed >= mapped_from) {
         const std::size_t offset = stagger();
         // Reserves a page more than the values need, whatever their offset, so that buffers of one size can reuse each
         // other's pages.
-        const SparePages::Block pages = new_pages(whole_pages(wanted) + page);
+        const SparePages::Block pages = new_pages(whole_pages(needed) + page);
         grown.block_ = pages.begin;
         grown.block_bytes_ = pages.bytes;
         grown.mapped_ = true;
         grown.data_ = static_cast<char*>(grown.block_) + offset;
         grown.capacity_ = grown.block_bytes_ - offset;
     } else {
-        grown.block_bytes_ = (wanted + line - 1) / line * line;
+        grown.block_bytes_ = (needed + line - 1) / line * line;
         grown.block_ = std::aligned_alloc(line, grown.block_bytes_);
         if (!grown.block_) throw std::bad_alloc();
         grown.data_ = grown.block_;

@@ -69,7 +69,7 @@ void CellSorter::fill(CellGrid& grid, const SpheresView& spheres, std::span<cons
     const std::size_t cells = bound(grid, spheres, members);
     find_keys(grid, spheres, members);
     for (PageArray<float>* column : {&grid.x, &grid.y, &grid.z, &grid.r}) column->resize(n + lanes);
-    grid.place.resize(n);
+    grid.index.resize(n);
     if (grid.dense_)
         sort_dense(grid, cells, spheres, members);
     else
@@ -112,16 +112,16 @@ void CellSorter::find_keys(const CellGrid& grid, const SpheresView& spheres, std
     });
 }
 
-inline CellSorter::Sphere CellSorter::sphere(const SpheresView& spheres, std::uint32_t place, std::uint64_t cell)
+inline CellSorter::Sphere CellSorter::sphere(const SpheresView& spheres, std::uint32_t index, std::uint64_t cell)
 {
-    const Vec3f at = spheres.in_grid(spheres.P[place]).cast<float>();
-    return {at.x(), at.y(), at.z(), spheres.reach[place], place, static_cast<std::uint32_t>(cell)};
+    const Vec3f at = spheres.in_grid(spheres.P[index]).cast<float>();
+    return {at.x(), at.y(), at.z(), spheres.reach[index], index, static_cast<std::uint32_t>(cell)};
 }
 
 inline void CellSorter::put(CellGrid& grid, std::size_t m, const Sphere& sphere)
 {
     grid.x[m] = sphere.x, grid.y[m] = sphere.y, grid.z[m] = sphere.z, grid.r[m] = sphere.r;
-    grid.place[m] = sphere.place;
+    grid.index[m] = sphere.index;
 }
 
 // Sorts the spheres into buckets of cells, then each bucket into its cells. Spheres of one cell keep the order of the

@@ -79,10 +79,10 @@ class CellSorter;
 class CellGrid {
 public:
     double width = 0;                // cell width; like all lengths below in grid units
-    PageArray<std::uint32_t> place;  // index of each sphere in the set
+    PageArray<std::uint32_t> index;  // index of each sphere in the set
     PageArray<float> x, y, z, r;     // relative to `middle`; padded to whole SIMD packs with arbitrary numbers
 
-    std::size_t size() const { return place.size(); }
+    std::size_t size() const { return index.size(); }
 
     // A range of consecutive spheres.
     struct Run {
@@ -121,7 +121,7 @@ public:
     }
     // Returns the half of around() with higher keys: first the spheres in the cells themselves, then those in the
     // neighbours after them.
-    Runs behind(std::uint64_t first, std::uint64_t last) const
+    Runs after(std::uint64_t first, std::uint64_t last) const
     {
         Runs runs;
         add_rows(runs, first, {last - first + 2, 1, 1});
@@ -195,9 +195,9 @@ public:
 private:
     struct Sphere {
         float x, y, z, r;
-        std::uint32_t place, cell;
+        std::uint32_t index, cell;
     };
-    static Sphere sphere(const SpheresView& spheres, std::uint32_t place, std::uint64_t cell);
+    static Sphere sphere(const SpheresView& spheres, std::uint32_t index, std::uint64_t cell);
     static void put(CellGrid& grid, std::size_t m, const Sphere& sphere);
 
     std::size_t bound(CellGrid& grid, const SpheresView& spheres, std::span<const std::uint32_t> members) const;

@@ -133,13 +133,13 @@ public:
     }
 
     // Returns a column of the values at these indices, in this order.
-    Column select(std::span<const std::uint32_t> places) const
+    Column select(std::span<const std::uint32_t> indices) const
     {
-        if (!values_) return Column(places.size(), shared_, fallback_);
+        if (!values_) return Column(indices.size(), shared_, fallback_);
         Column result(0, fallback_);
         const T* from = data();
-        const std::span<T> to = result.append_for_writing(places.size());
-        for (std::size_t i = 0; i < places.size(); ++i) to[i] = from[places[i]];
+        const std::span<T> to = result.append_for_writing(indices.size());
+        for (std::size_t i = 0; i < indices.size(); ++i) to[i] = from[indices[i]];
         return result;
     }
 

@@ -29,7 +29,7 @@ struct Block {
 };
 
 std::atomic<bool> in_use{false}, paused{false};
-std::atomic<std::size_t> most_resident{0};
+std::atomic<std::size_t> max_resident{0};
 std::mutex blocks_mutex;
 std::map<void*, Block> blocks;
 std::filesystem::path blocks_folder;
@@ -106,7 +106,7 @@ std::size_t resident_of_files()
 // Unmaps resident pages from this process. The system may still cache them or write them out.
 void trim()
 {
-    if (resident_of_files() <= most_resident) return;
+    if (resident_of_files() <= max_resident) return;
     const std::lock_guard lock(blocks_mutex);
     for (const auto& [begin, block] : blocks) madvise(begin, block.bytes, MADV_DONTNEED);
 }
@@ -142,7 +142,7 @@ ColumnFiles::ColumnFiles(const std::filesystem::path& folder, std::size_t reside
 {
     RAPID_ASSERT(!in_use);
     blocks_folder = folder.empty() ? "." : folder;
-    most_resident = resident_of_files() + resident;
+    max_resident = resident_of_files() + resident;
     trimmer_ = std::make_unique<Trimmer>();
     in_use = true;
 }

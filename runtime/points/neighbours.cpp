@@ -12,12 +12,12 @@ namespace {
 constexpr float reach = 0.5f;  // per point, in radii
 
 // Every accepted radius exceeds this unless all points are at the origin.
-constexpr double least_radius = 0x1p-200;
+constexpr double min_radius = 0x1p-200;
 
 }  // namespace
 
 Neighbours::Neighbours(std::span<const Vec3f> P, double radius)
-    : P_(P.size()), radius_(radius), spheres_{P_, {&reach, 0}, Vec3d::Zero(), 1 / std::max(radius, least_radius)}
+    : P_(P.size()), radius_(radius), spheres_{P_, {&reach, 0}, Vec3d::Zero(), 1 / std::max(radius, min_radius)}
 {
     float largest = 0;
     for (const Vec3f& x : P) largest = std::max(largest, x.cwiseAbs().maxCoeff());
@@ -45,17 +45,17 @@ void Neighbours::find(const Vec3d& X, std::vector<std::uint32_t>& indices) const
     if (P_.empty()) return;
     for (const CellGrid::Run& run : grid_.around(grid_.cell_at(spheres_.in_grid(X))))
         for (std::uint32_t o = run.begin; o < run.end; ++o)
-            if (is_near(grid_.place[o], X)) indices.push_back(grid_.place[o]);
+            if (is_near(grid_.index[o], X)) indices.push_back(grid_.index[o]);
     std::sort(indices.begin(), indices.end());
 }
 
 void Neighbours::list(std::size_t sphere, const NearSpheres& spheres, std::span<std::uint32_t> found,
                       std::vector<std::uint32_t>& near) const
 {
-    const Vec3d& X = P_[grid_.place[sphere]];
+    const Vec3d& X = P_[grid_.index[sphere]];
     std::uint32_t count = 0;
     spheres.for_each(grid_, sphere, blur_, 0, [&](std::uint32_t o, bool certain) {
-        const std::uint32_t point = grid_.place[o];
+        const std::uint32_t point = grid_.index[o];
         if (certain || is_near(point, X)) found[count++] = point;
     });
     near.resize(count);

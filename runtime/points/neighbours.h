@@ -36,10 +36,10 @@ public:
             std::vector<std::uint32_t> found, near;
             grid_.for_each_stretch(begin, end, [&](std::size_t m, std::size_t last, std::size_t from, std::size_t to) {
                 spheres.gather(grid_, grid_.around(grid_.key(from), grid_.key(to)));
-                found.resize(std::max<std::size_t>(found.size(), spheres.size() + most_sorted_by_rank));
+                found.resize(std::max<std::size_t>(found.size(), spheres.size() + max_sorted_by_rank));
                 for (; m < last; ++m) {
                     list(m, spheres, found, near);
-                    f(grid_.place[m], near);
+                    f(grid_.index[m], near);
                 }
             });
         });

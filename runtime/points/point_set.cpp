@@ -103,11 +103,11 @@ const AnyColumn* PointSet::find(std::string_view name) const
 
 AnyColumn* PointSet::find(std::string_view name) { return const_cast<AnyColumn*>(std::as_const(*this).find(name)); }
 
-void PointSet::no_column(std::string_view name, const AnyColumn& wanted) const
+void PointSet::no_column(std::string_view name, const AnyColumn& expected) const
 {
     if (const AnyColumn* other = find(name))
         throw Error(fmt::format("attribute \"{}\" is {}; it must be {}", name, type_name(type_of(*other)),
-                                type_name(type_of(wanted))));
+                                type_name(type_of(expected))));
     throw Error(fmt::format("no attribute \"{}\"{}", name, did_you_mean(name, column_names())));
 }
 
@@ -208,27 +208,27 @@ void PointSet::keep(std::span<const std::uint8_t> mask)
     size_ = compaction.kept;
 }
 
-PointSet PointSet::select(std::span<const std::uint32_t> places) const
+PointSet PointSet::select(std::span<const std::uint32_t> indices) const
 {
     PointSet set;
-    set.size_ = places.size();
+    set.size_ = indices.size();
     set.columns_.clear();
     for (const auto& [name, column] : columns_)
-        set.columns_.emplace(name, std::visit([&](const auto& c) { return AnyColumn(c.select(places)); }, column));
-    for (const auto& [name, members] : groups_) set.groups_.emplace(name, members.select(places));
+        set.columns_.emplace(name, std::visit([&](const auto& c) { return AnyColumn(c.select(indices)); }, column));
+    for (const auto& [name, members] : groups_) set.groups_.emplace(name, members.select(indices));
     set.details = details;
     return set;
 }
 
-void PointSet::put(std::span<const std::uint32_t> places, const PointSet& from)
+void PointSet::put(std::span<const std::uint32_t> indices, const PointSet& from)
 {
-    RAPID_ASSERT(places.size() == from.size());
+    RAPID_ASSERT(indices.size() == from.size());
     const auto put_into = [&]<class T>(Column<T>& column, const Column<T>& other) {
-        if (places.empty()) return;
+        if (indices.empty()) return;
         if (column.is_uniform() && other.is_uniform() && column[0] == other[0]) return;
         const std::span<T> to = column.write();
         const Strided<T> values = other.read();
-        for (std::size_t i = 0; i < places.size(); ++i) to[places[i]] = values[i];
+        for (std::size_t i = 0; i < indices.size(); ++i) to[indices[i]] = values[i];
     };
     for (auto& [name, column] : columns_)
         if (const AnyColumn* other = from.find(name))

@@ -109,10 +109,10 @@ public:
     void keep(std::span<const std::uint8_t> mask);
 
     // Returns the points at these indices, in this order, as a new set.
-    PointSet select(std::span<const std::uint32_t> places) const;
+    PointSet select(std::span<const std::uint32_t> indices) const;
     // Overwrites the points at these indices with those of `from`, a set with the same columns and groups; shape
     // [from.size()].
-    void put(std::span<const std::uint32_t> places, const PointSet& from);
+    void put(std::span<const std::uint32_t> indices, const PointSet& from);
 
     // Moves point order[i] to index i. `order` is a permutation, shape [size].
     void reorder(std::span<const std::uint32_t> order);
@@ -123,7 +123,7 @@ public:
     std::map<std::string, DetailValue, std::less<>> details;
 
 private:
-    [[noreturn]] void no_column(std::string_view name, const AnyColumn& wanted) const;
+    [[noreturn]] void no_column(std::string_view name, const AnyColumn& expected) const;
 
     std::size_t size_ = 0;
     Columns columns_;

@@ -23,7 +23,7 @@ bool are_memberships(const Column<std::uint8_t>& members)
 std::size_t SavedState::size() const
 {
     std::size_t sum = bytes.size();
-    for (const KeptColumn& any : columns) sum += std::visit([](const auto& column) { return column.bytes(); }, any);
+    for (const SavedColumn& any : columns) sum += std::visit([](const auto& column) { return column.bytes(); }, any);
     return sum;
 }
 
@@ -102,9 +102,9 @@ void load(StateReader& from, PointSet& points)
 void save(StateWriter& to, const SavedState& state)
 {
     to(state.bytes, state.columns.size());
-    for (const KeptColumn& any : state.columns)
+    for (const SavedColumn& any : state.columns)
         std::visit(
-            [&]<class T>(const Column<T>& column) { to(static_cast<std::uint8_t>(any.index()), to.place_of(column)); },
+            [&]<class T>(const Column<T>& column) { to(static_cast<std::uint8_t>(any.index()), to.slot_of(column)); },
             any);
 }
 
@@ -114,13 +114,13 @@ void load(StateReader& from, SavedState& state)
     from(state.bytes, count);
     from.require(count);
     state.columns.assign(count, Column<float>());
-    for (KeptColumn& any : state.columns) {
+    for (SavedColumn& any : state.columns) {
         std::uint8_t type = 0;
-        std::uint32_t place = 0;
-        from(type, place);
-        const auto take = [&]<class T>(const Column<T>&) { any = from.column_at<T>(place); };
-        if (type >= std::variant_size_v<KeptColumn>) StateReader::fail();
-        std::visit(take, column_of_type<KeptColumn>(type));
+        std::uint32_t slot = 0;
+        from(type, slot);
+        const auto take = [&]<class T>(const Column<T>&) { any = from.column_at<T>(slot); };
+        if (type >= std::variant_size_v<SavedColumn>) StateReader::fail();
+        std::visit(take, column_of_type<SavedColumn>(type));
     }
 }
 

@@ -10,13 +10,13 @@
 
 namespace rapid {
 
-using KeptColumn = AttributeTypes::KeptColumn;
+using SavedColumn = AttributeTypes::SavedColumn;
 
 struct SavedState {
     std::vector<char> bytes;
     // The columns of the state that have a value per point. They are shared with the state's owner until it writes
     // them.
-    std::vector<KeptColumn> columns;
+    std::vector<SavedColumn> columns;
 
     std::size_t size() const;  // bytes, including the columns
     // Compares bitwise.

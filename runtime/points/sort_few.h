@@ -11,7 +11,7 @@
 namespace rapid {
 
 // Longer lists go to std::sort.
-constexpr std::uint32_t most_sorted_by_rank = 4 * lanes;
+constexpr std::uint32_t max_sorted_by_rank = 4 * lanes;
 
 // Writes each number at its rank, the count of smaller numbers.
 template <std::uint32_t packs>
@@ -25,12 +25,12 @@ inline void sort_by_rank(const std::uint32_t* from, std::uint32_t count, std::ui
     for (std::uint32_t k = 0; k < count; ++k) to[rank[k / lanes][k % lanes]] = from[k];
 }
 
-// from: must be readable for most_sorted_by_rank numbers.
+// from: must be readable for max_sorted_by_rank numbers.
 inline void sort_few(const std::uint32_t* from, std::uint32_t count, std::uint32_t* to)
 {
     if (count <= lanes) return sort_by_rank<1>(from, count, to);
     if (count <= 2 * lanes) return sort_by_rank<2>(from, count, to);
-    if (count <= most_sorted_by_rank) return sort_by_rank<4>(from, count, to);
+    if (count <= max_sorted_by_rank) return sort_by_rank<4>(from, count, to);
     std::sort(to, std::copy_n(from, count, to));
 }
 

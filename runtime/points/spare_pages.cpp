@@ -9,8 +9,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_spare_bytes = std::size_t{1} << 26;
-constexpr std::size_t most_block_bytes = most_spare_bytes / 4;
+constexpr std::size_t max_spare_bytes = std::size_t{1} << 26;
+constexpr std::size_t max_block_bytes = max_spare_bytes / 4;
 
 void unmap(SparePages::Block block)
 {
@@ -34,7 +34,7 @@ void SparePages::keep(std::size_t blocks)
 std::size_t SparePages::room_for(std::size_t bytes)
 {
     const std::size_t step = std::max(std::bit_floor(bytes) / 4, page), room = (bytes + step - 1) / step * step;
-    return room <= most_block_bytes ? room : bytes;
+    return room <= max_block_bytes ? room : bytes;
 }
 
 SparePages::Block SparePages::take(std::size_t bytes)
@@ -51,12 +51,12 @@ SparePages::Block SparePages::take(std::size_t bytes)
 
 void SparePages::give(Block block)
 {
-    if (block.bytes > most_block_bytes) return unmap(block);
+    if (block.bytes > max_block_bytes) return unmap(block);
     const std::lock_guard lock(mutex_);
     bytes_ += block.bytes;
     const auto empty = std::find_if(blocks_.begin(), blocks_.end(), [](const Block& b) { return !b.begin; });
     if (empty != blocks_.end()) std::swap(block, *empty);
-    while (block.begin || bytes_ > most_spare_bytes) {  // evicts blocks in turn
+    while (block.begin || bytes_ > max_spare_bytes) {  // evicts blocks in turn
         std::swap(block, blocks_[next_]);
         next_ = (next_ + 1) % blocks_.size();
         bytes_ -= block.bytes;

@@ -43,7 +43,7 @@ public:
     }
     // Returns the column's index in the state. Columns that share their values share the index.
     template <class T>
-    std::uint32_t place_of(const Column<T>& column)
+    std::uint32_t slot_of(const Column<T>& column)
     {
         for (std::size_t k = 0; k < state_.columns.size(); ++k) {
             const auto* known = std::get_if<Column<T>>(&state_.columns[k]);
@@ -77,9 +77,9 @@ public:
     }
 
     template <class T>
-    const Column<T>& column_at(std::uint32_t place) const
+    const Column<T>& column_at(std::uint32_t slot) const
     {
-        const auto* column = place < state_.columns.size() ? std::get_if<Column<T>>(&state_.columns[place]) : nullptr;
+        const auto* column = slot < state_.columns.size() ? std::get_if<Column<T>>(&state_.columns[slot]) : nullptr;
         if (!column) fail();
         return *column;
     }
@@ -163,7 +163,7 @@ void save(StateWriter& to, const Column<T>& column)
     if (is_uniform)
         to(*column.read().data);
     else
-        to(to.place_of(column));
+        to(to.slot_of(column));
 }
 template <class T>
 void load(StateReader& from, Column<T>& column)
@@ -178,9 +178,9 @@ void load(StateReader& from, Column<T>& column)
         column = Column<T>(size, value, fallback);
         return;
     }
-    std::uint32_t place = 0;
-    from(place);
-    column = from.column_at<T>(place);
+    std::uint32_t slot = 0;
+    from(slot);
+    column = from.column_at<T>(slot);
     column.set_fallback(fallback);
     if (column.size() != size) StateReader::fail();
 }

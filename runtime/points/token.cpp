@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t bytes_an_entry = 128;                // of a string, besides its characters
+constexpr std::size_t bytes_per_entry = 128;               // of a string, besides its characters
 constexpr std::size_t bytes_between_checks = 64ull << 20;  // smaller amounts are not checked against the budget
 
 // Returns the length of a UTF-8 character by its first byte: 1 to 4, or 0 if the byte starts no character.
@@ -62,32 +62,32 @@ public:
     {
         const std::lock_guard lock(mutex_);
         if (const auto found = numbers_.find(text); found != numbers_.end()) return {found->second};
-        take(text.size() + bytes_an_entry);
-        const auto entry = texts_.emplace_back(text);
-        const auto number = static_cast<std::uint32_t>(entry - texts_.begin());
+        take(text.size() + bytes_per_entry);
+        const auto entry = strings_.emplace_back(text);
+        const auto number = static_cast<std::uint32_t>(entry - strings_.begin());
         numbers_.emplace(*entry, number);
         return {number};
     }
 
     // Strings do not move when others are added.
-    std::string_view operator[](std::uint32_t number) const { return texts_[number]; }
-    std::size_t size() const { return texts_.size(); }
+    std::string_view operator[](std::uint32_t number) const { return strings_[number]; }
+    std::size_t size() const { return strings_.size(); }
 
 private:
     void take(std::size_t bytes)
     {
-        if (texts_.size() > std::numeric_limits<std::uint32_t>::max())
+        if (strings_.size() > std::numeric_limits<std::uint32_t>::max())
             throw Error("attributes have more than 2^32 different texts; numbers tell points apart: use them");
         unchecked_ += bytes;
         if (unchecked_ < bytes_between_checks) return;
         const auto next = static_cast<double>(std::exchange(unchecked_, 0)) + bytes_between_checks;
         if (!fits_in_memory(next))
-            throw beyond_memory(fmt::format("{} different texts of attributes", texts_.size()), next,
-                                "tell points apart by numbers");
+            throw memory_exceeded(fmt::format("{} different texts of attributes", strings_.size()), next,
+                                  "tell points apart by numbers");
     }
 
     std::mutex mutex_;
-    tbb::concurrent_vector<std::string> texts_;  // by number
+    tbb::concurrent_vector<std::string> strings_;  // by number
     std::unordered_map<std::string_view, std::uint32_t> numbers_;
     std::size_t unchecked_ = 0;  // bytes since the last check of the memory budget
 };

@@ -16,7 +16,7 @@ std::vector<AttributeSpec> trail_columns(int places)
 Trails::Trails(const PointSet& points) : P_(points.P().read()), count_(points.find<std::int32_t>(trail_count_name))
 {
     if (!count_) return;
-    while (places() < most_trail_places) {
+    while (places() < max_trail_places) {
         const auto* column = points.find<Vec3f>(trail_name(places() + 1));
         if (!column) return;
         columns_.push_back(column->read());

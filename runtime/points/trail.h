@@ -11,7 +11,7 @@
 
 namespace rapid {
 
-constexpr int most_trail_places = 256;
+constexpr int max_trail_places = 256;
 
 // Returns "trail1", "trail2", ...
 std::string trail_name(int place);

@@ -175,7 +175,7 @@ void Biographer::leave(const Node& node, const PointSet& points)
         }
         const PointValues now = values_of(points, i);
         if (planned.in_loop || !plan_.simulations[followed.simulation].solve) step.values = now;
-        if (!followed.alive) return be_born(followed, node.name);
+        if (!followed.alive) return record_birth(followed, node.name);
         if (kind == NodeKind::Solve || kind == NodeKind::Source || !followed.before) return;
         Biography::Edit edit{node.name, {}};
         for (const auto& [name, value] : now) {
@@ -189,7 +189,7 @@ void Biographer::leave(const Node& node, const PointSet& points)
     });
 }
 
-void Biographer::be_born(Followed& followed, const std::string& node) const
+void Biographer::record_birth(Followed& followed, const std::string& node) const
 {
     const Biography::Step& step = followed.steps.back();
     followed.alive = true;

@@ -91,7 +91,7 @@ private:
     void enter(const Node& node, const Frame& frame, std::span<const Flow> inputs);
     void leave(const Node& node, const PointSet& points);
     void enter_solve(Followed& followed, const Node& node, const Frame& frame, const Flow& flow, std::size_t i) const;
-    void be_born(Followed& followed, const std::string& node) const;
+    void record_birth(Followed& followed, const std::string& node) const;
     void die(Followed& followed, const std::string& node, std::string why) const;
     void note_record(Followed& followed, const StepRecord& record, Biography::Step& step) const;
 

@@ -59,7 +59,7 @@ std::string text_of_half(const Explanation& plan, bool kept)
                       node.changes.empty() ? node.why : fmt::format("{}; {}", node.why, node.changes));
     for (const auto& attribute : plan.attributes) {
         if (attribute.kept != kept) continue;
-        const bool usual = kept || attribute.brought_in_by == usual_way_in(attribute.name);
+        const bool usual = kept || attribute.brought_in_by == usual_way_to_keep(attribute.name);
         attributes.add(
             shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
             usual ? attribute.why : fmt::format("{}; {} brings it in", attribute.why, attribute.brought_in_by));
@@ -68,7 +68,7 @@ std::string text_of_half(const Explanation& plan, bool kept)
         if (stage.kept == kept) stages.add(stage.name, "", stage.why);
     const std::string of_attributes = kept
                                           ? fmt::format(" attributes, {} bytes a point at most", plan.bytes_per_point())
-                                          : fmt::format(" attributes ({} brings one in)", usual_way_in("NAME"));
+                                          : fmt::format(" attributes ({} brings one in)", usual_way_to_keep("NAME"));
     return (kept ? "KEPT\n" : "\nLEFT OUT\n") + nodes.text(" nodes") + attributes.text(of_attributes) +
            stages.text(" stages");
 }
@@ -182,10 +182,10 @@ std::string text_of_surplus(const std::string& file, const std::string& other, c
     return fmt::format("{} NEEDS, AND {} DOES NOT\n{}", file, other, all.empty() ? "  nothing\n" : all);
 }
 
-std::string to_text(const std::string& heading, const std::vector<KeptBytes>& all)
+std::string to_text(const std::string& heading, const std::vector<HeldBytes>& all)
 {
     Rows rows;
-    for (const KeptBytes& one : all) rows.add(one.name, bytes(one.bytes), one.what);
+    for (const HeldBytes& one : all) rows.add(one.name, bytes(one.bytes), one.what);
     return rows.text(heading);
 }
 

@@ -17,11 +17,11 @@ std::string text_of_surplus(const std::string& file, const std::string& other, c
 std::string json_of_surplus(const Explanation& surplus);  // an object, in one line
 
 // Bytes that nodes hold, under a heading.
-struct KeptBytes {
+struct HeldBytes {
     std::string name;
     std::size_t bytes;
     std::string what;
 };
-std::string to_text(const std::string& heading, const std::vector<KeptBytes>& all);
+std::string to_text(const std::string& heading, const std::vector<HeldBytes>& all);
 
 }  // namespace rapid

@@ -25,7 +25,7 @@ std::size_t end_of_number(std::string_view text, std::size_t at)
 }
 
 // Returns the end of FILE:LINE: at the beginning; 0 if there is none.
-std::size_t end_of_place(std::string_view text)
+std::size_t end_of_location(std::string_view text)
 {
     const std::size_t end = text.find(": ");
     if (end == std::string_view::npos || end == 0 || !is_digit(text[end - 1])) return 0;
@@ -38,7 +38,7 @@ std::size_t end_of_place(std::string_view text)
 
 std::string kind_of_warning(std::string_view text)
 {
-    std::size_t at = end_of_place(text);
+    std::size_t at = end_of_location(text);
     std::string kind(text.substr(0, at));
     bool quoted = false;
     while (at < text.size()) {
@@ -59,32 +59,32 @@ std::string kind_of_warning(std::string_view text)
 bool FrameWarnings::add(const std::string& text, std::int64_t frame)
 {
     const std::string name = kind_of_warning(text);
-    if (kinds_.size() == most_kinds && !kinds_.contains(name)) {
+    if (kinds_.size() == max_kinds && !kinds_.contains(name)) {
         ++others_;
         return false;
     }
     Kind& kind = kinds_[name];
-    if (std::find(kind.told.begin(), kind.told.end(), text) != kind.told.end()) return false;
-    if (kind.told.size() < told_of_each) {
-        kind.told.push_back(text);
+    if (std::find(kind.printed.begin(), kind.printed.end(), text) != kind.printed.end()) return false;
+    if (kind.printed.size() < printed_of_each) {
+        kind.printed.push_back(text);
         return true;
     }
-    ++kind.untold;
+    ++kind.suppressed;
     kind.last = text;
     kind.frame = frame;
     return false;
 }
 
-std::vector<std::string> FrameWarnings::untold() const
+std::vector<std::string> FrameWarnings::suppressed() const
 {
     std::vector<const Kind*> kinds;
     for (const auto& [name, kind] : kinds_)
-        if (kind.untold > 0) kinds.push_back(&kind);
+        if (kind.suppressed > 0) kinds.push_back(&kind);
     std::stable_sort(kinds.begin(), kinds.end(), [](const Kind* a, const Kind* b) { return a->frame < b->frame; });
     std::vector<std::string> lines;
     for (const Kind* kind : kinds)
         lines.push_back(
-            fmt::format("{} more of this kind, the last in frame {}: {}", kind->untold, kind->frame, kind->last));
+            fmt::format("{} more of this kind, the last in frame {}: {}", kind->suppressed, kind->frame, kind->last));
     if (others_ > 0) lines.push_back(fmt::format("{} more of other kinds", others_));
     return lines;
 }

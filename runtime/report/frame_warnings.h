@@ -15,19 +15,19 @@ std::string kind_of_warning(std::string_view text);
 
 class FrameWarnings {
 public:
-    static constexpr std::size_t most_kinds = 1000, told_of_each = 10;
+    static constexpr std::size_t max_kinds = 1000, printed_of_each = 10;
 
     // Adds a warning. Returns true if it should be printed now: the first ten of a kind are, each once.
     bool add(const std::string& text, std::int64_t frame);
 
     // Returns summaries for the end of the run, in the order of their frames: for each kind the number of further
     // warnings and the last of them; then the number of warnings of further kinds.
-    std::vector<std::string> untold() const;
+    std::vector<std::string> suppressed() const;
 
 private:
     struct Kind {
-        std::vector<std::string> told;
-        std::uint64_t untold = 0;
+        std::vector<std::string> printed;
+        std::uint64_t suppressed = 0;
         std::string last;        // the last one that was not printed
         std::int64_t frame = 0;  // its frame
     };

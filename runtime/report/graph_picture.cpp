@@ -75,10 +75,10 @@ void draw_attributes(const Plan& plan, GraphPicture& picture)
         }
 }
 
-void add_edges(const Plan& plan, const std::map<const Node*, std::size_t>& places, GraphPicture& picture)
+void add_edges(const Plan& plan, const std::map<const Node*, std::size_t>& indices, GraphPicture& picture)
 {
     const auto add = [&](const Node* from, std::size_t to, Edge::Kind kind) {
-        if (const auto found = places.find(from); found != places.end())
+        if (const auto found = indices.find(from); found != indices.end())
             picture.edges.push_back({found->second, to, kind});
     };
     const auto add_inputs = [&](const NodePtr& node, std::size_t i) {
@@ -87,9 +87,9 @@ void add_edges(const Plan& plan, const std::map<const Node*, std::size_t>& place
             if (const auto handle = value.object<NodeHandle>()) add(handle->node.get(), i, Edge::Kind::Source);
     };
     for (std::size_t i = 0; i < plan.nodes.size(); ++i) add_inputs(plan.nodes[i].node, i);
-    for (std::size_t i = 0; i < plan.left_out.size(); ++i) add_inputs(plan.left_out[i], plan.nodes.size() + i);
+    for (std::size_t i = 0; i < plan.pruned.size(); ++i) add_inputs(plan.pruned[i], plan.nodes.size() + i);
     for (const PlannedSimulation& simulation : plan.simulations)
-        if (simulation.solve) add(simulation.solve.get(), places.at(simulation.create.get()), Edge::Kind::Feedback);
+        if (simulation.solve) add(simulation.solve.get(), indices.at(simulation.create.get()), Edge::Kind::Feedback);
 }
 
 const char* colour_of(const GraphPicture::Node& node)
@@ -157,15 +157,15 @@ void place(const CheckedJson& laid_out, CheckedJson& nodes, CheckedJson& edges, 
 GraphPicture picture_of(const Plan& plan)
 {
     GraphPicture picture;
-    std::map<const Node*, std::size_t> places;
+    std::map<const Node*, std::size_t> indices;
     const Explanation explained = explain(plan, {});
     for (const PlannedNode& planned : plan.nodes) {
-        places[planned.node.get()] = picture.nodes.size();
+        indices[planned.node.get()] = picture.nodes.size();
         picture.nodes.push_back(node_of(*planned.node));
         picture.nodes.back().simulation = plan.simulations[planned.simulation].create->name;
     }
-    for (const NodePtr& node : plan.left_out) {
-        places[node.get()] = picture.nodes.size();
+    for (const NodePtr& node : plan.pruned) {
+        indices[node.get()] = picture.nodes.size();
         picture.nodes.push_back(node_of(*node));
     }
     // The explanation has the nodes in the same order.
@@ -177,7 +177,7 @@ GraphPicture picture_of(const Plan& plan)
         picture.nodes[i].changes = node.changes;
     }
     draw_attributes(plan, picture);
-    add_edges(plan, places, picture);
+    add_edges(plan, indices, picture);
     picture.outputs = plan.outputs;
     return picture;
 }

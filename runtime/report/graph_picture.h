@@ -37,7 +37,7 @@ GraphPicture picture_of(const Plan& plan);
 
 // Returns the graph for Graphviz: from left to right, with a dashed edge from each Solve to its Create. Without tips
 // the text is the same for all values of parameters, and so is the layout.
-enum class Tips { Kept, LeftOut };
+enum class Tips { Kept, Pruned };
 std::string to_dot(const GraphPicture& picture, Tips tips = Tips::Kept);
 
 // Returns the picture as JSON. laid_out: the output of `dot -Tjson` for to_dot(), with the positions of nodes and the

@@ -94,7 +94,7 @@ void Progress::erase()
 std::string progress_bar(std::int64_t frame, std::int64_t first, std::int64_t last, std::uint64_t points,
                          double points_per_second, double seconds_left, int width)
 {
-    constexpr int least_bar = 10;
+    constexpr int min_bar = 10;
     std::vector<std::string> words = {
         fmt::format(" frame {}/{}", frame, last),
         fmt::format("  {} points", with_separators(points)),
@@ -106,10 +106,10 @@ std::string progress_bar(std::int64_t frame, std::int64_t first, std::int64_t la
         for (const std::string& word : words) sum += word.size();
         return static_cast<int>(sum);
     };
-    while (words.size() > 1 && length() + least_bar + 2 > width) words.pop_back();
+    while (words.size() > 1 && length() + min_bar + 2 > width) words.pop_back();
 
     std::string text;
-    if (const int room = width - length() - 2; room >= least_bar) {
+    if (const int room = width - length() - 2; room >= min_bar) {
         const int columns = std::min(room, 40);
         const auto done = static_cast<int>(columns * (frame - first + 1) / (last - first + 1));
         text = fmt::format("[{:=<{}}{: <{}}]", "", done, "", columns - done);

@@ -57,9 +57,9 @@ void Study::complete()
     std::vector<std::string> names;
     for (const auto& [knob, values] : sweep) {
         names.push_back(knob);
-        std::set<std::string> texts;
+        std::set<std::string> strings;
         for (const Value& value : values)
-            if (!texts.insert(knob_text(value)).second)
+            if (!strings.insert(knob_text(value)).second)
                 throw Error(fmt::format("sweep: {} has the value {} twice", knob, knob_text(value)));
     }
     const auto check_name = [&](const std::string& what, const std::string& knob) {

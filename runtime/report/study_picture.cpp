@@ -92,7 +92,7 @@ public:
     int first() const { return static_cast<int>(std::floor(std::log10(least_) + 1e-9)); }
     int last() const { return std::max(first() + 1, static_cast<int>(std::ceil(std::log10(most_) - 1e-9))); }
     // Decades per label, so that labels do not touch.
-    int stride(int most_labels) const { return std::max(1, (last() - first() + most_labels - 1) / most_labels); }
+    int stride(int max_labels) const { return std::max(1, (last() - first() + max_labels - 1) / max_labels); }
     double place(double value) const
     {
         return from_ + (to_ - from_) * (std::log10(value) - first()) / (last() - first());

@@ -31,9 +31,9 @@ std::string RunTotals::Warning::text(const char* what) const
 
 void RunTotals::add(const FrameStatistics& frame)
 {
-    if (frames_ == 0 || frame.points > most_points_) {
-        most_points_ = frame.points;
-        most_points_frame_ = frame.frame;
+    if (frames_ == 0 || frame.points > max_points_) {
+        max_points_ = frame.points;
+        max_points_frame_ = frame.frame;
     }
     if (!is_solved_ && frame.points > 0 && frame.substeps > 0) {
         is_solved_ = true;
@@ -86,8 +86,8 @@ std::string RunTotals::points_text() const
 {
     if (frames_ == 0) return "points   none: no frame was run\n";
     std::string text = fmt::format("points   {}", with_separators(last_.points));
-    if (most_points_ > last_.points)
-        text += fmt::format(" (most: {} in frame {})", with_separators(most_points_), most_points_frame_);
+    if (max_points_ > last_.points)
+        text += fmt::format(" (most: {} in frame {})", with_separators(max_points_), max_points_frame_);
     return text + '\n';
 }
 

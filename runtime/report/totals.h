@@ -39,8 +39,8 @@ private:
     std::uint64_t frames_ = 0, point_frames_ = 0;
     StageSeconds seconds_;
     FrameStatistics last_;
-    std::uint64_t most_points_ = 0;
-    std::int64_t most_points_frame_ = 0;
+    std::uint64_t max_points_ = 0;
+    std::int64_t max_points_frame_ = 0;
     bool is_solved_ = false;  // some points
     // The frame with the largest error.
     struct WorstError {

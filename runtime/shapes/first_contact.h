@@ -104,7 +104,7 @@ public:
     }
 
 private:
-    static constexpr int most_steps_back = 4096;
+    static constexpr int max_steps_back = 4096;
 
     void begin_some()
     {
@@ -163,7 +163,7 @@ private:
         // Each step is as long as the bound on the distance allows, so at least the half width of the band. A
         // user-supplied field may be negative everywhere, and then there is no way out.
         double back = 0;
-        for (int steps = 0; steps < most_steps_back; ++steps) {
+        for (int steps = 0; steps < max_steps_back; ++steps) {
             back += std::abs(f) / (sampler_.slope_bound() * speed);
             const Vec3d P = path.P - back * path.v;
             Vec3d there;

@@ -59,7 +59,7 @@ void BlockStep::add_forces(int substep)
     middle_.resize(size);
     for (std::size_t i = 0; i < size; ++i) middle_[i] = block.P[i] + 0.5 * block.dt[i] * block.v[i];
     set_time(substep);
-    const Chunk chunk{context_.points, block.places.front(), middle_, block.v, block.dt, time_, substep};
+    const Chunk chunk{context_.points, block.indices.front(), middle_, block.v, block.dt, time_, substep};
     for (const StepForce& local : scene.forces) {
         one_.reset(size);
         if (local.uniform)
@@ -98,15 +98,15 @@ void BlockStep::add_force_attribute()
 {
     const Column<Vec3f>& force = *context_.scene.force;
     for (std::size_t i = 0; i < block.size(); ++i)
-        block.own_a[i] += acceleration_by(force[block.places[i]].cast<double>(), block.places[i]);
+        block.own_a[i] += acceleration_by(force[block.indices[i]].cast<double>(), block.indices[i]);
 }
 
 void BlockStep::add_accelerations(const StepForce& local)
 {
     for (std::size_t i = 0; i < block.size(); ++i) {
-        if (!local.all && !local.members[block.places[i]]) continue;
+        if (!local.all && !local.members[block.indices[i]]) continue;
         const Vec3d a = one_.acceleration(i);
-        if (!a.allFinite()) at_node(*local.force, [&] { context_.errors.bad_acceleration(block.places[i], a); });
+        if (!a.allFinite()) at_node(*local.force, [&] { context_.errors.bad_acceleration(block.indices[i], a); });
         block.own_a[i] += a;
     }
 }
@@ -115,14 +115,14 @@ void BlockStep::add_linear(const StepForce& local)
 {
     own_linear();
     for (std::size_t i = 0; i < block.size(); ++i)
-        if (local.all || local.members[block.places[i]]) block.own_linear[i].add(one_.linear(i));
+        if (local.all || local.members[block.indices[i]]) block.own_linear[i].add(one_.linear(i));
 }
 
 void BlockStep::add_surface_springs(const StepForce& local)
 {
     own_linear();
     for (std::size_t i = 0; i < block.size(); ++i)
-        if (local.all || local.members[block.places[i]])
+        if (local.all || local.members[block.indices[i]])
             surface_springs_.add(i, one_.surface_spring(i), block.P[i], block.dt[i], block.own_linear[i]);
 }
 
@@ -192,15 +192,15 @@ void BlockStep::act(int substep)
     const std::size_t size = block.size();
     set_time(substep);
     kick_.assign(size, Vec3d::Zero());
-    const std::span<std::uint8_t> dead(context_.dead.data() + block.places.front(), size);
+    const std::span<std::uint8_t> dead(context_.dead.data() + block.indices.front(), size);
     if (context_.options.log) dead_before_.assign(dead.begin(), dead.end());
-    const Chunk chunk{context_.points, block.places.front(), block.P, block.v, block.dt, time_, substep};
+    const Chunk chunk{context_.points, block.indices.front(), block.P, block.v, block.dt, time_, substep};
     for (const StepAction& local : context_.scene.actions)
         at_node(*local.action, [&] { local.pass->act(chunk, kick_, dead); });
     for (std::size_t i = 0; i < size; ++i) {
-        block.v[i] += block.dt[i] * acceleration_by(kick_[i], block.places[i]);
+        block.v[i] += block.dt[i] * acceleration_by(kick_[i], block.indices[i]);
         if (!dead[i]) continue;
-        if (context_.options.log && !dead_before_[i]) context_.options.log->kill(block.places[i], time_[i]);
+        if (context_.options.log && !dead_before_[i]) context_.options.log->kill(block.indices[i], time_[i]);
         block.dt[i] = block.moved_dt[i] = half_[i] = 0;
     }
 }
@@ -209,21 +209,21 @@ void BlockStep::act(int substep)
 void BlockStep::stop_dead()
 {
     for (std::size_t i = 0; i < block.size(); ++i)
-        if (context_.dead[block.places[i]]) block.dt[i] = block.moved_dt[i] = 0;
+        if (context_.dead[block.indices[i]]) block.dt[i] = block.moved_dt[i] = 0;
 }
 
 void BlockStep::require_finite() const
 {
     for (std::size_t i = 0; i < block.size(); ++i)
-        context_.errors.require_finite(block.places[i], block.rounded[i], block.v[i].cast<float>(),
+        context_.errors.require_finite(block.indices[i], block.rounded[i], block.v[i].cast<float>(),
                                        PointErrors::in_step);
 }
 
 void BlockStep::store() const
 {
     for (std::size_t i = 0; i < block.size(); ++i) {
-        context_.P[block.places[i]] = block.rounded[i];
-        context_.v[block.places[i]] = block.v[i].cast<float>();
+        context_.P[block.indices[i]] = block.rounded[i];
+        context_.v[block.indices[i]] = block.v[i].cast<float>();
     }
 }
 

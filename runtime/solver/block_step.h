@@ -24,9 +24,9 @@ public:
     PointBlock block;
 
     // Begins with the points at these indices of the set, in order; they must be contiguous if forces or actions act.
-    void begin(std::span<const std::uint32_t> places, int substeps)
+    void begin(std::span<const std::uint32_t> indices, int substeps)
     {
-        block.begin(places, context_.P, context_.v, context_.time, substeps);
+        block.begin(indices, context_.P, context_.v, context_.time, substeps);
     }
 
     // Advances one substep, numbered from 0. The collisions must have begun this block.

@@ -9,11 +9,11 @@ namespace rapid {
 
 CollisionRadii::CollisionRadii(const Dynamics& dynamics, const PointSet& points) : points_(&points)
 {
-    const bool asked = std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
-                                   [](const auto& collider) { return !collider->radius; });
+    const bool requested = std::any_of(dynamics.colliders().begin(), dynamics.colliders().end(),
+                                       [](const auto& collider) { return !collider->radius; });
     for (const auto& constraint : dynamics.constraints()) {
         const std::optional<PerPoint<float>> given = constraint->radius();
-        if (!asked || !given) continue;
+        if (!requested || !given) continue;
         at_node(*constraint, [&] {
             const Strided<float> radius = given->read(points);
             const Strided<std::uint8_t> members = members_of(points, constraint->group);

@@ -15,11 +15,11 @@ namespace {
 // Checks memory before anything is allocated. Constraints check their additional memory themselves.
 std::size_t with_room(std::size_t points)
 {
-    constexpr double bytes_a_point = 200;  // of the step, and of a search for neighbours: 150 to 275 were measured
-    const double bytes = bytes_a_point * static_cast<double>(points);
+    constexpr double bytes_per_point = 200;  // of the step, and of a search for neighbours: 150 to 275 were measured
+    const double bytes = bytes_per_point * static_cast<double>(points);
     if (!fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("a step of {} points that act on one another", points), bytes,
-                            "give fewer points");
+        throw memory_exceeded(fmt::format("a step of {} points that act on one another", points), bytes,
+                              "give fewer points");
     return points;
 }
 
@@ -199,32 +199,32 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
     Collisions collisions(spin_ ? smooth_ : scene.obstacles, context);
     BlockStep step(context_);
     const PointBlock& block = step.block;
-    std::vector<std::uint32_t> places;
+    std::vector<std::uint32_t> indices;
     double max_acceleration = 0;
     EnergyChanges changes;
     for (std::size_t first = begin; first < end; first += block_size) {
         const std::size_t last = std::min(first + block_size, end);
-        places.clear();
+        indices.clear();
         for (std::size_t i = first; i < last; ++i) {
             start_[i] = at_[i].P;
             if (!born_.empty()) born_[i] = at_[i].P;
             if (!reaction_.empty()) reaction_[i].setZero();
-            if (!skips_sleepers_ || !leaves_out(i)) places.push_back(static_cast<std::uint32_t>(i));
+            if (!skips_sleepers_ || !skips(i)) indices.push_back(static_cast<std::uint32_t>(i));
         }
-        if (places.empty()) {
+        if (indices.empty()) {
             max_acceleration = std::max(max_acceleration, scene.uniform.a.norm());
             continue;
         }
-        begin_block(step, places);
-        if (!scene.obstacles.empty()) collisions.begin(block.places);
+        begin_block(step, indices);
+        if (!scene.obstacles.empty()) collisions.begin(block.indices);
         step.advance(collisions, now_.index);
         // A point that was moved out of a shape gets no velocity from that towards points it now overlaps, as if it
         // had been born there.
         for (const auto& [k, by] : collisions.displacements())
-            if (!held_[block.places[k]]) start_[block.places[k]] += by;
+            if (!held_[block.indices[k]]) start_[block.indices[k]] += by;
         for (std::size_t k = 0; k < block.size(); ++k) {
-            if (!surface_springs_.empty()) surface_springs_[block.places[k]] = step.surface_spring(k);
-            if (block.linear.data && !held_[block.places[k]]) add_drag(block, k, collisions.contact_work(k), changes);
+            if (!surface_springs_.empty()) surface_springs_[block.indices[k]] = step.surface_spring(k);
+            if (block.linear.data && !held_[block.indices[k]]) add_drag(block, k, collisions.contact_work(k), changes);
             take_point(block, k, !scene.obstacles.empty() && collisions.is_carried(k));
         }
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
@@ -237,13 +237,13 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
     now_.max_acceleration = std::max(now_.max_acceleration, max_acceleration);
 }
 
-void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> places)
+void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> indices)
 {
     PointBlock& block = step.block;
-    step.begin(places, context_.options.substeps);
-    if (!reaction_.empty()) block.reaction.assign(places.size(), Vec3d::Zero());
+    step.begin(indices, context_.options.substeps);
+    if (!reaction_.empty()) block.reaction.assign(indices.size(), Vec3d::Zero());
     for (std::size_t k = 0; k < block.size(); ++k) {
-        const std::uint32_t i = places[k];
+        const std::uint32_t i = indices[k];
         block.P[k] = at_[i].P;
         block.v[k] = v_[i];
         const bool asleep = sleep_ && sleep_->asleep(i);
@@ -255,7 +255,7 @@ void CoupledStep::begin_block(BlockStep& step, std::span<const std::uint32_t> pl
 // Stores the end of a point's free motion, at which the projection starts. is_carried: a shape prescribes it.
 void CoupledStep::take_point(const PointBlock& block, std::size_t k, bool is_carried)
 {
-    const std::uint32_t i = block.places[k];
+    const std::uint32_t i = block.indices[k];
     carried_[i] = is_carried && !held_[i];
     if (!carried_v_.empty()) carried_v_[i] = carried_[i] ? v_[i] : Vec3d(Vec3d::Zero());
     ProjectedPoint& at = at_[i];
@@ -303,16 +303,16 @@ Mobility CoupledStep::mobility_of(const PointBlock& block, std::size_t k) const
 // (J/kg).
 void CoupledStep::add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const
 {
-    const std::uint32_t i = block.places[k];
+    const std::uint32_t i = block.indices[k];
     const Linear& linear = block.linear[k];
     const SurfaceSpring& surface = surface_springs_[i];
     if (!(inverse_mass_[i] > 0) || !(block.dt[k] > 0) || (linear.k == 0 && linear.c == 0)) return;
     if (surface.w2 > 0 && surface.shape->moves()) return;  // the work of the shape is not known separately
-    const Vec3d &from = start_[i], &to = block.P[k], way = to - from;
+    const Vec3d &from = start_[i], &to = block.P[k], displacement = to - from;
     const double kinetic = 0.5 * (block.v[k] - v_[i]).dot(block.v[k] + v_[i]);
-    double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(way);
+    double springs = (0.5 * linear.w2 * (to + from) - linear.w2q).dot(displacement);
     if (surface.w2 > 0) springs += potential_energy(surface, to) - potential_energy(surface, from);
-    changes.drag += (kinetic - block.a[k].dot(way) + springs - contacts) / inverse_mass_[i];
+    changes.drag += (kinetic - block.a[k].dot(displacement) + springs - contacts) / inverse_mass_[i];
 }
 
 EnergyChanges CoupledStep::changes(const Projection& projection)
@@ -329,7 +329,7 @@ EnergyChanges CoupledStep::changes(const Projection& projection)
 }
 
 // Returns true if a sleeper under uniform forces stays asleep and can be skipped in the blocks.
-bool CoupledStep::leaves_out(std::size_t i)
+bool CoupledStep::skips(std::size_t i)
 {
     sleep_->check_acceleration(i, context_.scene.uniform.a);
     if (!sleep_->asleep(i)) return false;
@@ -342,7 +342,7 @@ bool CoupledStep::leaves_out(std::size_t i)
 // acceleration of forces, is assumed to have done so throughout; a larger velocity change was a contact.
 FreePath CoupledStep::free_path(const PointBlock& block, std::size_t k) const
 {
-    const std::uint32_t i = block.places[k];
+    const std::uint32_t i = block.indices[k];
     const Vec3d a = acceleration_of(block, k, false);
     const double dt = block.moved_dt[k];
     if (context_.scene.obstacles.empty() || !context_.scene.actions.empty() || !(dt > 0)) return {a, Vec3d::Zero()};
@@ -355,7 +355,7 @@ FreePath CoupledStep::free_path(const PointBlock& block, std::size_t k) const
 // Returns the acceleration of a point in a substep, m/s²; for a sleeper, it includes motion and velocity from actions.
 Vec3d CoupledStep::acceleration_of(const PointBlock& block, std::size_t k, bool asleep) const
 {
-    const Vec3d& from = start_[block.places[k]];
+    const Vec3d& from = start_[block.indices[k]];
     Vec3d a = block.a[k];
     if (block.linear.data) {
         const Linear& linear = block.linear[k];
@@ -376,20 +376,20 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
     Collisions collisions(context_.scene.obstacles, context);
     BlockStep step(context_);
     PointBlock& block = step.block;
-    std::vector<std::uint32_t> places;
+    std::vector<std::uint32_t> indices;
     double deepest = 0;
     for (std::size_t first = begin; first < end; first += block_size) {
         const std::size_t size = std::min(block_size, end - first);
-        places.resize(size);
-        std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(first));
-        step.begin(places, context_.options.substeps);
+        indices.resize(size);
+        std::iota(indices.begin(), indices.end(), static_cast<std::uint32_t>(first));
+        step.begin(indices, context_.options.substeps);
         for (std::size_t i = 0; i < size; ++i) {
             block.P[i] = at_[first + i].P;
             block.v[i] = v_[first + i];
         }
         if (collides) {
             block.dt.assign(size, 0);
-            collisions.begin(block.places);
+            collisions.begin(block.indices);
             collisions.advance(block.P, block.v, {{&context_.scene.uniform.a, 0}, block.dt, block.dt, {}});
             std::vector<std::size_t> displaced;  // out of shapes, or back to the position at which they stick
             for (std::size_t i = 0; i < size; ++i)
@@ -421,11 +421,11 @@ void CoupledStep::add_displacements(const Projection& projection)
     std::vector<Vec3d> P(at_.size());
     for (std::size_t i = 0; i < P.size(); ++i) P[i] = at_[i].P;
     double by_forces = 0, by_acceleration = 0;
-    for (const auto& [i, place] : displaced_) {
-        P[i] = place;
+    for (const auto& [i, position] : displaced_) {
+        P[i] = position;
         if (!(inverse_mass_[i] > 0)) continue;
-        by_forces += potential_energy(now_, i, place) - potential_energy(now_, i, at_[i].P);
-        by_acceleration -= now_.acceleration.dot(place - at_[i].P) / inverse_mass_[i];
+        by_forces += potential_energy(now_, i, position) - potential_energy(now_, i, at_[i].P);
+        by_acceleration -= now_.acceleration.dot(position - at_[i].P) / inverse_mass_[i];
     }
     const double elastic = projection.elastic_energy(now_, P) - projection.elastic_energy(now_);
     SolveResult& result = context_.result();

@@ -33,11 +33,11 @@ private:
     bool is_isolated(const Projection& projection) const;
     void interact(int kicks, double time);
     void advance_freely(std::size_t begin, std::size_t end);
-    void begin_block(BlockStep& step, std::span<const std::uint32_t> places);
+    void begin_block(BlockStep& step, std::span<const std::uint32_t> indices);
     void take_point(const PointBlock& block, std::size_t k, bool is_carried);
     void add_drag(const PointBlock& block, std::size_t k, double contacts, EnergyChanges& changes) const;
     EnergyChanges changes(const Projection& projection);
-    bool leaves_out(std::size_t i);
+    bool skips(std::size_t i);
     void store(std::size_t begin, std::size_t end);
     void add_displacements(const Projection& projection);
     Mobility mobility_of(const PointBlock& block, std::size_t k) const;

@@ -18,7 +18,7 @@ namespace rapid {
 namespace {
 
 // Limit of pairwise evaluations in a frame, 20 ns each: five hours of one processor.
-constexpr double most_looks = 1e12;
+constexpr double max_looks = 1e12;
 
 // Returns (1 - e^(-2 k t)) / 2: the part of the velocity difference of two points that each gets in the time t if it
 // decays at the rate k on both sides. At most a half, which makes them equal.
@@ -50,8 +50,8 @@ public:
         std::size_t count = 0;
         for (std::size_t i = 0; i < points.size(); ++i) count += takes_part(i);
         require_memory(count);
-        std::vector<Vec3f> places;
-        places.reserve(count);
+        std::vector<Vec3f> positions;
+        positions.reserve(count);
         members_.reserve(count);
         for (std::size_t i = 0; i < points.size(); ++i) {
             if (!takes_part(i)) continue;
@@ -63,10 +63,10 @@ public:
                 throw Error(fmt::format("point {}, frame {}: its mass is {:g}; with interactions it must be finite",
                                         id_[i], options.frame, mass_[i]));
             members_.push_back(static_cast<std::uint32_t>(i));
-            places.push_back(P_[i].template cast<float>());
+            positions.push_back(P_[i].template cast<float>());
         }
         if (members_.empty()) return;
-        grid_.emplace(places, interaction.radius);
+        grid_.emplace(positions, interaction.radius);
         require_affordable(at.steps, kicks);
         if (!interaction.sees_all())
             for (const std::uint32_t i : members_) headings_.push_back(v_[i]);
@@ -89,10 +89,10 @@ private:
     // Checks memory for points each in a separate cell.
     static void require_memory(std::size_t points)
     {
-        constexpr double bytes_a_point = 160;  // measured: positions, cells, weights, headings, kicks
-        const double bytes = bytes_a_point * static_cast<double>(points);
+        constexpr double bytes_per_point = 160;  // measured: positions, cells, weights, headings, kicks
+        const double bytes = bytes_per_point * static_cast<double>(points);
         if (!fits_in_memory(bytes))
-            throw beyond_memory(fmt::format("the neighbourhoods of {} points", points), bytes, "let it act on fewer");
+            throw memory_exceeded(fmt::format("the neighbourhoods of {} points", points), bytes, "let it act on fewer");
     }
 
     // The cost of a radius that contains all points grows with the square of their number, and may be endless. If it
@@ -102,19 +102,19 @@ private:
         constexpr std::size_t sampled = 32;
         const double n = static_cast<double>(members_.size());
         const double passes = 2 * steps * (1 + kicks);  // at both ends of a step, with that over the weights
-        if (n * n * passes <= most_looks) return;
+        if (n * n * passes <= max_looks) return;
         std::vector<std::uint32_t> near;
         double found = 0;
         for (std::size_t k = 0; k < sampled; ++k) {
             grid_->find(P_[members_[k * members_.size() / sampled]], near);
             found += static_cast<double>(near.size());
         }
-        if (const double neighbours = found / sampled; n * neighbours * passes > most_looks)
+        if (const double neighbours = found / sampled; n * neighbours * passes > max_looks)
             throw Error(fmt::format(
                 "radius = {:g} m: about {:.2g} neighbours of each of {} points, {:.2g} looks in a frame of {:g} steps, "
                 "of "
                 "which at most {:g} are taken; give it a smaller radius",
-                interaction_.radius, neighbours, members_.size(), n * neighbours * passes, steps, most_looks));
+                interaction_.radius, neighbours, members_.size(), n * neighbours * passes, steps, max_looks));
     }
 
     // Calls f for each member with each of its neighbours, in order of their indices in the set.
@@ -254,10 +254,10 @@ void interact(PointSet& points, const Dynamics& dynamics, const SolveOptions& op
     if (points.empty() || dynamics.interactions().empty()) return;
     std::vector<Vec3d> P(points.size()), v(points.size());
     const std::span<Vec3f> rounded = points.v().write();
-    const Strided<Vec3f> places = std::as_const(points).P().read();
+    const Strided<Vec3f> positions = std::as_const(points).P().read();
     for (const std::shared_ptr<const Interaction>& interaction : dynamics.interactions()) {
         for (std::size_t i = 0; i < P.size(); ++i) {
-            P[i] = places[i].cast<double>();
+            P[i] = positions[i].cast<double>();
             v[i] = rounded[i].cast<double>();
         }
         Dynamics one;

@@ -4,21 +4,21 @@
 
 namespace rapid {
 
-void PointBlock::begin(std::span<const std::uint32_t> block_places, std::span<const Vec3f> P0,
+void PointBlock::begin(std::span<const std::uint32_t> block_indices, std::span<const Vec3f> P0,
                        std::span<const Vec3f> v0, const OwnTime& time, int count)
 {
-    places = block_places;
+    indices = block_indices;
     substeps = count;
-    const std::size_t n = places.size();
+    const std::size_t n = indices.size();
     P.resize(n);
     v.resize(n);
     dt.resize(n);
     rounded.resize(n);
     for (std::size_t i = 0; i < n; ++i) {
-        rounded[i] = P0[places[i]];
+        rounded[i] = P0[indices[i]];
         P[i] = rounded[i].cast<double>();
-        v[i] = v0[places[i]].cast<double>();
-        dt[i] = time(places[i]) / substeps;
+        v[i] = v0[indices[i]].cast<double>();
+        dt[i] = time(indices[i]) / substeps;
     }
     moved_dt = dt;
 }

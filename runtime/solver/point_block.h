@@ -18,7 +18,7 @@ namespace rapid {
 class PointBlock {
 public:
     // Begins with the points at these indices of the set, whose columns are P0 and v0, before `count` substeps.
-    void begin(std::span<const std::uint32_t> block_places, std::span<const Vec3f> P0, std::span<const Vec3f> v0,
+    void begin(std::span<const std::uint32_t> block_indices, std::span<const Vec3f> P0, std::span<const Vec3f> v0,
                const OwnTime& time, int count);
 
     std::size_t size() const { return P.size(); }
@@ -30,7 +30,7 @@ public:
     // The paths with linear forces, for colliders: fills `damped`.
     void find_damped_paths(std::span<const double> t);
 
-    std::span<const std::uint32_t> places;  // in the set
+    std::span<const std::uint32_t> indices;  // in the set
     int substeps = 1;
     std::vector<Vec3d> P, v;
     std::vector<Vec3f> rounded;    // P at the beginning of the frame, and at its end

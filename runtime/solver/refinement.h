@@ -22,12 +22,12 @@ enum class PathKind : std::uint8_t {
 
 // A block at the end of the frame; spans have shape [n].
 struct BlockResult {
-    std::span<const std::uint32_t> places;  // in the set
+    std::span<const std::uint32_t> indices;  // in the set
     std::span<const PathKind> path;
-    std::span<const double> put_off;     // m, due to contacts found after a substep
-    std::span<const std::uint8_t> dead;  // 1: it has died; empty if none can
-    std::span<const Vec3d> P, v;         // before rounding to single precision
-    std::span<const Vec3f> rounded;      // P, on the outer side of the point's surface
+    std::span<const double> position_errors;  // m, due to contacts found after a substep
+    std::span<const std::uint8_t> dead;       // 1: it has died; empty if none can
+    std::span<const Vec3d> P, v;              // before rounding to single precision
+    std::span<const Vec3f> rounded;           // P, on the outer side of the point's surface
     std::span<const Obstacle> obstacles;
 };
 
@@ -37,7 +37,7 @@ public:
     virtual ~BlockRefinement() = default;
 
     // Begins the next block: the points at these indices of the set.
-    virtual void begin(std::span<const std::uint32_t> places) = 0;
+    virtual void begin(std::span<const std::uint32_t> indices) = 0;
     // Takes the result of a run. Returns the substeps of the next run, from the beginning of the frame, or 0.
     virtual int take(const BlockResult& result) = 0;
 };

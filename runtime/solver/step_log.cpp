@@ -7,10 +7,10 @@ namespace rapid {
 
 void StepLog::take_dead(const PointSet& points, std::span<const std::uint8_t> dead)
 {
-    std::vector<std::uint32_t> places;
+    std::vector<std::uint32_t> indices;
     for (std::size_t i = 0; i < dead.size(); ++i)
-        if (dead[i]) places.push_back(static_cast<std::uint32_t>(i)), dead_times_.push_back(died_at_[i]);
-    dead_ = points.select(places);
+        if (dead[i]) indices.push_back(static_cast<std::uint32_t>(i)), dead_times_.push_back(died_at_[i]);
+    dead_ = points.select(indices);
 }
 
 std::vector<LoggedHit> StepLog::hits() const

@@ -45,10 +45,10 @@ void SurfaceSprings::add(std::size_t i, const SurfaceSpring& spring, const Vec3d
     double phi = 0;
     Vec3d gradient = Vec3d::Zero();
     weaker.shape->distance_at({&P, 1}, {&weaker.time, 1}, {&phi, 1}, {&gradient, 1});
-    Vec3d place = nearest(P, phi, gradient);
-    if (weaker.shape->moves()) place += 0.5 * dt * weaker.shape->velocity_at(place, weaker.time);
+    Vec3d position = nearest(P, phi, gradient);
+    if (weaker.shape->moves()) position += 0.5 * dt * weaker.shape->velocity_at(position, weaker.time);
     linear.w2 += weaker.w2;
-    linear.w2q += weaker.w2 * place;
+    linear.w2q += weaker.w2 * position;
 }
 
 void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
@@ -84,19 +84,19 @@ void SurfaceSprings::advance(const PointBlock& block, std::span<const double> t)
     for (std::size_t m = 0; m < motions_.size(); ++m) times_[m] = springs_[indices_[m]].time;
     query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
-        if (motions_[m].t > 0) at_[m] = motions_[m].go(gradient_[m], shape_velocity(m));
+        if (motions_[m].t > 0) at_[m] = motions_[m].advance(gradient_[m], shape_velocity(m));
     query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
         if (motions_[m].t > 0) motions_[m].end(phi_[m], gradient_[m]);
     bool far = false;
     for (std::size_t m = 0; m < motions_.size(); ++m) {
         at_[m] = motions_[m].P;
-        far |= motions_[m].t > 0 && motions_[m].far_from_asked();
+        far |= motions_[m].t > 0 && motions_[m].far_from_query();
     }
     if (!far) return;
     query();
     for (std::size_t m = 0; m < motions_.size(); ++m)
-        if (motions_[m].t > 0 && motions_[m].far_from_asked()) motions_[m].settle(phi_[m], gradient_[m]);
+        if (motions_[m].t > 0 && motions_[m].far_from_query()) motions_[m].settle(phi_[m], gradient_[m]);
 }
 
 // Returns the velocity of a motion's shape at the queried position, m/s.
@@ -115,21 +115,21 @@ void SurfaceSprings::query()
     for (std::size_t first = 0; first < at_.size(); ++first) {
         if (done[first]) continue;
         const Shape* shape = springs_[indices_[first]].shape;
-        asked_.clear();
-        asked_times_.clear();
+        queried_.clear();
+        query_times_.clear();
         for (std::size_t m = first; m < at_.size(); ++m) {
             if (springs_[indices_[m]].shape != shape) continue;
-            asked_.push_back(at_[m]);
-            asked_times_.push_back(times_[m]);
+            queried_.push_back(at_[m]);
+            query_times_.push_back(times_[m]);
         }
-        asked_phi_.resize(asked_.size());
-        asked_gradient_.resize(asked_.size());
-        shape->distance_at(asked_, asked_times_, asked_phi_, asked_gradient_);
+        query_phi_.resize(queried_.size());
+        query_gradient_.resize(queried_.size());
+        shape->distance_at(queried_, query_times_, query_phi_, query_gradient_);
         for (std::size_t m = first, k = 0; m < at_.size(); ++m) {
             if (springs_[indices_[m]].shape != shape) continue;
             done[m] = 1;
-            phi_[m] = asked_phi_[k];
-            gradient_[m] = asked_gradient_[k++];
+            phi_[m] = query_phi_[k];
+            gradient_[m] = query_gradient_[k++];
         }
     }
 }

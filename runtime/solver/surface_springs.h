@@ -55,8 +55,8 @@ private:
     std::vector<Vec3d> at_, gradient_;
     std::vector<double> phi_, times_;  // times_: of the shape, s
 
-    std::vector<Vec3d> asked_, asked_gradient_;  // for one shape
-    std::vector<double> asked_phi_, asked_times_;
+    std::vector<Vec3d> queried_, query_gradient_;  // for one shape
+    std::vector<double> query_phi_, query_times_;
 };
 
 }  // namespace rapid

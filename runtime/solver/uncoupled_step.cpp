@@ -12,7 +12,7 @@ public:
     explicit BlockRun(StepContext& context) : context_(context), step_(context) {}
 
     // Returns the largest penetration of a point at the end, m.
-    double advance(Collisions& collisions, std::span<const std::uint32_t> places, int substeps);
+    double advance(Collisions& collisions, std::span<const std::uint32_t> indices, int substeps);
     void store() const { step_.store(); }
     BlockResult result(const Collisions& collisions);
 
@@ -22,16 +22,16 @@ private:
     StepContext& context_;
     BlockStep step_;
     std::vector<PathKind> paths_;
-    std::vector<double> put_off_;  // m
+    std::vector<double> position_errors_;  // m
     std::vector<std::uint8_t> dead_;
 };
 
-double BlockRun::advance(Collisions& collisions, std::span<const std::uint32_t> places, int substeps)
+double BlockRun::advance(Collisions& collisions, std::span<const std::uint32_t> indices, int substeps)
 {
     const bool collides = !context_.scene.obstacles.empty();
     PointBlock& block = step_.block;
-    step_.begin(places, substeps);
-    if (collides) collisions.begin(block.places);
+    step_.begin(indices, substeps);
+    if (collides) collisions.begin(block.indices);
     for (int substep = 0; substep < substeps; ++substep) step_.advance(collisions, substep);
     if (!context_.advances_all()) restore_others();
     double deepest = 0;
@@ -48,10 +48,10 @@ void BlockRun::restore_others()
 {
     PointBlock& block = step_.block;
     for (std::size_t i = 0; i < block.size(); ++i) {
-        const std::uint32_t place = block.places[i];
-        if (context_.advances(place)) continue;
-        block.P[i] = context_.P[place].cast<double>();
-        block.v[i] = context_.v[place].cast<double>();
+        const std::uint32_t index = block.indices[i];
+        if (context_.advances(index)) continue;
+        block.P[i] = context_.P[index].cast<double>();
+        block.v[i] = context_.v[index].cast<double>();
     }
 }
 
@@ -64,15 +64,15 @@ BlockResult BlockRun::result(const Collisions& collisions)
                               : scene.actions.empty()                                ? PathKind::Smooth
                                                                                      : PathKind::Acted;
     paths_.assign(block.size(), unbroken);
-    put_off_.assign(block.size(), 0);
+    position_errors_.assign(block.size(), 0);
     for (std::size_t i = 0; !scene.obstacles.empty() && i < block.size(); ++i) {
         if (collisions.has_met(i)) paths_[i] = PathKind::Broken;
-        put_off_[i] = collisions.position_error(i);
+        position_errors_[i] = collisions.position_error(i);
     }
     dead_.clear();
     if (!context_.dead.empty())
-        for (const std::uint32_t place : block.places) dead_.push_back(context_.dead[place]);
-    return {block.places, paths_, put_off_, dead_, block.P, block.v, block.rounded, scene.obstacles};
+        for (const std::uint32_t index : block.indices) dead_.push_back(context_.dead[index]);
+    return {block.indices, paths_, position_errors_, dead_, block.P, block.v, block.rounded, scene.obstacles};
 }
 
 }  // namespace
@@ -88,18 +88,18 @@ void UncoupledStep::advance_chunk(std::size_t begin, std::size_t end)
         context_.errors.require_finite(from, context_.P.subspan(from, to - from), context_.v.subspan(from, to - from),
                                        occasion);
     };
-    std::vector<std::uint32_t> places;
+    std::vector<std::uint32_t> indices;
     if (context_.scene.is_ballistic() && context_.advances_all() && (!refinement_ || refinement_->takes_exact())) {
-        const BallisticBatch::Progress progress = advance_ballistic(begin, end, places);
+        const BallisticBatch::Progress progress = advance_ballistic(begin, end, indices);
         if (!progress.finite) require_finite(begin, progress.end, PointErrors::in_step_overwritten);
         require_finite(progress.end, end, PointErrors::before_step);
-        if (places.empty()) return;
+        if (indices.empty()) return;
     } else {
         require_finite(begin, end, PointErrors::before_step);
-        places.resize(end - begin);
-        std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
+        indices.resize(end - begin);
+        std::iota(indices.begin(), indices.end(), static_cast<std::uint32_t>(begin));
     }
-    advance_by_substeps(places);
+    advance_by_substeps(indices);
 }
 
 // Advances the points that come near no shape in the whole frame, and lists the others.
@@ -118,7 +118,7 @@ BallisticBatch::Progress UncoupledStep::advance_ballistic(std::size_t begin, std
 }
 
 // Advances points of one chunk, in order; the whole chunk if forces or actions act.
-void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> places)
+void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> indices)
 {
     // Contacts are counted in the first run of each block only.
     Collisions counted(context_.scene.obstacles, context_.collision_context());
@@ -126,8 +126,8 @@ void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> places)
     BlockRun run(context_);
     const std::unique_ptr<BlockRefinement> refinement = refinement_ ? refinement_->begin() : nullptr;
     double deepest = 0;
-    for (std::size_t begin = 0; begin < places.size(); begin += block_size) {
-        const std::span at = places.subspan(begin, std::min(block_size, places.size() - begin));
+    for (std::size_t begin = 0; begin < indices.size(); begin += block_size) {
+        const std::span at = indices.subspan(begin, std::min(block_size, indices.size() - begin));
         if (refinement) refinement->begin(at);
         deepest = std::max(deepest, run.advance(counted, at, context_.options.substeps));
         if (!refinement) {
@@ -137,11 +137,11 @@ void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> places)
         int substeps = refinement->take(run.result(counted));
         for (; substeps > 0; substeps = refinement->take(run.result(others))) {
             if (!context_.dead.empty())
-                for (const std::uint32_t place : at) context_.dead[place] = 0;
+                for (const std::uint32_t index : at) context_.dead[index] = 0;
             deepest = std::max(deepest, run.advance(others, at, substeps));
         }
     }
-    context_.count(counted, deepest, places.front());
+    context_.count(counted, deepest, indices.front());
 }
 
 }  // namespace rapid

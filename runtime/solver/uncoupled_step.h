@@ -25,7 +25,7 @@ public:
 private:
     void advance_chunk(std::size_t begin, std::size_t end);
     BallisticBatch::Progress advance_ballistic(std::size_t begin, std::size_t end, std::vector<std::uint32_t>& near);
-    void advance_by_substeps(std::span<const std::uint32_t> places);
+    void advance_by_substeps(std::span<const std::uint32_t> indices);
 
     StepContext& context_;
     Refinement* const refinement_;

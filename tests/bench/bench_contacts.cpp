@@ -165,9 +165,9 @@ public:
     {
         for (Row& row : rows_) {
             const double C = row.n.dot(step.points[row.i].P - step.points[row.j].P) - row.reach - row.allowed;
-            const double wanted = std::max(0.0, row.normal_impulse - C / step.dt * row.per_w);
+            const double target = std::max(0.0, row.normal_impulse - C / step.dt * row.per_w);
             row.change.setZero();
-            row.shift = step.dt * (wanted - row.normal_impulse) * row.n;
+            row.shift = step.dt * (target - row.normal_impulse) * row.n;
         }
         apply(step, 0, true);
         for (Row& row : rows_) row.normal_impulse += row.n.dot(row.shift) / step.dt;

@@ -19,11 +19,12 @@
 namespace rapid {
 namespace {
 
-constexpr double births_a_frame = 1 << 20;
+constexpr double births_per_frame = 1 << 20;
 
 std::map<std::string, Value> plain(const char* birth)
 {
-    return {{"source", ObjectPtr(make_torus(1, 0.3, 50, Vec3d::Zero()))}, {"count", births_a_frame}, {"birth", birth}};
+    return {
+        {"source", ObjectPtr(make_torus(1, 0.3, 50, Vec3d::Zero()))}, {"count", births_per_frame}, {"birth", birth}};
 }
 
 std::map<std::string, Value> sparks()

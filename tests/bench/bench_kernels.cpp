@@ -128,7 +128,7 @@ public:
     {
         const Evaluation now{{2, dt, dt}, false, node_, location_, RandomKey(1, node_), figures_, warnings_, nothing_};
         const auto pass = host->kernels[kernel]->prepare(sets[kernel], "", now, {}, {});
-        go_over({&pass, 1}, sets[kernel], false);
+        run_passes({&pass, 1}, sets[kernel], false);
     }
 
     Columns columns()

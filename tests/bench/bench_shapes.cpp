@@ -110,24 +110,24 @@ struct Dense {
     }
 };
 
-// Runs `ask` over all points in chunks, on the number of threads given by the benchmark's argument.
-template <class Ask>
-void run(benchmark::State& state, const std::vector<Vec3d>& points, const Ask& ask)
+// Runs `query` over all points in chunks, on the number of threads given by the benchmark's argument.
+template <class Query>
+void run(benchmark::State& state, const std::vector<Vec3d>& points, const Query& query)
 {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, state.range(0));
     std::vector<double> phi(n);
     std::vector<Vec3d> gradient(n);
     for (auto _ : state) {
         for_each_chunk(n, [&](std::size_t begin, std::size_t end) {
-            ask(std::span(points).subspan(begin, end - begin), std::span(phi).subspan(begin, end - begin),
-                std::span(gradient).subspan(begin, end - begin));
+            query(std::span(points).subspan(begin, end - begin), std::span(phi).subspan(begin, end - begin),
+                  std::span(gradient).subspan(begin, end - begin));
         });
         benchmark::ClobberMemory();
     }
     state.SetItemsProcessed(state.iterations() * n);
 }
 
-void ask_stencil(benchmark::State& state, const std::vector<Vec3d>& points)
+void query_stencil(benchmark::State& state, const std::vector<Vec3d>& points)
 {
     openvdb::initialize();
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(radius, openvdb::Vec3f(0), voxel, 3);
@@ -151,7 +151,7 @@ void near_surface_rapid_in_order(benchmark::State& state)
 {
     run(state, points_in_order(), [](auto P, auto phi, auto gradient) { sphere()->distance(P, phi, gradient); });
 }
-void near_surface_box_stencil(benchmark::State& state) { ask_stencil(state, points_near()); }
+void near_surface_box_stencil(benchmark::State& state) { query_stencil(state, points_near()); }
 void near_surface_dense_array(benchmark::State& state)
 {
     const Dense dense;
@@ -163,7 +163,7 @@ void far_outside_rapid(benchmark::State& state)
 {
     run(state, points_far(), [](auto P, auto phi, auto gradient) { sphere()->distance(P, phi, gradient); });
 }
-void far_outside_box_stencil(benchmark::State& state) { ask_stencil(state, points_far()); }
+void far_outside_box_stencil(benchmark::State& state) { query_stencil(state, points_far()); }
 
 // Builds both the tree and its baked copy.
 void build_sphere(benchmark::State& state)

@@ -224,7 +224,7 @@ private:
         return "not yet examined";
     }
 
-    bool asked(const std::string& name) const { return name.find(only_) != std::string::npos; }
+    bool requested(const std::string& name) const { return name.find(only_) != std::string::npos; }
 
     void add(Row row)
     {
@@ -255,7 +255,7 @@ private:
     void compare(const std::string& name, const std::string& program, const std::string& ours,
                  const std::string& theirs, double limit)
     {
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const auto medians = measure(program, {ours, theirs});
         const double a = medians.at(ours).at("real_time"), b = medians.at(theirs).at("real_time");
         add({name, a / b, limit, "", false, fmt::format("{:.4g} ms, {:.4g} ms", a, b)});
@@ -312,7 +312,7 @@ private:
 
     void compare_runs(const std::string& name, const Words& ours, const Words& theirs, double limit)
     {
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const std::vector<Ended> ended = in_turn({ours, theirs});
         add({name, ended[0].seconds / ended[1].seconds, limit, "", false,
              fmt::format("{:.3f} s, {:.3f} s", ended[0].seconds, ended[1].seconds)});
@@ -344,7 +344,7 @@ private:
     void grains()
     {
         const std::string name = "column of 10,000 grains, a frame";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const auto column = [](const char* points, int sizes, int substeps, int frames) {
             return fmt::format("column/points:{}/threads:1/sizes:{}/substeps:{}/frames:{}/iterations:1", points, sizes,
                                substeps, frames);
@@ -374,7 +374,7 @@ private:
     void neighbours()
     {
         const std::string name = "a million neighbour queries / the search for contacts";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const auto medians = measure("bench_points", {"find_neighbours/100", "find_contacts/100"});
         const double ours = medians.at("find_neighbours/100").at("cpu_time"),
                      theirs = medians.at("find_contacts/100").at("cpu_time");
@@ -399,9 +399,11 @@ private:
         const fs::path empty = scene("empty", "return rapid.create {} :solve {}\n");
         const std::string name = "run of an empty scene", memory = "memory of an empty scene";
         const std::string points = "memory of gravity on 10 million points, a point";
-        if (asked(name)) add({name, 1000 * in_turn({command(empty, {"-f", "1-1"})})[0].seconds, 60, "ms", false, ""});
-        if (asked(memory)) add({memory, in_turn({command(empty, {"-f", "1-2"})})[0].bytes / 1e6, 60, "MB", false, ""});
-        if (!asked(points)) return;
+        if (requested(name))
+            add({name, 1000 * in_turn({command(empty, {"-f", "1-1"})})[0].seconds, 60, "ms", false, ""});
+        if (requested(memory))
+            add({memory, in_turn({command(empty, {"-f", "1-2"})})[0].bytes / 1e6, 60, "MB", false, ""});
+        if (!requested(points)) return;
         const fs::path crowd = scene("crowd",
                                      "return rapid.create {}\n"
                                      "  :emit { source = rapid.shape.box { size = {10, 10, 10} }, from = \"volume\",\n"
@@ -415,7 +417,7 @@ private:
     void static_level_set()
     {
         const std::string name = "a static level set, frames after the first: time in the graph";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const fs::path still = scene("still",
                                      "local body = rapid.mesh.torus { radius = 0.6, tube = 0.22, divisions = 64 }\n"
                                      "return rapid.create {\n"
@@ -457,7 +459,7 @@ private:
     void deforming_figure()
     {
         const std::string name = "three :collide on a deforming level set / one, time to build it";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         write_figure(12);
         const auto build_seconds = [&](int colliders) {
             std::string text =
@@ -479,7 +481,7 @@ private:
     void still_points()
     {
         const std::string name = "a million points at rest, a frame";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const fs::path still = scene("at_rest",
                                      "return rapid.create {\n"
                                      "    points = rapid.points.grid { size = {2, 2, 2}, spacing = 0.02 } }\n"
@@ -494,7 +496,7 @@ private:
     void first_frame()
     {
         const std::string name = "first.lua: a run of its first frame";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const Ended ended = in_turn({command(graphs_ / "first.lua", {"-f", "1-1"})})[0];
         add({name, 1000 * ended.seconds, 50, "ms", false, fmt::format("{:.3f} s of processor", ended.processor)});
     }
@@ -504,7 +506,7 @@ private:
     void pictures()
     {
         const std::string name = "a .png of 1280 x 720, 60,000 points, processor time";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const fs::path graph = graphs_ / "first.lua";
         const std::string files = (scratch_ / "picture.####.png").string();
         const std::vector<Ended> ended = in_turn({command(graph, {"-f", "71-120", "--keep-all", "-o", files}),
@@ -521,7 +523,7 @@ private:
     void tolerance_check()
     {
         const std::string name = "mill.lua: checking its tolerance, of the time of the run";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         constexpr int first = 6, every = 4, last = 71;
         std::vector<double> parts;
         for (int k = 0; k < repeat_; ++k) {
@@ -562,7 +564,7 @@ private:
     void main_job()
     {
         const std::string name = "first.lua, a million points: times faster than Blender's 10.7 s";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const double seconds =
             in_turn({command(graphs_ / "first.lua", {"--set", "rate=500000", "-f", "1-48"})})[0].seconds;
         add({name, 10.7 / seconds, 25, "", true, fmt::format("{:.3f} s", seconds)});
@@ -581,7 +583,7 @@ private:
               Scene{"magic", "a million", "300000", 1.2}, Scene{"mill", "40,000", "20000", 1.2}}) {
             const std::string name =
                 fmt::format("{}.lua, {} points / a program by hand, processor time", each.name, each.points);
-            if (!asked(name)) continue;
+            if (!requested(name)) continue;
             const Words program = {(bin_ / fmt::format("by_hand_{}", each.name)).string(), each.rate, "48"};
             const fs::path graph = graphs_ / fmt::format("{}.lua", each.name);
             const std::string rate = fmt::format("rate={}", each.rate);
@@ -589,9 +591,9 @@ private:
             run(command(graph, {"--set", rate, "-f", "48", "-o", last.string()}));
             run(program, answer);
             std::ifstream file(answer);
-            const json told = json::parse(file);
+            const json reported = json::parse(file);
             require_alike(graph.filename().string(), moments_of(rapid::read_points(last)),
-                          {told.at("points"), told.at("mean"), told.at("deviation")});
+                          {reported.at("points"), reported.at("mean"), reported.at("deviation")});
             fs::remove(last);
             const std::vector<Ended> ended = in_turn({command(graph, {"--set", rate, "-f", "1-48"}), program});
             add({name, ended[0].processor / ended[1].processor, each.limit, "", false,
@@ -604,7 +606,7 @@ private:
     void output()
     {
         const std::string name = "a run with -o .vdb / the longer of computing and writing";
-        if (!asked(name)) return;
+        if (!requested(name)) return;
         const fs::path moving = scene("moving",
                                       "return rapid.create {\n"
                                       "    points = rapid.points.grid { size = {2, 2, 2}, spacing = 0.02 } }\n"
@@ -639,7 +641,7 @@ private:
             // Other load makes wall time too noisy for a difference of a few percent.
             const std::string time = scene + ".lua: pruned / --keep-all, processor time";
             const std::string memory = scene + ".lua: pruned / --keep-all, memory";
-            if (!asked(time) && !asked(memory)) continue;
+            if (!requested(time) && !requested(memory)) continue;
             const std::vector<Ended> ended = in_turn({with({}), with({"--keep-all"})});
             add({time, ended[0].processor / ended[1].processor, 1.0, "", false,
                  fmt::format("{:.3f} s, {:.3f} s", ended[0].processor, ended[1].processor)});
@@ -658,7 +660,7 @@ private:
             const std::string small = scene + ".lua: 100,000 points / 10,000, exponent of the processor time";
             const std::string large = scene + ".lua: a million points / 100,000, exponent of the processor time";
             const std::string alone = scene + ".lua: time of one thread alone, of the processor time";
-            if (!asked(small) && !asked(large) && !asked(alone)) continue;
+            if (!requested(small) && !requested(large) && !requested(alone)) continue;
             const auto with = [&, &file = scene, births = rate](double part, const char* frames) {
                 return command(graphs_ / (file + ".lua"),
                                {"--threads", "2", "-f", frames, "--set", fmt::format("rate={}", part * births)});

@@ -287,7 +287,7 @@ private:
         for (const auto& [node, frame] : {std::pair{"none", 2}, std::pair{"create1", -5}, std::pair{"", 2}})
             all.push_back(hostile_call([scene, node = node, frame = frame](rapid_error** e) {
                 rapid_frame* points = nullptr;
-                return rapid_scene_points_behind(scene, node, frame, &points, e);
+                return rapid_scene_points_after(scene, node, frame, &points, e);
             }));
     }
 

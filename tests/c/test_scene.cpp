@@ -28,12 +28,12 @@ rapid_scene* opened(const char* text = fall)
 }
 
 // The status of a call, with the message of its error.
-class Told {
+class OwnedError {
 public:
-    Told() = default;
-    Told(const Told&) = delete;
-    Told& operator=(const Told&) = delete;
-    ~Told() { rapid_error_release(error_); }
+    OwnedError() = default;
+    OwnedError(const OwnedError&) = delete;
+    OwnedError& operator=(const OwnedError&) = delete;
+    ~OwnedError() { rapid_error_release(error_); }
     operator rapid_error**() { return &error_; }
     std::string message() const { return rapid_error_message(error_); }
     const rapid_error* get() const { return error_; }
@@ -136,9 +136,9 @@ TEST_CASE("what is offered in C is taken", "[c]")
     auto found = sized<rapid_column>();
     REQUIRE(rapid_frame_column(frame, "heat", &found, nullptr) == RAPID_OK);
     CHECK(static_cast<const float*>(found.data)[1] == Approx(3));
-    Told told;
-    CHECK(rapid_scene_advance(scene, nullptr, told) == RAPID_FAILED_FRAME);
-    CHECK_THAT(told.message(), Contains("it returned 7"));
+    OwnedError error;
+    CHECK(rapid_scene_advance(scene, nullptr, error) == RAPID_FAILED_FRAME);
+    CHECK_THAT(error.message(), Contains("it returned 7"));
     rapid_frame_release(frame, nullptr);
     rapid_scene_release(scene, nullptr);
 }
@@ -209,9 +209,9 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     rapid_offers* offers = nullptr;
     REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
     const auto refused = [](const char* what, const auto& call) {
-        Told told;
-        CHECK(call(told) == RAPID_WRONG_CALL);
-        CHECK_THAT(told.message(), Contains(what));
+        OwnedError error;
+        CHECK(call(error) == RAPID_WRONG_CALL);
+        CHECK_THAT(error.message(), Contains(what));
     };
     auto shape = sized<rapid_shape>();
     auto type = sized<rapid_node_type>();
@@ -281,15 +281,15 @@ TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
 TEST_CASE("an error in C has message, file, line and node", "[c]")
 {
     rapid_scene* scene = nullptr;
-    Told told;
+    OwnedError error;
     CHECK(rapid_scene_open_text("wrong.lua",
                                 "local rapid = require 'rapid'\nreturn rapid.create {} :wind { speed = 1 }", nullptr,
-                                &scene, told) == RAPID_WRONG_SCENE);
+                                &scene, error) == RAPID_WRONG_SCENE);
     CHECK(scene == nullptr);
-    CHECK(std::string(rapid_error_file(told.get())) == "wrong.lua");
-    CHECK(rapid_error_line(told.get()) == 2);
-    CHECK(rapid_error_kind(told.get()) == RAPID_WRONG_SCENE);
-    CHECK_THAT(rapid_error_text(told.get()), Contains("wrong.lua:2: "));
+    CHECK(std::string(rapid_error_file(error.get())) == "wrong.lua");
+    CHECK(rapid_error_line(error.get()) == 2);
+    CHECK(rapid_error_kind(error.get()) == RAPID_WRONG_SCENE);
+    CHECK_THAT(rapid_error_text(error.get()), Contains("wrong.lua:2: "));
     CHECK(std::string(rapid_error_message(nullptr)).empty());
     CHECK(rapid_error_line(nullptr) == 0);
     rapid_error_release(nullptr);
@@ -302,14 +302,14 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
     REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
     auto column = sized<rapid_column>();
     {
-        Told told;
-        CHECK(rapid_scene_advance(nullptr, nullptr, told) == RAPID_WRONG_CALL);
-        CHECK(told.message() == "the scene is NULL");
+        OwnedError error;
+        CHECK(rapid_scene_advance(nullptr, nullptr, error) == RAPID_WRONG_CALL);
+        CHECK(error.message() == "the scene is NULL");
     }
     {
-        Told told;
-        CHECK(rapid_frame_column(reinterpret_cast<rapid_frame*>(scene), "P", &column, told) == RAPID_WRONG_CALL);
-        CHECK_THAT(told.message(), Contains("no open frame"));
+        OwnedError error;
+        CHECK(rapid_frame_column(reinterpret_cast<rapid_frame*>(scene), "P", &column, error) == RAPID_WRONG_CALL);
+        CHECK_THAT(error.message(), Contains("no open frame"));
     }
     int local = 0;
     CHECK(rapid_scene_restart(reinterpret_cast<rapid_scene*>(&local), nullptr) == RAPID_WRONG_CALL);
@@ -332,9 +332,9 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     rapid_frame* frame = nullptr;
     REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
     const auto refused = [](const char* name, const auto& call) {
-        Told told;
-        CHECK(call(told) == RAPID_WRONG_CALL);
-        CHECK_THAT(told.message(), Contains(std::string(name) + " is NULL"));
+        OwnedError error;
+        CHECK(call(error) == RAPID_WRONG_CALL);
+        CHECK_THAT(error.message(), Contains(std::string(name) + " is NULL"));
     };
     rapid_scene* other = nullptr;
     refused("file", [&](rapid_error** e) { return rapid_scene_open(nullptr, nullptr, &other, e); });
@@ -361,9 +361,9 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("json", [&](rapid_error** e) { return rapid_scene_explain(scene, nullptr, e); });
     refused("node", [&](rapid_error** e) {
         rapid_frame* behind = nullptr;
-        return rapid_scene_points_behind(scene, nullptr, 2, &behind, e);
+        return rapid_scene_points_after(scene, nullptr, 2, &behind, e);
     });
-    refused("frame", [&](rapid_error** e) { return rapid_scene_points_behind(scene, "solve1", 2, nullptr, e); });
+    refused("frame", [&](rapid_error** e) { return rapid_scene_points_after(scene, "solve1", 2, nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_frame_profile_json(frame, nullptr, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_graph(scene, RAPID_GRAPH_DOT, nullptr, e); });
     refused("json", [&](rapid_error** e) {
@@ -420,10 +420,10 @@ TEST_CASE("a struct's size says what the program knows", "[c]")
 {
     rapid_scene* scene = nullptr;
     rapid_options options = rapid_default_options();
-    Told told;
+    OwnedError error;
     options.size = 0;
-    CHECK(rapid_scene_open_text("a.lua", fall, &options, &scene, told) == RAPID_WRONG_CALL);
-    CHECK_THAT(told.message(), Contains("sizeof(*options)"));
+    CHECK(rapid_scene_open_text("a.lua", fall, &options, &scene, error) == RAPID_WRONG_CALL);
+    CHECK_THAT(error.message(), Contains("sizeof(*options)"));
 
     // Options of an older program, whose struct ends after the settings.
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};
@@ -600,11 +600,11 @@ TEST_CASE("an error of a frame of a run is there with its outcome in C", "[c]")
     REQUIRE(rapid_run_make("fails.lua", nullptr, &options, &run, nullptr) == RAPID_OK);
     REQUIRE(rapid_run_prepare(run, nullptr) == RAPID_OK);
     auto outcome = sized<rapid_outcome>();
-    Told told;
-    CHECK(rapid_run_run(run, &outcome, told) == RAPID_FAILED_FRAME);
+    OwnedError error;
+    CHECK(rapid_run_run(run, &outcome, error) == RAPID_FAILED_FRAME);
     CHECK(outcome.ending == RAPID_FAILED);
     CHECK(outcome.last_frame == 2);
-    CHECK_THAT(told.message(), Contains("no more"));
+    CHECK_THAT(error.message(), Contains("no more"));
     rapid_run_release(run, nullptr);
 }
 

@@ -240,10 +240,10 @@ const std::vector<Function>& functions()
              const char* json = nullptr;
              return rapid_scene_explain(h.scene, &json, e);
          }},
-        {"rapid_scene_points_behind", "s",
+        {"rapid_scene_points_after", "s",
          [](const Handles& h, rapid_error** e) {
              rapid_frame* frame = nullptr;
-             const int status = rapid_scene_points_behind(h.scene, "gravity1", 3, &frame, e);
+             const int status = rapid_scene_points_after(h.scene, "gravity1", 3, &frame, e);
              return released(rapid_frame_release, frame, status);
          }},
         {"rapid_scene_graph", "s",
@@ -276,11 +276,11 @@ const std::vector<Function>& functions()
              auto statistics = sized<rapid_statistics>();
              return rapid_frame_statistics(h.frame, &statistics, e);
          }},
-        {"rapid_frame_places", "f",
+        {"rapid_frame_indices", "f",
          [](const Handles& h, rapid_error** e) {
              const std::int64_t id = 0;
              std::uint32_t place = 0;
-             return rapid_frame_places(h.frame, &id, 1, &place, e);
+             return rapid_frame_indices(h.frame, &id, 1, &place, e);
          }},
         {"rapid_frame_column", "f",
          [](const Handles& h, rapid_error** e) {
@@ -665,8 +665,8 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("frame 2", [&](auto e) { return rapid_scene_advance_to(h.scene, 2, &frame, e); });
     refused("\"other\"", [&](auto e) { return rapid_frame_output(h.frame, "other", &frame, e); });
     refused("did you mean \"solve1\"",
-            [&](auto e) { return rapid_scene_points_behind(h.scene, "solve", 2, &frame, e); });
-    refused("frame 0", [&](auto e) { return rapid_scene_points_behind(h.scene, "solve1", 0, &frame, e); });
+            [&](auto e) { return rapid_scene_points_after(h.scene, "solve", 2, &frame, e); });
+    refused("frame 0", [&](auto e) { return rapid_scene_points_after(h.scene, "solve1", 0, &frame, e); });
     refused("nowhere.so", [&](auto e) { return rapid_scene_load_plugin("nowhere.so", e); });
     refused("it is no plugin of Rapid", [&](auto e) { return rapid_scene_load_plugin("/proc/self/exe", e); });
     refused("file is NULL", [&](auto e) { return rapid_scene_load_plugin(nullptr, e); });
@@ -755,7 +755,7 @@ TEST_CASE("what a callback does wrong is an error of the scene, which goes on be
                                   "return rapid.create { points = rapid.points.grid {} } :warm {} :solve {}",
                                   &options, &scene, nullptr) == RAPID_OK);
     struct Wrong {
-        const char* told;
+        const char* expected;
         int (*does)(const rapid_call*);
     };
     for (const Wrong& wrong : {
@@ -777,11 +777,11 @@ TEST_CASE("what a callback does wrong is an error of the scene, which goes on be
                        throw std::runtime_error(message);
                    }},
          }) {
-        CAPTURE(wrong.told);
+        CAPTURE(wrong.expected);
         program.wrong = wrong.does;
         rapid_error* error = nullptr;
         CHECK(rapid_scene_advance_to(scene, 3, nullptr, &error) == RAPID_FAILED_FRAME);
-        CHECK_THAT(rapid_error_message(error), Contains(wrong.told) && Contains("warm"));
+        CHECK_THAT(rapid_error_message(error), Contains(wrong.expected) && Contains("warm"));
         CHECK(std::string(rapid_error_node(error)) == "warm1");
         CHECK(rapid_error_line(error) == 2);
         rapid_error_release(error);

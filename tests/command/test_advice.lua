@@ -46,7 +46,7 @@ return rapid.create { fps = 24, points = one } :attribute { mass = 2 }
       assert.equal("1.9", step, lines[1])
       assert.equal("8", substeps)
       -- The true errors of the first frame, from the closed form; the summary reports one digit.
-      for n, told in pairs { [1] = tonumber(error), [8] = tonumber(less) } do
+      for n, reported in pairs { [1] = tonumber(error), [8] = tonumber(less) } do
         local folder = command.folder()
         folder:write("scene.lua", sun:format("substeps = " .. n))
         assert.equal(0, command.rapid("run scene.lua -f 1-2 -o a.####.csv --quiet", { cwd = folder.path }).status)
@@ -55,7 +55,7 @@ return rapid.create { fps = 24, points = one } :attribute { mass = 2 }
         file:close()
         local t = omega / 24
         local wrong = math.sqrt((x - math.cos(t)) ^ 2 + (z - 2 / omega * math.sin(t)) ^ 2)
-        assert.near(1, told / wrong, 0.55)
+        assert.near(1, reported / wrong, 0.55)
       end
     end)
   end
@@ -80,12 +80,12 @@ return rapid.create { fps = 24 }
     local text = head .. [[
 return rapid.create { fps = 24, points = one }
   :drag { linear = function(f) return f.number == 5 and 240 or 24 end } :solve {}]]
-    local told = "drag1: k dt = 10; solved in closed form, with what else acts held through a sub-step"
-    assert.same({ told }, advice("run scene.lua -f 1-6", text))
+    local reported = "drag1: k dt = 10; solved in closed form, with what else acts held through a sub-step"
+    assert.same({ reported }, advice("run scene.lua -f 1-6", text))
     local result, folder = rapid("run scene.lua -f 1-6 --stats stats.json --quiet", text)
     assert.equal(0, result.status)
     local file = assert(io.open(folder.path .. "/stats.json"))
-    assert.same({ told }, json.decode(file:read "*a").stiff)
+    assert.same({ reported }, json.decode(file:read "*a").stiff)
     file:close()
   end)
 
@@ -128,7 +128,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, s
     local lines = advice("run scene.lua -f 1-2", [[
 local rapid = require "rapid"
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0.01, 0, 0}} } } :attract {} :solve {}]])
-    local told = "; they are no remedy near a place where a force has no bound: attract has core"
-    assert.truthy(lines[1]:find(told, 1, true), lines[1])
+    local reported = "; they are no remedy near a place where a force has no bound: attract has core"
+    assert.truthy(lines[1]:find(reported, 1, true), lines[1])
   end)
 end)

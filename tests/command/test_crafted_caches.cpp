@@ -33,11 +33,11 @@ int run(const fs::path& folder)
 {
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "rapid";
 #ifdef RAPID_ADDRESS_SANITIZER  // it maps terabytes
-    const std::string most_memory = "unlimited";
+    const std::string max_memory = "unlimited";
 #else
-    const std::string most_memory = "4194304";
+    const std::string max_memory = "4194304";
 #endif
-    const std::string line = "cd '" + folder.string() + "' && ulimit -t 10 && ulimit -v " + most_memory + " && '" +
+    const std::string line = "cd '" + folder.string() + "' && ulimit -t 10 && ulimit -v " + max_memory + " && '" +
                              program.string() +
                              "' run scene.lua -f 1-6 --cache cache --cache-every 2 --stats stats.json --events e.csv "
                              "-o a.####.png --size 32x32 --threads 1 >said 2>&1";
@@ -85,7 +85,7 @@ TEST_CASE("a snapshot with any header is told, or is an error that names it", "[
     const test::TemporaryFolder folder;
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "rapid";
     const std::string nested = std::string(200000, '[') + std::string(200000, ']');
-    int told = 0;
+    int reported = 0;
     for (const std::string body :
          {R"({"format": FORMAT})", R"({"format": FORMAT, "graph": "a", "frame": 1})", "{}", "[]", "1", "null", "", "{",
           R"({"format": "FORMAT"})", R"({"format": FORMAT, "graph": "a"})",
@@ -105,10 +105,10 @@ TEST_CASE("a snapshot with any header is told, or is an error that names it", "[
                 CHECK(WEXITSTATUS(status) <= 2);
                 CHECK((WEXITSTATUS(status) == 0 || said.find("a.csv") == 0));
                 CHECK(said.find('\x1b') == std::string::npos);
-                told += status == 0;
+                reported += status == 0;
             }
         }
-    CHECK(told > 0);
+    CHECK(reported > 0);
 }
 
 TEST_CASE("a cache that is made to do harm is refused, or the run goes on", "[crafted][random]")

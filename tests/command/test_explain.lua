@@ -272,8 +272,8 @@ describe("rapid explain --state", function()
     for _, frame in ipairs { "x", "1-3", "2x2", "1e9", "9223372036854775807", "" } do
       wrong = explain(("falls.lua --state '%s'"):format(frame))
       assert.equal(2, wrong.status)
-      local told = ("--state %s: it must be the number of a frame, such as 12\n"):format(frame)
-      assert.truthy(wrong.stderr:find(told, 1, true), wrong.stderr)
+      local reported = ("--state %s: it must be the number of a frame, such as 12\n"):format(frame)
+      assert.truthy(wrong.stderr:find(reported, 1, true), wrong.stderr)
     end
   end)
 end)

@@ -5,7 +5,7 @@ local command = require "testing.command"
 local csv_rows = require "tests.csv_rows"
 
 local function same_files(folder, scene, arguments, outputs)
-  local further = { pruned = "", all = "--keep-all", asked = "-o other.{output}.####.csv:mass,pscale,age,life" }
+  local further = { pruned = "", all = "--keep-all", requested = "-o other.{output}.####.csv:mass,pscale,age,life" }
   for how, options in pairs(further) do
     local line = ("run %s %s %s"):format(scene, arguments, options)
     for _, output in ipairs(outputs) do line = line .. (" -o %s/%s"):format(how, output) end

@@ -211,8 +211,8 @@ TEST_CASE("in the sandbox no limit is set, no page is taken from the machine, an
 {
     const rlimit inverse{2, 1};
     CHECK(error_in_sandbox(Processes::None, [&] { return setrlimit(RLIMIT_DATA, &inverse); }) == EPERM);
-    rlimit asked{};
-    CHECK(error_in_sandbox(Processes::None, [&] { return getrlimit(RLIMIT_DATA, &asked); }) == 0);
+    rlimit requested{};
+    CHECK(error_in_sandbox(Processes::None, [&] { return getrlimit(RLIMIT_DATA, &requested); }) == 0);
     const auto nowhere = reinterpret_cast<void*>(1);
     for (const Processes processes : {Processes::None, Processes::Copies})
         for (const int advice : {MADV_HWPOISON, 101 /* soft offline */, MADV_MERGEABLE, MADV_REMOVE})

@@ -8,7 +8,7 @@ local function trace(text, arguments)
 end
 
 -- Returns the lines of a life, as text.
-local function told(text, arguments, status)
+local function reported(text, arguments, status)
   local result = scene.command("trace", text, arguments)
   assert.equal(status or 0, result.status, result.stderr)
   return result.stdout, result.stderr
@@ -27,7 +27,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}, {5,
 
 describe("trace", function()
   it("tells birth, contacts and the end of a ball's life at their moments", function()
-    local text = told(ball, "--id 0 -f 1-60")
+    local text = reported(ball, "--id 0 -f 1-60")
     assert.truthy(text:find("born in create1 at (0, 1, 0), v = (2, 0, 0)", 1, true), text)
     local fall, contacts = math.sqrt(2 / g), {}
     for line in text:gmatch "[^\n]+" do
@@ -44,7 +44,7 @@ describe("trace", function()
   end)
 
   it("tells each force by its node, in metres per second squared", function()
-    local text = told([[
+    local text = reported([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{2, 0, 0}}, v = {{0, 3, 0}} } }
   :gravity {} :spring { stiffness = 2 } :drag { linear = 4 } :solve {}]], "--id 0 -f 1-2")
     local gravity = numbers_in(text:match "gravity1 accelerates it by ([^\n]+) m/s")
@@ -56,7 +56,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{2, 0, 0}}, v 
   end)
 
   it("tells what each node changed, and which one removed the point", function()
-    local text = told([[
+    local text = reported([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{0, 1, 0}} } }
   :attribute { heat = 0 }
   :points("warm", function(p) p.heat = p.heat + 2 end)
@@ -68,7 +68,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v 
   end)
 
   it("names the collider that kills", function()
-    local text = told([[
+    local text = reported([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}} } }
   :gravity {} :collide { name = "lava", shape = rapid.shape.plane {}, response = "die" } :solve {}]], "--id 0 -f 1-24")
     local death = text:match "([^\n]+killed by contact with lava)"
@@ -85,7 +85,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}} } }
   end)
 
   it("says where no point has the id, and refuses a create that there is not", function()
-    local _, errors = told(ball, "--id 77", 1)
+    local _, errors = reported(ball, "--id 77", 1)
     assert.truthy(errors:find("no point has the id 77", 1, true))
     local result = scene.command("trace", ball, "--id 0 --of creat1")
     assert.equal(2, result.status)

@@ -149,10 +149,10 @@ describe("a command that is a program of its own", function()
   it("has the command, not itself, do what others do for it", function()
     local folder = command.folder()
     folder:write("scene.lua", scene)
-    local told = rapid("wedge scene.lua --vary count=2,3 --farm slurm --dry-run", { cwd = folder.path }).stdout
-    assert.truthy(told:find("/rapid run ", 1, true), told)
-    assert.truthy(told:find("/rapid wedge ", 1, true), told)
-    assert.is_nil(told:find("libexec", 1, true), told)
+    local reported = rapid("wedge scene.lua --vary count=2,3 --farm slurm --dry-run", { cwd = folder.path }).stdout
+    assert.truthy(reported:find("/rapid run ", 1, true), reported)
+    assert.truthy(reported:find("/rapid wedge ", 1, true), reported)
+    assert.is_nil(reported:find("libexec", 1, true), reported)
   end)
 
   it("that is not there is named, with its place", function()

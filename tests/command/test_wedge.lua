@@ -147,9 +147,10 @@ return rapid.create {} :emit { source = rapid.shape.box {}, rate = rate }
     for _, more in ipairs { "", "--jobs 2", "--untrusted" } do
       local same = run("--again " .. more)
       assert.equal(1, same.status)
-      local told = same.stdout .. same.stderr
-      assert.truthy(told:find('file = "same.####.ply": another row of the wedge writes it, too; put a parameter that '
-        .. "is varied into its name", 1, true), told)
+      local reported = same.stdout .. same.stderr
+      assert.truthy(reported:find(
+        'file = "same.####.ply": another row of the wedge writes it, too; put a parameter that '
+        .. "is varied into its name", 1, true), reported)
     end
     local own = run "--set own=true"
     assert.equal("", own.stderr)

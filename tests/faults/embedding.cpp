@@ -123,7 +123,7 @@ void run(rapid_offers* offers)
     const int64_t id = 0;
     const char* lives = nullptr;
     rapid_frame* behind = nullptr;
-    if (done("points_behind", rapid_scene_points_behind(scene, "solve1", 2, &behind, &error)))
+    if (done("points_after", rapid_scene_points_after(scene, "solve1", 2, &behind, &error)))
         done("frame_release", rapid_frame_release(behind, &error));
     done("trace", rapid_scene_trace(scene, &id, 1, nullptr, 1, 2, &lives, &error));
     const rapid_setting height = {"height", {RAPID_NUMBER, {3, 0, 0}, nullptr}};

@@ -153,7 +153,7 @@ F next(const char* name)
 // Returns in each copy; the original process exits.
 void copy_for_each(const char* list)
 {
-    constexpr unsigned most_seconds = 300;
+    constexpr unsigned max_seconds = 300;
     std::ifstream file(list);
     std::vector<std::string> faults;
     for (std::string line; std::getline(file, line);) faults.push_back(line);
@@ -167,7 +167,7 @@ void copy_for_each(const char* list)
             const int said = ::creat("said", 0666);
             for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(said, stream);
             ::close(said);
-            ::alarm(most_seconds);
+            ::alarm(max_seconds);
             return arm_with(faults[k - 1].c_str());
         }
         int status = 0;

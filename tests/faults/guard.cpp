@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t page = 4096;
 constexpr std::size_t room = std::size_t{1} << 38;      // of addresses; none is reused
 constexpr std::size_t largest = std::size_t{16} << 20;  // larger blocks come from the C library
-constexpr int most_alive = 25000;                       // each takes two of the kernel's 65,530 mappings
+constexpr int max_alive = 25000;                        // each takes two of the kernel's 65,530 mappings
 constexpr unsigned char untouched = 0xa5;
 
 // Stored in the page before a block's first page.
@@ -27,13 +27,13 @@ static_assert(sizeof(Head) <= page);
 std::atomic<std::uintptr_t> begin{0}, next{0};
 std::atomic<int> alive{0};
 
-bool is_asked_for()
+bool is_requested()
 {
-    static const bool asked = [] {
+    static const bool requested = [] {
         const char* stress = std::getenv("RAPID_STRESS");
         return stress && std::strstr(stress, "guard");
     }();
-    return asked;
+    return requested;
 }
 
 std::uintptr_t begin_of_room()
@@ -64,7 +64,7 @@ Head& head_of(const void* block)
 
 void* take(std::size_t alignment, std::size_t bytes)
 {
-    if (!is_asked_for() || bytes > largest || alignment > page || alive >= most_alive || begin_of_room() == 0)
+    if (!is_requested() || bytes > largest || alignment > page || alive >= max_alive || begin_of_room() == 0)
         return nullptr;
     const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
     const std::size_t pages = 1 + (rounded + page - 1) / page + (rounded == 0);

@@ -1,5 +1,5 @@
 -- glibc allocates memory for the destructor of a thread-local variable, and ends the process if it cannot. Our
--- libraries therefore register none (runtime/base/of_thread.h).
+-- libraries therefore register none (runtime/base/per_thread.h).
 local command = require "testing.command"
 local library = require "tests.faults.library"
 

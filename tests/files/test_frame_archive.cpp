@@ -103,7 +103,7 @@ TEST_CASE("a log goes on at the place of an earlier record, and keeps what is af
     std::uint64_t place = 0;
     std::string record;
     REQUIRE(log.read(place, record));
-    log.go_on_at(place);
+    log.continue_at(place);
     const std::uint64_t second = place;
     log.append(words[1]);
     std::vector<std::string> read;

@@ -83,5 +83,5 @@ TEST_CASE("a sequence has a name of its own, without the number and what parts i
     CHECK(FramePattern("out/a.####.vdb").without_frame() == "out/a.vdb");
     CHECK(FramePattern("out/{output}_$F.vdb").without_frame("left") == "out/left.vdb");
     CHECK(FramePattern("a.vdb").without_frame() == "a.vdb");
-    CHECK(FramePattern("out/{output}.####.vdb").of_output("left") == "out/left.####.vdb");
+    CHECK(FramePattern("out/{output}.####.vdb").for_output("left") == "out/left.####.vdb");
 }

@@ -245,7 +245,7 @@ TEST_CASE("what a file can't be made of is an error: a folder, a device, a folde
     CHECK(error_of([&] { file.finish(); }) == "can't be named when complete: No such file or directory");
 }
 
-// A process reads its own files without a sandbox (read_apart.h).
+// A process reads its own files without a sandbox (read_sandboxed.h).
 TEST_CASE("a file that another has changed in place is not its writer's, with all the times that can be set as before",
           "[files]")
 {

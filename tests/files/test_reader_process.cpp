@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "runtime/base/memory_budget.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -30,7 +30,7 @@ Number read(const std::filesystem::path&, const std::string& what)
     throw Error("there is no " + what);
 }
 
-const ApartReader<Number> reader("test: a number", read, send, receive);
+const SandboxedReader<Number> reader("test: a number", read, send, receive);
 
 // Runs a test in a separate process, because a reader process can't be stopped again.
 void in_process(const std::function<void(const std::filesystem::path& file)>& test)

@@ -130,23 +130,23 @@ TEST_CASE("a node with two readers is evaluated once a frame, and neither sees w
 
 TEST_CASE("functions are asked at each frame, with its number, time and length", "[evaluate]")
 {
-    std::vector<Frame> asked;
+    std::vector<Frame> requested;
     GraphUnderTest scene;
     const NodePtr source = scene.node("source", {}, {{"fps", Value(4.0)}});
     const NodePtr moving = scene.node("shift", {source}, {{"by", of_frame([&](const Frame& frame) {
-                                                               asked.push_back(frame);
+                                                               requested.push_back(frame);
                                                                return Value(Vec3d(frame.number, 0, 0));
                                                            })}});
     const Plan plan(scene.returning(moving), {});
     Evaluator evaluator(plan);
-    asked.clear();  // the plan has called it for the first frame
+    requested.clear();  // the plan has called it for the first frame
     for (int frame = 1; frame <= 3; ++frame) {
         CHECK(evaluator.advance().outputs.at("main").P()[0].x() == static_cast<float>(frame));
-        CHECK(asked.back().number == frame);
-        CHECK(asked.back().time == (frame - 1) / 4.0);
-        CHECK(asked.back().dt == 0.25);
+        CHECK(requested.back().number == frame);
+        CHECK(requested.back().time == (frame - 1) / 4.0);
+        CHECK(requested.back().dt == 0.25);
     }
-    CHECK(asked.size() == 3);
+    CHECK(requested.size() == 3);
 }
 
 TEST_CASE("an error of a node, or of its function, comes with node, place and frame", "[evaluate]")

@@ -27,10 +27,10 @@ const PlannedNode& planned(const Plan& plan, const std::string& name)
 }
 
 // Returns the names of nodes, in order.
-std::vector<std::string> names_of(const Plan& plan, const std::vector<std::size_t>& places)
+std::vector<std::string> names_of(const Plan& plan, const std::vector<std::size_t>& indices)
 {
     std::vector<std::string> names;
-    for (const std::size_t place : places) names.push_back(plan.nodes[place].node->name);
+    for (const std::size_t place : indices) names.push_back(plan.nodes[place].node->name);
     return names;
 }
 
@@ -50,7 +50,7 @@ std::set<std::string> kept(const Plan& plan, std::size_t simulation = 0)
 }
 
 // Returns options with which outputs request only these names.
-PlanOptions asking_for(std::vector<std::string> names)
+PlanOptions requesting(std::vector<std::string> names)
 {
     PlanOptions options;
     options.attributes = std::move(names);
@@ -287,13 +287,13 @@ TEST_CASE("an attribute that nobody reads is kept exactly where an output asks f
     const Graph& graph = scene.returning(scene.node("post", {made}));
 
     CHECK(kept(Plan(graph, {})) == NameSet{"P", "heat", "id", "v"});
-    CHECK(attribute(Plan(graph, {}), "heat").asked_as_made);
-    CHECK(kept(Plan(graph, asking_for({"heat"}))) == NameSet{"P", "heat", "id", "v"});
-    CHECK(attribute(Plan(graph, asking_for({"heat"})), "heat").asked_by_name);
+    CHECK(attribute(Plan(graph, {}), "heat").requested_as_made);
+    CHECK(kept(Plan(graph, requesting({"heat"}))) == NameSet{"P", "heat", "id", "v"});
+    CHECK(attribute(Plan(graph, requesting({"heat"})), "heat").requested_by_name);
 
-    const Plan without(graph, asking_for({"mass"}));
+    const Plan without(graph, requesting({"mass"}));
     CHECK(kept(without) == NameSet{"P", "id", "mass", "v"});
-    CHECK(without.simulations[0].left_out.count("heat") == 1);
+    CHECK(without.simulations[0].pruned.count("heat") == 1);
     for (const AttributeSpec& spec : without.columns_of(0)) CHECK(spec.name == "mass");
 }
 
@@ -303,7 +303,7 @@ TEST_CASE("an attribute that a node reads is kept, and the plan knows who makes 
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
     const NodePtr one = scene.node("read", {made}, {{"value", Value(AttributeRef{"heat"})}}, "one");
     const NodePtr other = scene.node("read", {one}, {{"value", Value(AttributeRef{"heat"})}}, "other");
-    const Plan plan(scene.returning(scene.node("post", {other})), asking_for({}));
+    const Plan plan(scene.returning(scene.node("post", {other})), requesting({}));
     const PlannedAttribute& heat = attribute(plan, "heat");
     CHECK(heat.kept);
     CHECK(names_of(plan, heat.made_by) == Names{"make1"});
@@ -316,7 +316,7 @@ TEST_CASE("a reader that no output comes from keeps nothing alive", "[plan]")
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
     scene.node("read", {made}, {{"value", Value(AttributeRef{"heat"})}});
-    CHECK(kept(Plan(scene.returning(made), asking_for({}))) == NameSet{"P", "id", "v"});
+    CHECK(kept(Plan(scene.returning(made), requesting({}))) == NameSet{"P", "id", "v"});
 }
 
 TEST_CASE("what points are assigned one by one keeps its place", "[plan]")
@@ -324,7 +324,7 @@ TEST_CASE("what points are assigned one by one keeps its place", "[plan]")
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
     const NodePtr assigned = scene.node("assign", {made}, {{"to", Value("heat")}});
-    const Plan plan(scene.returning(scene.node("post", {assigned})), asking_for({}));
+    const Plan plan(scene.returning(scene.node("post", {assigned})), requesting({}));
     CHECK(kept(plan) == NameSet{"P", "heat", "id", "v"});
     CHECK(names_of(plan, attribute(plan, "heat").written_by) == Names{"assign1"});
 }
@@ -335,16 +335,17 @@ TEST_CASE("what may read every name keeps all that is made", "[plan]")
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
     const bool all = GENERATE(true, false);
     const NodePtr assigned = scene.node("assign", {made}, {{"all", Value(all)}});
-    const NameSet names = kept(Plan(scene.returning(scene.node("post", {assigned})), asking_for({})));
+    const NameSet names = kept(Plan(scene.returning(scene.node("post", {assigned})), requesting({})));
     CHECK(names == (all ? NameSet{"P", "group:hot", "heat", "id", "v"} : NameSet{"P", "id", "v"}));
 }
 
 TEST_CASE("life and age are there exactly where a life may end, and birth times where something reads them", "[plan]")
 {
-    const auto planned_with = [&](Value life, bool solved, std::vector<std::string> asked = {}) {
+    const auto planned_with = [&](Value life, bool solved, std::vector<std::string> requested = {}) {
         GraphUnderTest graph;
         const NodePtr born = graph.node("bear", {graph.node("source")}, {{"life", std::move(life)}});
-        return kept(Plan(graph.returning(solved ? graph.node("post", {born}) : born), asking_for(std::move(asked))));
+        return kept(
+            Plan(graph.returning(solved ? graph.node("post", {born}) : born), requesting(std::move(requested))));
     };
     const double forever = std::numeric_limits<double>::infinity();
     const Value later = of_frame([=](const Frame& f) { return Value(f.number < 9 ? forever : 1.0); });
@@ -365,15 +366,15 @@ TEST_CASE("a group that nobody asks for is left out, unless points join it one b
     const NodePtr asks = scene.node("assign", {joined}, {{"within", Value("hot")}});
     const NodePtr limited = scene.node("shift", {joined}, {{"group", Value("hot")}});
 
-    const Plan without(scene.returning(joined), asking_for({}));
+    const Plan without(scene.returning(joined), requesting({}));
     CHECK(kept(without) == NameSet{"P", "group:old", "id", "v"});
     CHECK(without.groups_of(0).empty());  // nothing feeds back here
     for (const NodePtr& reader : {asks, limited}) {
-        const Plan plan(scene.returning(scene.node("post", {reader}, {}, "post")), asking_for({}));
+        const Plan plan(scene.returning(scene.node("post", {reader}, {}, "post")), requesting({}));
         CHECK(names_of(plan, attribute(plan, "group:hot").read_by) == Names{reader->name});
         CHECK(plan.groups_of(0) == Names{"hot", "old"});
     }
-    CHECK(kept(Plan(scene.returning(joined), asking_for({"hot"}))).count("group:hot") == 1);
+    CHECK(kept(Plan(scene.returning(joined), requesting({"hot"}))).count("group:hot") == 1);
     CHECK(attribute(without, "group:old").bytes_per_point() == 1);
 }
 
@@ -387,10 +388,10 @@ TEST_CASE("a reader behind a merge keeps the attribute in both simulations, and 
     const NodePtr reader = scene.node("read", {both}, {{"value", heat}});
     const NodePtr beside = scene.node("read", {scene.node("make", {here}, {{"heat", Value(1.0)}})}, {{"value", heat}});
 
-    const Plan joined(scene.returning(reader), asking_for({}));
+    const Plan joined(scene.returning(reader), requesting({}));
     CHECK(attribute(joined, "heat", 0).kept);
     CHECK(attribute(joined, "heat", 1).kept);
-    const Plan apart(scene.returning({{"a", beside}, {"b", hot}}), asking_for({}));
+    const Plan apart(scene.returning({{"a", beside}, {"b", hot}}), requesting({}));
     CHECK(attribute(apart, "heat", 0).kept);
     CHECK_FALSE(attribute(apart, "heat", 1).kept);
 }
@@ -404,7 +405,7 @@ TEST_CASE("what the result of a merge has, all points that come into it keep", "
     const NodePtr heavy = scene.node("read", {scene.node("read", {hot}, {{"value", heat}})}, {{"value", mass}});
     const NodePtr other = scene.node("make", {there}, {{"heat", Value(2.0)}});
     const Graph graph = scene.returning({{"both", scene.node("both", {heavy, other})}, {"other", other}});
-    const Plan plan(graph, asking_for({}));
+    const Plan plan(graph, requesting({}));
     for (const char* name : {"mass", "heat"}) {
         CAPTURE(name);
         CHECK(attribute(plan, name, 0).kept);
@@ -412,10 +413,10 @@ TEST_CASE("what the result of a merge has, all points that come into it keep", "
         CHECK(attribute(plan, name, 1).kept_for_merge);
     }
     // The points of the other output have no mass in their files.
-    CHECK(plan.unasked_columns(plan.outputs.at("both")).empty());
-    CHECK(plan.unasked_columns(plan.outputs.at("other")) == NameSet{"mass"});
+    CHECK(plan.unrequested_columns(plan.outputs.at("both")).empty());
+    CHECK(plan.unrequested_columns(plan.outputs.at("other")) == NameSet{"mass"});
     // An attribute is dropped if it is merged into points without it.
-    const Plan back(scene.returning(scene.node("both", {other, heavy})), asking_for({}));
+    const Plan back(scene.returning(scene.node("both", {other, heavy})), requesting({}));
     CHECK_FALSE(attribute(back, "mass", back.nodes[back.outputs.at("main")].simulation).kept_for_merge);
 }
 
@@ -423,10 +424,10 @@ TEST_CASE("with keep_all nothing is left out, and nothing is evaluated once", "[
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
-    PlanOptions options = asking_for({});
+    PlanOptions options = requesting({});
     options.keep_all = true;
     const Plan plan(scene.returning(made), options);
-    CHECK(plan.simulations[0].left_out.empty());
+    CHECK(plan.simulations[0].pruned.empty());
     for (const AttributeSpec& known : known_attributes()) CHECK(kept(plan).count(known.name) == 1);
     CHECK(kept(plan).count("heat") == 1);
     CHECK(kept(plan).count("group:hot") == 1);

@@ -26,13 +26,13 @@ public:
     std::unique_ptr<EditPass> prepare(PointSet& points, const Evaluation& now, const Before& before) const override
     {
         points.v().write();
-        told = before;
+        received = before;
         return std::make_unique<Pass>(*this, points, now);
     }
     bool removes_points() const override { return removes_; }
-    bool asks_places() const override { return false; }
+    bool reads_indices() const override { return false; }
 
-    mutable Before told;
+    mutable Before received;
     mutable int begun = 0;
 
 private:
@@ -77,18 +77,18 @@ struct Together {
         std::vector<std::string> warnings;
         const std::function<void(const std::string&, const PointSet&)> write;
         std::vector<std::string> names;
-        std::vector<Location> places;
+        std::vector<Location> locations;
         for (std::size_t k = 0; k < edits.size(); ++k) {
             names.push_back("edit" + std::to_string(k));
-            places.push_back({"scene.lua", static_cast<int>(k) + 1});
+            locations.push_back({"scene.lua", static_cast<int>(k) + 1});
         }
         std::vector<Evaluation> now;
-        std::vector<const Evaluation*> told;
+        std::vector<const Evaluation*> received;
         std::vector<PointEdit*> all;
         for (std::size_t k = 0; k < edits.size(); ++k)
-            now.push_back({frame, false, names[k], places[k], RandomKey(1, names[k]), figures, warnings, write});
-        for (std::size_t k = 0; k < edits.size(); ++k) told.push_back(&now[k]), all.push_back(&edits[k]);
-        edit_together(all, told, points);
+            now.push_back({frame, false, names[k], locations[k], RandomKey(1, names[k]), figures, warnings, write});
+        for (std::size_t k = 0; k < edits.size(); ++k) received.push_back(&now[k]), all.push_back(&edits[k]);
+        edit_together(all, received, points);
     }
 };
 
@@ -145,9 +145,9 @@ TEST_CASE("an edit is told whether others come before it, and whether they remov
     const Visit nothing = [](PointSet&, std::size_t) { return false; };
     for (const bool removes : {false, true, false}) scene.edits.emplace_back(nothing, removes);
     scene.run();
-    std::vector<std::pair<bool, bool>> told;
-    for (const Edit& edit : scene.edits) told.emplace_back(edit.told.edits, edit.told.removals);
-    CHECK(told == std::vector<std::pair<bool, bool>>{{false, false}, {true, false}, {true, true}});
+    std::vector<std::pair<bool, bool>> received;
+    for (const Edit& edit : scene.edits) received.emplace_back(edit.received.edits, edit.received.removals);
+    CHECK(received == std::vector<std::pair<bool, bool>>{{false, false}, {true, false}, {true, true}});
 }
 
 TEST_CASE("the error of edits that go together is that of the first edit that fails, at its first point",

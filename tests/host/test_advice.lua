@@ -250,10 +250,10 @@ describe("a warning", function()
   it("tells of a voxel that is as large as half of the mesh", function()
     local text = "rapid.levelset.from_mesh(rapid.mesh.box { size = {0.2, 0.2, 0.2} }, { voxel = %g }) "
       .. "return rapid.create { points = POINTS } :solve {}"
-    local function told(voxel)
+    local function reported(voxel)
       return scene.command("check", (text:format(voxel):gsub("POINTS", points))).stderr
     end
-    expect("a voxel of 0.11 m is half as large as mesh", told(0.11))
-    assert.falsy(told(0.05):find("voxel", 1, true))
+    expect("a voxel of 0.11 m is half as large as mesh", reported(0.11))
+    assert.falsy(reported(0.05):find("voxel", 1, true))
   end)
 end)

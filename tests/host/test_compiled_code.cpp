@@ -20,7 +20,7 @@ void* allocate(void* data, void* block, std::size_t, std::size_t new_size)
         return nullptr;
     }
     Requests& requests = *static_cast<Requests*>(data);
-    ++(is_asked_by_compiled_code() ? requests.compiled : requests.others);
+    ++(is_called_by_compiled_code() ? requests.compiled : requests.others);
     return std::realloc(block, new_size);
 }
 

@@ -62,7 +62,7 @@ void limit_time()
     ::alarm(120);
 }
 
-void go_on_behind(const SavedState& state, const fs::path& scene)
+void continue_after(const SavedState& state, const fs::path& scene)
 {
     Snapshot snapshot;
     restore(snapshot, state);
@@ -87,8 +87,8 @@ TEST_CASE("goes on behind crafted snapshots", "[.]")
     for (; report->next < end; report->next += step) {
         limit_time();
         try {
-            go_on_behind(test::Forger(static_cast<std::uint64_t>(report->next))(whole),
-                         std::getenv("RAPID_TEST_SCENE"));
+            continue_after(test::Forger(static_cast<std::uint64_t>(report->next))(whole),
+                           std::getenv("RAPID_TEST_SCENE"));
             ++report->gone_on;
         } catch (const std::exception&) {
             ++report->refused;
@@ -110,7 +110,7 @@ TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "
             for (int frame = 0; frame < 6; ++frame) run.evaluator().advance();
             write_state(folder / "whole", {{"frame", 6}}, state_of(run.evaluator().save()));
         }
-        go_on_behind(StateFile(folder / "whole").state(), scene);
+        continue_after(StateFile(folder / "whole").state(), scene);
 
         Report report{amount("RAPID_CRAFTED_FIRST", 0) / step * step + static_cast<int>(k), 0, 0};
         std::ofstream(folder / "report", std::ios::binary).write(reinterpret_cast<char*>(&report), sizeof report);

@@ -46,9 +46,9 @@ describe("the memory of a run", function()
       local function of(size, more) return "--size " .. size .. " -o picture.####.png" .. (more or "") end
       local small, large = peak(text, 2, of "32x18"), peak(text, 2, of "2000x1500")
       local refused = scene.command("run", text, "-f 1-2 " .. of("2000x1500", " --memory 150M"))
-      local told = tonumber(refused.stderr:match "would take about (%d+) MiB")
-      assert.truthy(large - small < 1.05 * told and large - small > least * told,
-        ("%s: %g MiB in place of %g, %d told"):format(shape, large, small, told))
+      local reported = tonumber(refused.stderr:match "would take about (%d+) MiB")
+      assert.truthy(large - small < 1.05 * reported and large - small > least * reported,
+        ("%s: %g MiB in place of %g, %d told"):format(shape, large, small, reported))
     end
   end)
 

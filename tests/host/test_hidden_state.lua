@@ -60,9 +60,10 @@ describe("a kernel with hidden state", function()
       count = count + 1
       for _, threads in ipairs { 1, 3 } do
         local message = scene.error(scene.kernel_text(body, nil, before), { frames = {2, 2}, threads = threads })
-        local told = message:match '^scene%.lua:1: node "kernel": the kernel changes what all points share %((.-)%); '
-        assert.truthy(told, body .. ": " .. message)
-        if name then assert.equal(name, told, body) end
+        local reported = message:match
+          '^scene%.lua:1: node "kernel": the kernel changes what all points share %((.-)%); '
+        assert.truthy(reported, body .. ": " .. message)
+        if name then assert.equal(name, reported, body) end
       end
     end
     assert.truthy(count >= 15)

@@ -282,9 +282,9 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
   } do
     it("fails as one point at a time does: " .. body, function()
       local text = head .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body)
-      local told = scene.error(text, { threads = 1 })
-      assert.equal(scene.error(text, { threads = 1, watch_traces = true }), told)
-      assert.truthy(told:find(message, 1, true), told)
+      local reported = scene.error(text, { threads = 1 })
+      assert.equal(scene.error(text, { threads = 1, watch_traces = true }), reported)
+      assert.truthy(reported:find(message, 1, true), reported)
     end)
   end
 

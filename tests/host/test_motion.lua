@@ -13,8 +13,8 @@ local function error_of(text)
 end
 
 -- The tolerance covers the speck's size and single precision.
-local function close(wanted, found)
-  assert.near(0, (found - wanted):length(), 4e-6)
+local function close(expected, found)
+  assert.near(0, (found - expected):length(), 4e-6)
 end
 
 describe("a motion", function()

@@ -229,7 +229,7 @@ TEST_CASE("a snapshot shares the columns that no frame has changed since", "[sna
     const Column<float> heat = heat_of(run.evaluator().advance());
     const Snapshot snapshot = run.evaluator().save();
     const auto& columns = snapshot.simulations.at("create1").columns;
-    CHECK(std::any_of(columns.begin(), columns.end(), [&](const KeptColumn& any) {
+    CHECK(std::any_of(columns.begin(), columns.end(), [&](const SavedColumn& any) {
         const auto* column = std::get_if<Column<float>>(&any);
         return column && column->shares_values_with(heat);
     }));

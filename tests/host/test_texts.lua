@@ -123,20 +123,20 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}}, n
         'no attribute "name"; add :attribute{ attributes = { name = "" } } before it',
     } do
       local text = "return rapid.create { points = two }\n" .. line .. " :solve {}"
-      local told = scene.error(text)
-      assert.truthy(told:find(message, 1, true), told)
-      assert.truthy(told:find("scene.lua:2", 1, true), told)
+      local reported = scene.error(text)
+      assert.truthy(reported:find(message, 1, true), reported)
+      assert.truthy(reported:find("scene.lua:2", 1, true), reported)
     end
   end)
 
   it("is no amount: where numbers are asked for, the error says so", function()
-    local told = scene.error [[
+    local reported = scene.error [[
 return rapid.create { points = two } :attribute { kind = "a" } :drag { linear = rapid.attr "kind" } :solve {}]]
-    assert.truthy(told:find('"kind" is string', 1, true), told)
-    told = scene.error [[
+    assert.truthy(reported:find('"kind" is string', 1, true), reported)
+    reported = scene.error [[
 local parents = rapid.create { points = two } :attribute { kind = "a" } :solve { name = "parents" }
 return rapid.create {} :spawn { from = parents, on = "kind > 1" } :solve {}]]
-    assert.truthy(told:find('on: "kind" is a text; test it with a function', 1, true), told)
+    assert.truthy(reported:find('on: "kind" is a text; test it with a function', 1, true), reported)
   end)
 end)
 
@@ -176,8 +176,8 @@ describe("texts", function()
 
   it("are told by info and diff", function()
     done("run", "-f 3 -o b.vdb -o b.csv -o b.npz")
-    local told = command.rapid("info b.vdb", { cwd = scene.folder.path }).stdout
-    assert.truthy(told:find('name +string  "a" "a2" "a3" "b" "b2"'), told)
+    local reported = command.rapid("info b.vdb", { cwd = scene.folder.path }).stdout
+    assert.truthy(reported:find('name +string  "a" "a2" "a3" "b" "b2"'), reported)
     for _, other in ipairs { "b.csv", "b.npz" } do
       local result = command.rapid("diff b.vdb " .. other, { cwd = scene.folder.path })
       assert.equal(0, result.status, result.stdout .. result.stderr)
@@ -185,8 +185,8 @@ describe("texts", function()
   end)
 
   it("are told by trace", function()
-    local told = json.decode(done("trace", "--json --id 0 -f 1-6"))
-    local name = told[1].steps[1].values.name
+    local reported = json.decode(done("trace", "--json --id 0 -f 1-6"))
+    local name = reported[1].steps[1].values.name
     assert.truthy(name == "a" or name == "b", name)
   end)
 

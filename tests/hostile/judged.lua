@@ -9,7 +9,7 @@ local command = require "testing.command"
 
 local judged = {}
 
-local most_address_space = 3 * 2 ^ 20 -- KiB: --memory, plus memory that libraries and threads map but never touch
+local max_address_space = 3 * 2 ^ 20 -- KiB: --memory, plus memory that libraries and threads map but never touch
 local longest_message = 10000
 
 -- seconds: of processor time, which does not depend on other load. environment: further variables. any_address: true if
@@ -18,7 +18,7 @@ function judged.run(folder, text, limits)
   folder:write("scene.lua", text)
   local result = command.shell(('ulimit -t %d; %s timeout -k 1 120 "$RAPID" run scene.lua -f 1-3 --quiet ' ..
     "--memory 1G --threads 2 %s"):format(limits.seconds,
-    limits.any_address and "" or address_space(most_address_space), limits.arguments), {
+    limits.any_address and "" or address_space(max_address_space), limits.arguments), {
     cwd = folder.path, environment = limits.environment })
   if result.status > 2 then
     result.complaint = "ended with " .. result.status

@@ -43,9 +43,9 @@ local function pieces_of(text)
 end
 
 local function joined(pieces)
-  local texts = {}
-  for i, piece in ipairs(pieces) do texts[i] = piece.text end
-  return table.concat(texts)
+  local strings = {}
+  for i, piece in ipairs(pieces) do strings[i] = piece.text end
+  return table.concat(strings)
 end
 
 -- Definitions for wrong values: one line, after the scene's first.
@@ -158,11 +158,11 @@ local links = {
   ":collide { shape = rapid.levelset.sphere {}, radius = 1e9 }", ":collide { shape = rapid.mesh.box {} }",
 }
 
--- Returns the indices of the pieces for which `wanted` returns true.
-local function places(pieces, wanted)
+-- Returns the indices of the pieces for which `is_selected` returns true.
+local function places(pieces, is_selected)
   local found = {}
   for i, piece in ipairs(pieces) do
-    if wanted(piece, i) then found[#found + 1] = i end
+    if is_selected(piece, i) then found[#found + 1] = i end
   end
   return found
 end
@@ -303,13 +303,14 @@ function mistakes.parameter(pieces)
   local node = pick(nodes)
   if #node.params == 0 then return end
   local param = pick(node.params)
-  local texts = { param.name .. " = " .. wrong_value() }
+  local strings = { param.name .. " = " .. wrong_value() }
   for _, other in ipairs(node.params) do
     if other.required and other ~= param and draw.chance(0.8) then
-      texts[#texts + 1] = other.name .. " = " .. pick { wrong_value(), "1", "rapid.shape.plane {}", "function(p) end" }
+      strings[#strings + 1] = other.name .. " = "
+        .. pick { wrong_value(), "1", "rapid.shape.plane {}", "function(p) end" }
     end
   end
-  in_chain(pieces, (":%s { %s }"):format(node.name, table.concat(texts, ", ")))
+  in_chain(pieces, (":%s { %s }"):format(node.name, table.concat(strings, ", ")))
 end
 
 local kinds = {}

@@ -178,8 +178,8 @@ TEST_CASE("a .bgeo that is cut off, newer or something else is an error that say
         return error_of([&] { read_points(folder / "b.bgeo"); });
     };
     // The groups all, hot and nobody: a length, the name, a count and a word each.
-    constexpr std::size_t behind_points = 3 * (2 + 4 + 4) + 3 + 3 + 6 + 2;
-    CHECK_THAT(error(whole.substr(0, whole.size() - behind_points - 20)),
+    constexpr std::size_t after_points = 3 * (2 + 4 + 4) + 3 + 3 + 6 + 2;
+    CHECK_THAT(error(whole.substr(0, whole.size() - after_points - 20)),
                Catch::EndsWith("the file ends early: its header promises 3 points, it holds 2"));
     CHECK_THAT(error(whole.substr(0, 60)), Catch::EndsWith("the file ends within its header"));
     CHECK_THAT(error("\x7fNSJb..."), Catch::EndsWith("Rapid reads the classic one (in Houdini: .bhclassic)"));

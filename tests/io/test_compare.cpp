@@ -13,7 +13,7 @@ using namespace rapid::test;
 
 namespace {
 
-nlohmann::ordered_json json_of(const auto& told) { return nlohmann::ordered_json::parse(to_json(told)); }
+nlohmann::ordered_json json_of(const auto& reported) { return nlohmann::ordered_json::parse(to_json(reported)); }
 
 const AttributeDifference& of(const Comparison& comparison, const std::string& name)
 {

@@ -27,14 +27,15 @@ TEST_CASE("all frames are written to all patterns, with missing folders made", "
     FrameWriter writer({{pattern(folder, "new/deep/a.####.ply"), {}},
                         {pattern(folder, "new/{output}.####.csv"), std::vector<std::string>{"age"}}});
     for (int frame = 1; frame <= 10; ++frame)
-        writer.submit(random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false, .texts = false}),
-                      {.number = frame}, "sparks");
+        writer.submit(
+            random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false, .strings = false}),
+            {.number = frame}, "sparks");
     writer.finish();
 
     CHECK(file_names(folder / "new/deep").size() == 10);
     for (int frame = 1; frame <= 10; ++frame) {
         const PointSet expected =
-            random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false, .texts = false});
+            random_points({.size = 100, .seed = static_cast<unsigned>(frame), .wide = false, .strings = false});
         const std::string number = four_digits(frame);
         CHECK(differing_columns(expected, read_points(folder / ("new/deep/a." + number + ".ply"))) == "");
         CHECK(read_points(folder / ("new/sparks." + number + ".csv")).column_names() ==
@@ -82,7 +83,7 @@ TEST_CASE("pictures of an empty scene wait for points a hundred frames, and no l
 TEST_CASE("what changes in a point set after it was submitted is not in the file", "[io][writer][threads]")
 {
     const TemporaryFolder folder;
-    PointSet points = random_points({.size = 20000, .wide = false, .texts = false});
+    PointSet points = random_points({.size = 20000, .wide = false, .strings = false});
     const PointSet before = points;
     FrameWriter writer({{pattern(folder, "a.##.ply"), {}}});
     writer.submit(points, {.number = 1});
@@ -101,7 +102,7 @@ TEST_CASE("a full disk is an error that names the file, earlier frames stay, not
     if (formats()[place].film || !disk.mounted()) return;  // mounting is not allowed, so nothing can be filled
     CAPTURE(extension);
     const std::string name = "a.####" + extension;
-    const PointSet points = random_points({.size = 4000, .wide = false, .texts = false});
+    const PointSet points = random_points({.size = 4000, .wide = false, .strings = false});
 
     FrameWriter writer({{pattern(disk.folder(), name), {}}});
     const std::string error = error_of([&] {

@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/format.h"
 #include "runtime/points/point_lines.h"
 #include "runtime/points/trail.h"
@@ -18,7 +18,7 @@ namespace {
 // 0 0 0 -1 2 2 -1: two lines, of three points and of two.
 PointSet with_curves()
 {
-    PointSet points = random_points({.size = 7, .wide = false, .texts = false});
+    PointSet points = random_points({.size = 7, .wide = false, .strings = false});
     const std::vector<std::int32_t> curves = {0, 0, 0, -1, 2, 2, -1};
     points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
     return points;
@@ -63,10 +63,10 @@ TEST_CASE("points with trails come back from .bgeo and .ply with the same bits",
     CAPTURE(size, extension);
     const TemporaryFolder folder;
     const PointSet points = points_with_trails(size);
-    const LeftOut left_out;
+    const SkippedContents skipped;
     write_points(folder / ("a" + extension), points);
     CHECK(differing_columns(points, read_points(folder / ("a" + extension))) == "");
-    CHECK(left_out.list().empty());
+    CHECK(skipped.list().empty());
 }
 
 TEST_CASE("a .bgeo has open polygons behind its points", "[io][lines][bgeo]")
@@ -87,7 +87,7 @@ TEST_CASE("a .bgeo has open polygons behind its points", "[io][lines][bgeo]")
         CHECK(reader.take(4) == 1);
         CHECK(reader.take(4) == line.size());
         CHECK(reader.take(1) == ':');
-        for (const std::uint32_t place : line) CHECK(reader.take(2) == place);
+        for (const std::uint32_t index : line) CHECK(reader.take(2) == index);
     }
 }
 
@@ -109,10 +109,10 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
         put(0, 4);
         put(0, 4);
     }
-    const auto polygon = [&](char mark, const std::vector<std::uint32_t>& places) {
-        put(static_cast<std::uint32_t>(places.size()), 4);
+    const auto polygon = [&](char mark, const std::vector<std::uint32_t>& indices) {
+        put(static_cast<std::uint32_t>(indices.size()), 4);
         text += mark;
-        for (const std::uint32_t place : places) put(place, 2), put(0, 4);
+        for (const std::uint32_t index : indices) put(index, 2), put(0, 4);
         put(0, 4);
     };
     put(0xffffffff, 4);
@@ -128,7 +128,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
         return read_points(folder / "a.bgeo");
     };
 
-    const LeftOut left_out;
+    const SkippedContents skipped;
     const PointSet points = read(text);
     REQUIRE(points.size() == 6);  // the third point is on both lines, the fourth on none
     const std::vector<std::pair<float, std::int32_t>> expected = {{4, 0}, {2, 0}, {0, 0}, {2, 1}, {1, 1}, {3, -1}};
@@ -136,8 +136,8 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
         CHECK(points.P()[i].x() == expected[i].first);
         CHECK(points.column<std::int32_t>("curve")[i] == expected[i].second);
     }
-    const std::vector<std::string> told = left_out.list();
-    CHECK(std::count(told.begin(), told.end(), "its 1 closed polygons") == 1);
+    const std::vector<std::string> reported = skipped.list();
+    CHECK(std::count(reported.begin(), reported.end(), "its 1 closed polygons") == 1);
 
     std::string wrong = text;
     wrong[text.size() - 2 - 4 - 4 - 1] = 9;  // the last index
@@ -148,7 +148,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
     const std::size_t type = text.size() - 2 - (4 + 1 + 2 * (2 + 4) + 4) - 4;
     wrong = text;
     wrong[type + 3] = 2;  // a NURBS curve
-    const LeftOut others;
+    const SkippedContents others;
     CHECK(read(wrong).size() == 5);
     const std::vector<std::string> of_others = others.list();
     CHECK(std::count(of_others.begin(), of_others.end(), "its 3 primitives") == 1);

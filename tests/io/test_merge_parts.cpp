@@ -46,11 +46,11 @@ std::string bytes_of(const std::filesystem::path& path)
 TEST_CASE("the parts of a set are the set, to the bit, whatever its size and the gaps of its ids", "[merge_parts]")
 {
     CHECK(rc::check([] {
-        test::RandomPoints wanted;
-        wanted.size = static_cast<std::size_t>(*rc::gen::inRange(0, 3000));
-        wanted.seed = *rc::gen::arbitrary<unsigned>();
-        wanted.first_id = *rc::gen::inRange<std::int64_t>(0, 1LL << 40);
-        PointSet whole = test::random_points(wanted);
+        test::RandomPoints options;
+        options.size = static_cast<std::size_t>(*rc::gen::inRange(0, 3000));
+        options.seed = *rc::gen::arbitrary<unsigned>();
+        options.first_id = *rc::gen::inRange<std::int64_t>(0, 1LL << 40);
+        PointSet whole = test::random_points(options);
         // A few gaps of any width.
         std::int64_t shift = 0;
         for (std::int64_t& id : whole.id().write()) {
@@ -67,7 +67,7 @@ TEST_CASE("parts that were written and read again make the file of the whole, by
 {
     std::vector<std::string> extensions;
     for (const Format& format : formats())
-        if (format.read && !format.places_alone) extensions.push_back(format.extension);
+        if (format.read && !format.positions_only) extensions.push_back(format.extension);
     REQUIRE(extensions.size() >= 8);
     const std::string extension = GENERATE_COPY(from_range(extensions));
     const int count = GENERATE(2, 3, 16);

@@ -12,7 +12,7 @@ TEST_CASE("points come back from .ply with the same bits", "[io][ply]")
     const std::size_t size = GENERATE(0, 1, 2, 5000);
     CAPTURE(size);
     const TemporaryFolder folder;
-    const PointSet points = random_points({.size = size, .extent = 1e5f, .wide = false, .texts = false});
+    const PointSet points = random_points({.size = size, .extent = 1e5f, .wide = false, .strings = false});
 
     write_points(folder / "a.ply", points);
 

@@ -25,9 +25,9 @@ PointSet some_points(std::size_t size)
 
 PointSet slice_of(const PointSet& points, std::size_t begin, std::size_t end)
 {
-    std::vector<std::uint32_t> places(end - begin);
-    std::iota(places.begin(), places.end(), static_cast<std::uint32_t>(begin));
-    return points.select(places);
+    std::vector<std::uint32_t> indices(end - begin);
+    std::iota(indices.begin(), indices.end(), static_cast<std::uint32_t>(begin));
+    return points.select(indices);
 }
 
 void write_in_pieces(const std::filesystem::path& path, const PointSet& points, const std::vector<std::size_t>& ends)

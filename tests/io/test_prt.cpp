@@ -67,7 +67,7 @@ TEST_CASE("points come back from .prt with the same bits", "[io][prt]")
     const std::size_t size = GENERATE(0, 1, 2, 5000, 20000);
     CAPTURE(size);
     const TemporaryFolder folder;
-    const PointSet points = random_points({.size = size, .extent = 1e5f, .texts = false});
+    const PointSet points = random_points({.size = size, .extent = 1e5f, .strings = false});
 
     write_points(folder / "a.prt", points);
 

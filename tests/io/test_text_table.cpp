@@ -12,10 +12,10 @@ using namespace rapid::test;
 
 namespace {
 
-Column<Token> column_of(const std::vector<std::string>& texts)
+Column<Token> column_of(const std::vector<std::string>& strings)
 {
     std::vector<Token> tokens;
-    for (const std::string& text : texts) tokens.push_back(token_of(text));
+    for (const std::string& text : strings) tokens.push_back(token_of(text));
     return Column<Token>(std::span<const Token>(tokens));
 }
 
@@ -25,19 +25,19 @@ TEST_CASE("a table of texts is in the order of the points, not in that in which 
 {
     for (const char* first : {"late", "middle", "early"}) token_of(first);
     const TextTable table = text_table(column_of({"early", "middle", "early", "", "late"}));
-    std::vector<std::string> texts;
-    for (const Token text : table.texts) texts.emplace_back(text.text());
-    CHECK(texts == std::vector<std::string>{"early", "middle", "", "late"});
-    CHECK(same_bits(texts_at(table.texts, table.places), column_of({"early", "middle", "early", "", "late"})));
-    CHECK(text_table(Column<Token>(3, token_of("a"))).places.is_uniform());
-    CHECK(text_table(Column<Token>()).texts.empty());
+    std::vector<std::string> strings;
+    for (const Token text : table.strings) strings.emplace_back(text.text());
+    CHECK(strings == std::vector<std::string>{"early", "middle", "", "late"});
+    CHECK(same_bits(strings_at(table.strings, table.indices), column_of({"early", "middle", "early", "", "late"})));
+    CHECK(text_table(Column<Token>(3, token_of("a"))).indices.is_uniform());
+    CHECK(text_table(Column<Token>()).strings.empty());
 }
 
 TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error", "[io][texts]")
 {
-    const std::vector<Token> texts = {token_of("leaf")};
-    const auto column = [&](const std::vector<std::int32_t>& places) {
-        return texts_at(texts, Column<std::int32_t>(std::span<const std::int32_t>(places)));
+    const std::vector<Token> strings = {token_of("leaf")};
+    const auto column = [&](const std::vector<std::int32_t>& indices) {
+        return strings_at(strings, Column<std::int32_t>(std::span<const std::int32_t>(indices)));
     };
     CHECK(same_bits(column({0, -1}), column_of({"leaf", ""})));
     CHECK(error_of([&] { column({0, 1}); }) == "a point has the text 1; there are 1");
@@ -46,7 +46,7 @@ TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error
 
 TEST_CASE("texts of a file have the tokens of the process, also when more are met than are remembered", "[io][texts]")
 {
-    TokensOfTexts token_of_word;
+    StringTokens token_of_word;
     for (int round = 0; round < 2; ++round)
         for (int k = 0; k < 70000; ++k) {
             std::string word = fmt::format("word {}", k);
@@ -62,15 +62,15 @@ TEST_CASE("each format that holds texts gives them back; the others leave them o
           "[io][texts]")
 {
     const PointSet points = random_points({.size = 300, .wide = false});
-    int with_texts = 0;
+    int with_strings = 0;
     for (const Format& format : formats()) {
-        if (!format.read || format.places_alone) continue;
+        if (!format.read || format.positions_only) continue;
         CAPTURE(format.extension);
         const TemporaryFolder folder;
         const std::filesystem::path file = folder.path() / ("a" + format.extension);
         write_points(file, points);
-        CHECK(differing_columns(format.holds_texts ? points : without_texts(points), read_points(file)) == "");
-        with_texts += format.holds_texts;
+        CHECK(differing_columns(format.holds_strings ? points : without_strings(points), read_points(file)) == "");
+        with_strings += format.holds_strings;
     }
-    CHECK(with_texts == 6);
+    CHECK(with_strings == 6);
 }

@@ -42,9 +42,9 @@ struct Positions {
 };
 
 void fill_array(AttributeArray& array, const Column<Token>& column, const std::vector<vdb::PointIndex32>& indices,
-                const vdb::MetaMap& texts)
+                const vdb::MetaMap& strings)
 {
-    vdb::points::StringAttributeWriteHandle handle(array, texts);
+    vdb::points::StringAttributeWriteHandle handle(array, strings);
     const auto text = [&](vdb::Index32 i) { return std::string(column[i].text()); };
     if (std::all_of(indices.begin(), indices.end(), [&](vdb::Index32 i) { return text(i) == text(indices[0]); }))
         return handle.collapse(text(indices[0]));
@@ -98,8 +98,8 @@ PointDataGrid::Ptr grid_of(const PointSet& points)
             named.second);
     }
     vdb::points::appendGroups(tree, points.group_names());
-    vdb::MetaMap& texts = vdb::points::makeDescriptorUnique(tree)->getMetadata();
-    vdb::points::StringMetaInserter list(texts);
+    vdb::MetaMap& strings = vdb::points::makeDescriptorUnique(tree)->getMetadata();
+    vdb::points::StringMetaInserter list(strings);
     for (const auto& named : points.columns())
         if (const auto* column = std::get_if<Column<Token>>(&named.second))
             for (std::size_t i = 0; i < points.size(); ++i)
@@ -111,7 +111,7 @@ PointDataGrid::Ptr grid_of(const PointSet& points)
             if (named.first != "P")
                 std::visit(
                     [&](const auto& c) {
-                        fill_array(leaf->attributeArray(descriptor.find(named.first)), c, order, texts);
+                        fill_array(leaf->attributeArray(descriptor.find(named.first)), c, order, strings);
                     },
                     named.second);
         for (const auto& [name, members] : points.groups()) fill_group(leaf->groupWriteHandle(name), members, order);

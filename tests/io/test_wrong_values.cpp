@@ -180,7 +180,7 @@ TEST_CASE("points of one id are not called the same, whichever format they come 
     PointSet points = random_points({.size = 3, .first_id = 4, .wide = false});
     for (std::int64_t& id : points.id().write()) id = 4;
     for (const Format& format : formats()) {
-        if (!format.read || format.places_alone) continue;
+        if (!format.read || format.positions_only) continue;
         const std::string name = "a" + format.extension;
         CAPTURE(name);
         const TemporaryFolder folder;

@@ -4,7 +4,7 @@
 #include <span>
 #include <variant>
 
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/describe.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
@@ -33,9 +33,9 @@ public:
     {
         add(std::span<const T>(values));
     }
-    void add(const LeftOut& left_out)
+    void add(const SkippedContents& skipped)
     {
-        for (const std::string& what : left_out.list()) add(what);
+        for (const std::string& what : skipped.list()) add(what);
     }
     void add(const PointSet& points)
     {
@@ -78,19 +78,19 @@ std::string content_of(const Grid& grid)
 
 std::string content_of_points(const std::filesystem::path& path)
 {
-    const LeftOut left_out;
+    const SkippedContents skipped;
     const PointSet points = read_points(path);
     describe(points);
     Content content;
     content.add(points);
-    content.add(left_out);
+    content.add(skipped);
     return content.bytes();
 }
 
 std::string content_of_mesh(const std::filesystem::path& path)
 {
     const MeshFile mesh = read_mesh_file(path);
-    joined(mesh, join_by_place(mesh.positions), path.string())->openness();
+    joined(mesh, join_by_position(mesh.positions), path.string())->openness();
     Content content;
     content.add(mesh.positions);
     content.add(mesh.colours);
@@ -99,7 +99,7 @@ std::string content_of_mesh(const std::filesystem::path& path)
     content.add(mesh.triangles);
     content.add(mesh.face_values);
     for (const auto& [name, members] : mesh.face_groups) content.add(name), content.add(members);
-    for (const std::string& what : mesh.left_out) content.add(what);
+    for (const std::string& what : mesh.skipped) content.add(what);
     return content.bytes();
 }
 

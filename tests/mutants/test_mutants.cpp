@@ -197,10 +197,10 @@ TEST_CASE("a file that is cut anywhere is an error, unless it only lacks white s
     const std::vector<WholeFile> files = chosen_files();
     // Truncates short files at each byte, and all files at more of the last ones.
     constexpr std::size_t near_end = 40;
-    const std::size_t wanted = near_end + 5 * mutants_of_each_reader(files.size());
+    const std::size_t expected = near_end + 5 * mutants_of_each_reader(files.size());
     for (const WholeFile& whole : files) {
         CAPTURE(whole.reader);
-        const std::size_t size = whole.bytes.size(), cuts = std::min(size, wanted);
+        const std::size_t size = whole.bytes.size(), cuts = std::min(size, expected);
         const auto cut = [&](std::size_t k) {
             if (cuts == size || k < near_end) return size - 1 - k;
             return (size - near_end) * (k - near_end) / (cuts - near_end);

@@ -30,7 +30,7 @@ std::string written(const std::string& name, const std::function<void(const Path
 }
 
 // Writes a file in a separate process, whose memory is freed with it.
-std::string written_apart(const std::string& name, const std::function<void(const Path& path)>& write)
+std::string written_sandboxed(const std::string& name, const std::function<void(const Path& path)>& write)
 {
     return written(name, [&](const Path& path) {
         const pid_t child = ::fork();
@@ -178,7 +178,7 @@ std::vector<WholeFile> registered_formats()
         };
         add("", random_points({.size = 40, .wide = false}));
         add(", trails", points_with_trails(8));
-        if (!format.places_alone) add(", no points", points_with_trails(0));
+        if (!format.positions_only) add(", no points", points_with_trails(0));
     }
     return files;
 }
@@ -194,7 +194,7 @@ WholeFile sparse_fog(int values)
         for (int i = 0; i < values; ++i) grid->tree().addTile(1, {i << 12, 0, 0}, 1.0f, true);
         write_grid(path, grid, "density", openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
     };
-    return {"sparse fog .vdb", "a.vdb", written_apart("a.vdb", write), content_of_fog};
+    return {"sparse fog .vdb", "a.vdb", written_sandboxed("a.vdb", write), content_of_fog};
 }
 
 std::vector<WholeFile> whole_files()

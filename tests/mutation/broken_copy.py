@@ -117,7 +117,7 @@ class Suite:
         self.seconds, self.reached = self.took, {i for i, byte in enumerate(notes.read_bytes()) if byte}
         return passed
 
-    def most_seconds(self):
+    def max_seconds(self):
         return 30 + 5 * self.seconds
 
 

@@ -62,8 +62,8 @@ inline std::shared_ptr<Simulation> simulation(double fps = 24, std::int64_t star
 }
 
 // Returns points at these positions, with ids from 0.
-inline PointSet points_at(std::initializer_list<InitialisedVec3f> places) { return points(places); }
-inline PointSet points_at(const std::vector<Vec3f>& places) { return points(places); }
+inline PointSet points_at(std::initializer_list<InitialisedVec3f> positions) { return points(positions); }
+inline PointSet points_at(const std::vector<Vec3f>& positions) { return points(positions); }
 
 inline std::shared_ptr<PointsObject> source_of(PointSet points)
 {
@@ -139,7 +139,7 @@ public:
     FrameFigures figures;
     std::vector<std::string> warnings;
     std::function<void(const std::string&, const PointSet&)> write;
-    std::set<std::string> left_out;  // by a plan
+    std::set<std::string> pruned;  // by a plan
 
 private:
     template <class F>
@@ -156,7 +156,7 @@ private:
                              figures,
                              warnings,
                              write,
-                             &left_out};
+                             &pruned};
         return f(now);
     }
 

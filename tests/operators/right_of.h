@@ -11,7 +11,7 @@ class RightOf : public PointFunction {
 public:
     explicit RightOf(float limit) : limit_(limit) {}
     void uses(Uses& uses) const override { uses.reads.push_back("P"); }
-    bool asks_places() const override { return false; }
+    bool reads_indices() const override { return false; }
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation&) const override
     {
         return std::make_unique<Test>(points, limit_);

@@ -103,7 +103,7 @@ TEST_CASE("attribute refuses illegal names and values", "[attribute]")
 TEST_CASE("attribute makes no attribute that the plan leaves out", "[attribute]")
 {
     NodeTest attribute("attribute", {{"heat", 2.0}, {"wet", 1.0}});
-    attribute.left_out = {"heat"};
+    attribute.pruned = {"heat"};
     CHECK(attribute(2, points_at({{0, 0, 0}})).column_names() == std::vector<std::string>{"P", "id", "v", "wet"});
 }
 

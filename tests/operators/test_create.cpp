@@ -102,7 +102,7 @@ TEST_CASE("create drops what the plan leaves out of the initial points", "[creat
     points.group("left");
     points.group("right");
     NodeTest create("create", {{"points", ObjectPtr(source_of(points))}});
-    create.left_out = {"heat", "group:left"};
+    create.pruned = {"heat", "group:left"};
     const PointSet initial = create(1);
     CHECK(initial.column_names() == std::vector<std::string>{"P", "id", "v", "wet"});
     CHECK(initial.group_names() == std::vector<std::string>{"right"});

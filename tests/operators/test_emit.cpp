@@ -528,7 +528,7 @@ TEST_CASE("emit makes no attribute that the plan leaves out, and emits the same 
                                  {"velocity", Vec3d(1, 0, 0)},
                                  {"attributes", named({{"heat", 5.0}})}};
     NodeTest pruned("emit", arguments), whole("emit", arguments);
-    pruned.left_out = {"N", "age", "group:hot", "heat", "life"};
+    pruned.pruned = {"N", "age", "group:hot", "heat", "life"};
     const PointSet some = pruned(2), all = whole(2);
     CHECK(some.column_names() == std::vector<std::string>{"P", "dt", "id", "v"});
     CHECK(some.group_names().empty());

@@ -109,8 +109,8 @@ TEST_CASE(
     "[emit]")
 {
     const Vec3d P0(1, 2, 3), v(30, -4, 0), a = GENERATE(Vec3d(0, 0, 0), Vec3d(10, 300, -7));
-    const auto way = [=](double t) -> Vec3d { return P0 + t * v + 0.5 * t * t * a; };
-    NodeTest emit("emit", {{"source", moved(speck(), places([&](const Frame& f) { return way(f.time); }))},
+    const auto path = [=](double t) -> Vec3d { return P0 + t * v + 0.5 * t * t * a; };
+    NodeTest emit("emit", {{"source", moved(speck(), places([&](const Frame& f) { return path(f.time); }))},
                            {"rate", 500.0},
                            {"birth", "even"},
                            {"inherit_velocity", 0.5}});
@@ -119,7 +119,7 @@ TEST_CASE(
         const PointSet born = emit(frame);
         for (std::size_t i = 0; i < born.size(); ++i, ++k) {
             const double t = double(k + 1) / 500;
-            off = std::max(off, (born.P()[i].cast<double>() - way(t)).norm());
+            off = std::max(off, (born.P()[i].cast<double>() - path(t)).norm());
             slip = std::max(slip, (born.v()[i].cast<double>() - 0.5 * (v + t * a)).norm());
         }
     }
@@ -259,11 +259,11 @@ TEST_CASE("age can be an attribute of the source", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     from.set("delay", Column<float>(std::span<const float>(std::vector<float>{0.01f, 0.5f})));
-    PointSet asked;
-    asked.add(*known_attribute("age"));
+    PointSet requested;
+    requested.add(*known_attribute("age"));
     NodeTest emit("emit",
                   {{"source", ObjectPtr(source_of(from))}, {"count", 2.0}, {"age", Value(AttributeRef{"delay"})}});
-    const PointSet born = emit(2, asked);
+    const PointSet born = emit(2, requested);
     CHECK(values_of<float>(born, "dt") == std::vector<float>{0.01f, static_cast<float>(1 / fps)});
     CHECK(values_of<float>(born, "age")[1] == Approx(0.5 - 1 / fps));
 

@@ -86,18 +86,18 @@ return rapid.create { fps = 20 }
   end)
 
   it("needs a target, and the attribute", function()
-    local told = scene.error("return rapid.create { points = two } :goal { to = rapid.attr 'goal' } :solve {}")
-    assert.truthy(told:find('no attribute "goal"', 1, true), told)
-    told = scene.error("return rapid.create { points = two } :goal {} :solve {}")
-    assert.truthy(told:find("to is missing", 1, true) or told:find('"to" is missing', 1, true), told)
+    local reported = scene.error("return rapid.create { points = two } :goal { to = rapid.attr 'goal' } :solve {}")
+    assert.truthy(reported:find('no attribute "goal"', 1, true), reported)
+    reported = scene.error("return rapid.create { points = two } :goal {} :solve {}")
+    assert.truthy(reported:find("to is missing", 1, true) or reported:find('"to" is missing', 1, true), reported)
     for to, message in pairs {
       ["rapid.shape.sphere {}"] = 'by = "id": ',
       ["rapid.points.from { P = {} }"] = "there are no points to go to",
       ["rapid.translate(1, 0, 0)"] = "has no places to go to; it must be a mesh, a shape, points, or rapid.attr",
       ["3"] = "to = 3",
     } do
-      told = scene.error(("return rapid.create { points = two } :goal { to = %s } :solve {}"):format(to))
-      assert.truthy(told:find(message, 1, true), told)
+      reported = scene.error(("return rapid.create { points = two } :goal { to = %s } :solve {}"):format(to))
+      assert.truthy(reported:find(message, 1, true), reported)
     end
   end)
 end)

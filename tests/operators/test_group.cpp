@@ -72,7 +72,7 @@ TEST_CASE("a group needs a name", "[group]")
 TEST_CASE("a group that the plan leaves out is neither made nor tested", "[group]")
 {
     NodeTest group("group", {{"name", "hot"}});
-    group.left_out = {"group:hot"};
+    group.pruned = {"group:hot"};
     CHECK(group(2, points_at({{0, 0, 0}})).group_names().empty());
 }
 

@@ -216,7 +216,7 @@ TEST_CASE("merge drops what the plan leaves out", "[merge]")
     other.add({"wet", 1.0f});
     other.group("hot");
     NodeTest merge("merge", {}, here);
-    merge.left_out = {"heat", "group:hot"};
+    merge.pruned = {"heat", "group:hot"};
     const PointSet both = merge.evaluate(2, {Flow{points_at({{0, 0, 0}}), {}, here}, Flow{other, {}, there}}).points;
     CHECK(both.size() == 2);
     CHECK(both.column_names() == std::vector<std::string>{"P", "id", "v", "wet"});

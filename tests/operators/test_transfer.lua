@@ -98,7 +98,7 @@ end)
 
 describe("closest", function()
   -- The square from above, queried by a kernel.
-  local function asked(kernel, options, points, square)
+  local function requested(kernel, options, points, square)
     scene.folder:write("square.ply", ply)
     return scene.run(([[
 local square = %s
@@ -110,7 +110,7 @@ return rapid.create { fps = 24, points = %s }
   end
 
   it("is the nearest place of a mesh, and what the mesh has there of vertices and faces", function()
-    local points = asked [[
+    local points = requested [[
 p.near, p.heat, p.way = square:closest(p.P), square:closest(p.P, "heat"), square:closest(p.P, "way")
 p.wet = square:closest(p.P, "wet")]]
     assert.is_true(#points > 2000)
@@ -130,7 +130,7 @@ p.wet = square:closest(p.P, "wet")]]
       :transform(function(frame)
         return rapid.translate(0, 5, 0) * rapid.rotate({0, 0, 1}, 90 * (frame.number - 1))
       end)]]
-    local points = asked([[p.near, p.heat, p.way = square:closest(p.P), square:closest(p.P, "heat"),
+    local points = requested([[p.near, p.heat, p.way = square:closest(p.P), square:closest(p.P, "heat"),
       square:closest(p.P, "N") ]], nil, "rapid.points.from { P = {{3, 5.5, 0.2}} }", square)
     -- A quarter of a turn about z: x points up, and y to -x.
     assert.near({0, 5.5, 0.2}, points[1].near, 1e-5)
@@ -143,18 +143,18 @@ p.wet = square:closest(p.P, "wet")]]
       local at_height = ply:gsub("\n(%d) 0 (%d %d %d %d %d)", ("\n%%1 %d %%2"):format(file))
       scene.folder:write(("lift.%04d.ply"):format(file), at_height)
     end
-    local points = asked([[p.near, p.heat = square:closest(p.P), square:closest(p.P, "heat")]], nil,
+    local points = requested([[p.near, p.heat = square:closest(p.P), square:closest(p.P, "heat")]], nil,
       "rapid.points.from { P = {{0.25, 7, 0.5}} }", 'rapid.mesh.read "lift.####.ply"')
     assert.near({0.25, 2, 0.5}, points[1].near, 1e-5)
     assert.near(0.25, points[1].heat, 1e-5)
   end)
 
   it("is a place of a shape and of a level set within its band", function()
-    local points = asked("p.near = square:closest(p.P)", nil, "rapid.points.from { P = {{3, 0, 4}, {0, -9, 0}} }",
+    local points = requested("p.near = square:closest(p.P)", nil, "rapid.points.from { P = {{3, 0, 4}, {0, -9, 0}} }",
       "rapid.shape.sphere { radius = 1 }")
     assert.near({0.6, 0, 0.8}, points[1].near, 1e-6)
     assert.near({0, -1, 0}, points[2].near, 1e-6)
-    points = asked("p.near = square:closest(p.P)", nil, "rapid.points.from { P = {{1.05, 0, 0}} }",
+    points = requested("p.near = square:closest(p.P)", nil, "rapid.points.from { P = {{1.05, 0, 0}} }",
       "rapid.levelset.sphere { radius = 1, voxel = 0.05 }")
     assert.near({1, 0, 0}, points[1].near, 0.005) -- a tenth of a voxel
   end)
@@ -162,10 +162,10 @@ p.wet = square:closest(p.P, "wet")]]
   it("has the same bits on 1, 2 and 7 threads", function()
     local grid = "rapid.points.grid { size = {2, 2, 2}, spacing = 0.06 }"
     local kernel = [[p.near, p.heat = square:closest(p.P), square:closest(p.P, "heat")]]
-    local one = asked(kernel, { frames = {2, 2}, threads = 1 }, grid)
+    local one = requested(kernel, { frames = {2, 2}, threads = 1 }, grid)
     assert.is_true(#one > 30000)
     for _, threads in ipairs { 2, 7 } do
-      assert.same_points(one, asked(kernel, { frames = {2, 2}, threads = threads }, grid))
+      assert.same_points(one, requested(kernel, { frames = {2, 2}, threads = threads }, grid))
     end
   end)
 

@@ -25,7 +25,7 @@ double allocated(const std::vector<SurfaceTile>& tiles)
     return static_cast<double>(bytes);
 }
 
-double bytes_a_pixel(const PictureScene& scene)
+double bytes_per_pixel(const PictureScene& scene)
 {
     const PictureOptions options{.width = 20 * tile_size, .height = 15 * tile_size};
     const PictureView view = view_from_above();
@@ -45,14 +45,14 @@ PictureScene with_block()
 
 TEST_CASE("the surfaces of a picture take no more than is reckoned with", "[picture][surfaces]")
 {
-    CHECK(bytes_a_pixel({}) == Approx(surface_bytes_a_pixel(false)));  // the ground grid takes no shadows of points
+    CHECK(bytes_per_pixel({}) == Approx(surface_bytes_per_pixel(false)));  // the ground grid takes no shadows of points
 
     PictureScene walls;  // fill the whole picture
     walls.planes.push_back({Vec3d(0, 1, 0), 0});
     walls.planes.push_back({Vec3d(0, 0, 1), -20});
-    CHECK(bytes_a_pixel(walls) == Approx(surface_bytes_a_pixel(true)));
+    CHECK(bytes_per_pixel(walls) == Approx(surface_bytes_per_pixel(true)));
 
-    CHECK(bytes_a_pixel(with_block()) < surface_bytes_a_pixel(true));
+    CHECK(bytes_per_pixel(with_block()) < surface_bytes_per_pixel(true));
 }
 
 }  // namespace

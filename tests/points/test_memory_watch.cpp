@@ -17,8 +17,8 @@ namespace {
 
 using Catch::Matchers::Contains;
 
-struct Told {
-    std::atomic<int> beyond = 0, too_late = 0;
+struct Reported {
+    std::atomic<int> exceeded = 0, overrun = 0;
     std::string message;
 
     bool waits_for(const std::atomic<int>& count) const
@@ -29,21 +29,21 @@ struct Told {
 };
 
 // Allocates this many MiB while the memory is watched. With `leave`, stops when it is asked to end.
-void take(Told& told, std::size_t mebibytes, bool leave)
+void take(Reported& reported, std::size_t mebibytes, bool leave)
 {
     malloc_trim(0);  // releases memory that other tests freed, which the watch would do otherwise
     const MemoryWatch watch(
         MemoryWatch::now(),
         [&](const Error& error) {
-            told.message = error.message();
-            ++told.beyond;
+            reported.message = error.message();
+            ++reported.exceeded;
         },
-        [&](const Error&) { ++told.too_late; });
+        [&](const Error&) { ++reported.overrun; });
     const std::vector<char> memory(mebibytes << 20, 1);
     if (leave)
-        told.waits_for(told.beyond);
+        reported.waits_for(reported.exceeded);
     else
-        told.waits_for(told.too_late);
+        reported.waits_for(reported.overrun);
 }
 
 }  // namespace
@@ -51,29 +51,29 @@ void take(Told& told, std::size_t mebibytes, bool leave)
 TEST_CASE("a run is asked to end where it takes more than its budget, and once more where it does not", "[memory]")
 {
     const MemoryBudget budget(1);
-    Told leaves, stays, grows;
+    Reported leaves, stays, grows;
     take(leaves, 130, true);
-    CHECK(leaves.beyond == 1);
-    CHECK(leaves.too_late == 0);
+    CHECK(leaves.exceeded == 1);
+    CHECK(leaves.overrun == 0);
     CHECK_THAT(leaves.message, Contains("the run takes") && Contains("or set memory"));
     take(stays, 130, false);
-    CHECK(stays.beyond == 1);
-    CHECK(stays.too_late == 1);
+    CHECK(stays.exceeded == 1);
+    CHECK(stays.overrun == 1);
     take(grows, 300, false);
-    CHECK(grows.beyond == 1);
-    CHECK(grows.too_late == 1);
+    CHECK(grows.exceeded == 1);
+    CHECK(grows.overrun == 1);
 }
 
 TEST_CASE("little memory is let pass whatever the budget", "[memory]")
 {
     const MemoryBudget budget(1);
-    int told = 0;
+    int reported = 0;
     {
-        const MemoryWatch watch(MemoryWatch::now(), [&](const Error&) { ++told; }, {});
+        const MemoryWatch watch(MemoryWatch::now(), [&](const Error&) { ++reported; }, {});
         const std::vector<char> memory(std::size_t{32} << 20, 1);
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
-    CHECK(told == 0);
+    CHECK(reported == 0);
 }
 
 TEST_CASE("memory is not watched where nobody has set a budget", "[memory]")

@@ -10,13 +10,13 @@ using namespace rapid;
 
 namespace {
 
-std::vector<Vec3d> random_places(std::size_t n, double size)
+std::vector<Vec3d> random_positions(std::size_t n, double size)
 {
     std::mt19937_64 engine(7);
     std::uniform_real_distribution<double> uniform(-size, size);
-    std::vector<Vec3d> places(n);
-    for (Vec3d& P : places) P = {uniform(engine), uniform(engine), uniform(engine)};
-    return places;
+    std::vector<Vec3d> positions(n);
+    for (Vec3d& P : positions) P = {uniform(engine), uniform(engine), uniform(engine)};
+    return positions;
 }
 
 double root_mean_square(const std::vector<double>& values)
@@ -33,7 +33,7 @@ TEST_CASE("noise has the gradient that central differences find", "[noise]")
     const NoiseOptions options{GENERATE(0.0, 0.3, -7.6), GENERATE(1, 3), 5};
     CAPTURE(options.time, options.octaves);
     const double h = 1e-5;  // error of the differences: h²/6 of the third derivative, and 1e-16/h from rounding
-    for (const Vec3d& P : random_places(200, 20)) {
+    for (const Vec3d& P : random_positions(200, 20)) {
         Vec3d gradient;
         noise(P, options, &gradient);
         for (int axis = 0; axis < 3; ++axis) {
@@ -49,7 +49,7 @@ TEST_CASE("curl noise neither gathers nor spreads: its divergence is 0", "[noise
     const NoiseOptions options{GENERATE(0.0, 0.3), GENERATE(1, 3), 5};
     CAPTURE(options.time, options.octaves);
     const double h = 1e-5;
-    for (const Vec3d& P : random_places(200, 20)) {
+    for (const Vec3d& P : random_positions(200, 20)) {
         double divergence = 0, largest = 0;
         for (int axis = 0; axis < 3; ++axis) {
             const Vec3d step = h * Vec3d::Unit(axis);
@@ -90,7 +90,7 @@ TEST_CASE("noise stays in [-1, 1] with mean 0 and the root mean square that is p
     CAPTURE(options.time, options.octaves);
     std::vector<double> values;
     double sum = 0;
-    for (const Vec3d& P : random_places(100000, 1000)) {
+    for (const Vec3d& P : random_positions(100000, 1000)) {
         values.push_back(noise(P, options));
         REQUIRE(std::abs(values.back()) <= 1);
         sum += values.back();
@@ -105,7 +105,7 @@ TEST_CASE("curl noise has a root mean square length of 1, whatever the octaves",
     CAPTURE(options.octaves);
     std::vector<double> lengths;
     Vec3d sum = Vec3d::Zero();
-    for (const Vec3d& P : random_places(100000, 1000)) {
+    for (const Vec3d& P : random_positions(100000, 1000)) {
         const Vec3d curl = curl_noise(P, options);
         lengths.push_back(curl.norm());
         sum += curl;
@@ -118,7 +118,7 @@ TEST_CASE("noise and its curl are continuous across cells, in place and in time,
 {
     const double h = 1e-7;
     const int octaves = GENERATE(1, 3);
-    for (const Vec3d& inside : random_places(50, 5)) {
+    for (const Vec3d& inside : random_positions(50, 5)) {
         Vec3d P = inside;
         const int axis = static_cast<int>(std::abs(P.x()) * 100) % 3;
         P[axis] = std::round(P[axis]);  // on a face between two cells
@@ -136,7 +136,7 @@ TEST_CASE("curl noise just below a plane of its lattice is what it is on it", "[
 {
     const NoiseOptions options{0.3, 3, 5};
     const double below = GENERATE(-1e-300, -7e-21, -1e-17);
-    for (Vec3d P : random_places(200, 20)) {
+    for (Vec3d P : random_positions(200, 20)) {
         const int axis = static_cast<int>(std::abs(P.sum())) % 3;
         P[axis] = 0;
         const Vec3d on = curl_noise(P, options);
@@ -152,7 +152,7 @@ TEST_CASE("curl noise just below a plane of its lattice is what it is on it", "[
 TEST_CASE("noises two cells apart, of two seeds and of two times know nothing of each other", "[noise]")
 {
     std::vector<double> value, far, other_seed, later, next_axis;
-    for (const Vec3d& P : random_places(100000, 1000)) {
+    for (const Vec3d& P : random_positions(100000, 1000)) {
         value.push_back(noise(P, {}));
         far.push_back(noise(P + Vec3d(2, 0, 0), {}));
         next_axis.push_back(noise(Vec3d(P.y(), P.x(), P.z()), {}));
@@ -185,7 +185,7 @@ TEST_CASE("many points at once give the bits of each alone", "[noise]")
 {
     const NoiseOptions options{GENERATE(0.0, 0.3), 3, 9};
     for (const std::size_t n : {0, 1, 7, 8, 100}) {
-        const std::vector<Vec3d> P = random_places(n, 100);
+        const std::vector<Vec3d> P = random_positions(n, 100);
         std::vector<Vec3d> curl(n);
         curl_noise(P, options, curl);
         for (std::size_t i = 0; i < n; ++i) CHECK(curl[i] == curl_noise(P[i], options));

@@ -42,18 +42,18 @@ TEST_CASE("a text is UTF-8 without zeros", "[points][token]")
 
 TEST_CASE("threads that bring the same texts get the same tokens", "[points][token][threads]")
 {
-    constexpr std::size_t texts = 1000, calls = 64;
-    std::vector<std::vector<Token>> tokens(calls, std::vector<Token>(texts));
+    constexpr std::size_t strings = 1000, calls = 64;
+    std::vector<std::vector<Token>> tokens(calls, std::vector<Token>(strings));
     tbb::parallel_for(std::size_t{0}, calls, [&](std::size_t call) {
-        for (std::size_t k = 0; k < texts; ++k) {
-            const std::size_t text = (k * 7 + call * 13) % texts;
+        for (std::size_t k = 0; k < strings; ++k) {
+            const std::size_t text = (k * 7 + call * 13) % strings;
             tokens[call][text] = token_of(fmt::format("text {}", text));
             CHECK(tokens[call][text].text() == fmt::format("text {}", text));
         }
     });
     std::set<std::uint32_t> numbers;
     for (const Token token : tokens[0]) numbers.insert(token.number);
-    CHECK(numbers.size() == texts);
+    CHECK(numbers.size() == strings);
     for (const auto& other : tokens) CHECK(other == tokens[0]);
 }
 

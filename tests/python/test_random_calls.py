@@ -162,14 +162,14 @@ class Hostile:
 
 def hostile_calls(scene, frames, snapshots):
     """Returns (name, function) of calls that are refused and change nothing."""
-    texts = ["", "none", "P.x", "\x1b[2J", "\udcff", "a\0b", None, 3, b"P", "n" * 100000]
+    strings = ["", "none", "P.x", "\x1b[2J", "\udcff", "a\0b", None, 3, b"P", "n" * 100000]
     numbers = [2**64 + 2, -2**80, 1.5, math.nan, "2", None, [2]]
     paths = ["", "x", "x.none", "/dev/full/x.csv", "/dev/zero", "/", "a\0b"]
     all_calls = [("advance_to", lambda n=n: scene.advance_to(n)) for n in numbers]
-    for text in texts:
+    for text in strings:
         all_calls += [("set " + repr(text)[:20], lambda t=text: scene.set({t: 1})),
                       ("value " + repr(text)[:20], lambda t=text: scene.set(height=t if t != 3 else [3])),
-                      ("points_behind", lambda t=text: scene.points_behind(t, 2)),
+                      ("points_after", lambda t=text: scene.points_after(t, 2)),
                       ("graph", lambda t=text: scene.graph(t))]
     for values in ({"solve.substeps": -1}, {"solve.substeps": math.nan}, {"none.none": 1}, {"height": object()},
                    {"height": [1, 2]}, {"height": 1j}, 7):
@@ -198,7 +198,7 @@ def hostile_calls(scene, frames, snapshots):
     all_calls += [("restore", lambda: scene.restore(None)), ("restore", lambda: scene.restore(Hostile()))]
     if frames:
         frame = frames[-1][0]
-        for text in texts:
+        for text in strings:
             all_calls += [("column", lambda t=text: frame[t]), ("group", lambda t=text: frame.group(t)),
                           ("output", lambda t=text: frame.output(t)), ("detail", lambda t=text: frame.detail(t))]
         all_calls += [("write " + path, lambda p=path: frame.write(p)) for path in paths]

@@ -330,10 +330,10 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
         self.assertIn(["solve1"], [work["nodes"] for work in frame.profile_json])
         kept = {node["name"]: node["kept"] for node in scene.explain()["nodes"]}
         self.assertTrue(all(kept.values()))
-        behind = scene.points_behind("gravity1", 3)
+        behind = scene.points_after("gravity1", 3)
         self.assertEqual((behind.number, behind.outputs, len(behind)), (3, ["gravity1"], 16))
         with self.assertRaisesRegex(rapid.Error, "did you mean"):
-            scene.points_behind("gravty1", 3)
+            scene.points_after("gravty1", 3)
         life, = scene.trace([3], 2, 4)
         self.assertEqual((life["id"], [step["frame"] for step in life["steps"]]), (3, [2, 3, 4]))
         self.assertAlmostEqual(life["steps"][2]["values"]["P"][1], 10 - 9.81 / 2 / 8 ** 2, places=5)
@@ -417,12 +417,12 @@ return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :
                             ignore=shutil.ignore_patterns("__pycache__"))
             environment = {name: value for name, value in os.environ.items() if name != "RAPID_LIBRARY"}
             environment["PYTHONPATH"] = str(checkout / "bindings/python")
-            told = subprocess.run([sys.executable, "-B", "-c",
+            reported = subprocess.run([sys.executable, "-B", "-c",
                                    "import ctypes.util\nctypes.util.find_library = lambda name: None\nimport rapid"],
                                   env=environment, cwd=folder, capture_output=True, text=True)
-        self.assertNotEqual(told.returncode, 0)
+        self.assertNotEqual(reported.returncode, 0)
         self.assertIn(f"librapid_host.so is not built; type\n    {checkout}/rapid --version && "
-                      f"cmake --build {checkout}/build/release --target rapid_host_library", told.stderr)
+                      f"cmake --build {checkout}/build/release --target rapid_host_library", reported.stderr)
 
     def test_scenes_on_threads_give_the_same_bits(self):
         def bits(into, place):
@@ -460,9 +460,9 @@ class Runs(unittest.TestCase):
                     outcome = run.run()
                 self.assertEqual((outcome["ending"], outcome["last_frame"]), ("complete", 2))
             self.assertEqual(frames[:2], [(1, 16), (2, 16)])
-            told = rapid.merge_files([folder / "x_part{part}.####.csv"], folder / "merged.####.csv",
+            reported = rapid.merge_files([folder / "x_part{part}.####.csv"], folder / "merged.####.csv",
                                      lambda frame, points: merged.append(frame))
-            self.assertEqual((told, merged), ({"parts": 2, "frames": 2, "points": 32}, [1, 2]))
+            self.assertEqual((reported, merged), ({"parts": 2, "frames": 2, "points": 32}, [1, 2]))
             for number in ("0001", "0002"):
                 self.assertEqual((folder / f"merged.{number}.csv").read_text(), (folder / f"whole.{number}.csv").read_text())
 

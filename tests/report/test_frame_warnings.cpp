@@ -21,14 +21,14 @@ TEST_CASE("the kind of a warning has its place and its names, and none of its nu
 TEST_CASE("of warnings that differ in numbers ten are told, and the last of the rest with its frame", "[report]")
 {
     FrameWarnings warnings;
-    int told = 0;
+    int reported = 0;
     for (int frame = 1; frame <= 1000; ++frame) {
-        told += warnings.add(fmt::format("node \"a\": off by {} m", frame), frame);
-        told += warnings.add("node \"b\": the same", frame);
-        if (frame == 5) told += warnings.add("node \"c\": 1", frame);
+        reported += warnings.add(fmt::format("node \"a\": off by {} m", frame), frame);
+        reported += warnings.add("node \"b\": the same", frame);
+        if (frame == 5) reported += warnings.add("node \"c\": 1", frame);
     }
-    CHECK(told == 12);
-    CHECK(warnings.untold() ==
+    CHECK(reported == 12);
+    CHECK(warnings.suppressed() ==
           std::vector<std::string>{"990 more of this kind, the last in frame 1000: node \"a\": off by 1000 m"});
 }
 
@@ -38,14 +38,14 @@ TEST_CASE("what was told is not told again, after others of its kind either", "[
     CHECK(warnings.add("off by 1 m", 1));
     CHECK(warnings.add("off by 2 m", 2));
     CHECK_FALSE(warnings.add("off by 1 m", 3));
-    CHECK(warnings.untold().empty());
+    CHECK(warnings.suppressed().empty());
 }
 
 TEST_CASE("kinds of warnings without end are counted", "[report]")
 {
     FrameWarnings warnings;
-    std::size_t told = 0;
-    for (int i = 0; i < 5000; ++i) told += warnings.add(fmt::format("mesh \"{}\" is open", i), i);
-    CHECK(told == FrameWarnings::most_kinds);
-    CHECK(warnings.untold() == std::vector<std::string>{"4000 more of other kinds"});
+    std::size_t reported = 0;
+    for (int i = 0; i < 5000; ++i) reported += warnings.add(fmt::format("mesh \"{}\" is open", i), i);
+    CHECK(reported == FrameWarnings::max_kinds);
+    CHECK(warnings.suppressed() == std::vector<std::string>{"4000 more of other kinds"});
 }

@@ -120,9 +120,9 @@ TEST_CASE("points are found by their ids, and dead ones are not", "[kept]")
     Scene scene = test::opened(two_outputs);
     const SceneFrame frame = good(scene.advance_to(4));
     REQUIRE(frame.size() == 2);  // the one with id 0 has died
-    CHECK(good(frame.places({2, 0, 1, -1, 77, 2})) ==
-          std::vector<std::uint32_t>{1, SceneFrame::no_place, 0, SceneFrame::no_place, SceneFrame::no_place, 1});
-    CHECK(good(frame.places({})).empty());
+    CHECK(good(frame.indices({2, 0, 1, -1, 77, 2})) ==
+          std::vector<std::uint32_t>{1, SceneFrame::no_index, 0, SceneFrame::no_index, SceneFrame::no_index, 1});
+    CHECK(good(frame.indices({})).empty());
 }
 
 TEST_CASE("a number of spare columns that is no number of columns is refused", "[kept]")

@@ -79,16 +79,16 @@ TEST_CASE("merged parts are the points of all, in the order of their ids", "[mer
 {
     const Parts parts;
     const std::string whole = parts.folder / "deep/whole.####.bgeo";
-    std::vector<std::int64_t> told;
+    std::vector<std::int64_t> reported;
     const MergedFiles merged = good(merge_files({parts.all()}, whole, [&](std::int64_t frame, std::uint64_t count) {
         CHECK(count == points);
-        told.push_back(frame);
+        reported.push_back(frame);
         return true;
     }));
     CHECK(merged.parts == 2);
     CHECK(merged.frames == 3);
     CHECK(merged.points == 3 * points);
-    CHECK(told == std::vector<std::int64_t>{1, 2, 3});
+    CHECK(reported == std::vector<std::int64_t>{1, 2, 3});
 
     const SceneFrame frame = good(SceneFrame::read(parts.folder / "deep/whole.0002.bgeo"));
     const SceneColumn id = good(frame.column("id")), P = good(frame.column("P"));

@@ -25,9 +25,9 @@ Answer answer(const Result<T>& result)
 template <class T, class Handle>
 Answer taken(Result<T> result, Handle& handle)
 {
-    const Answer told = answer(result);
+    const Answer reported = answer(result);
     if (result) handle.emplace(std::move(*result));
-    return told;
+    return reported;
 }
 
 Hostile hostile_text(const std::string& text, const SceneOptions& options = {})
@@ -149,11 +149,11 @@ private:
              {TraceOptions{}, TraceOptions{{0}, "none"}, TraceOptions{{0}, "", 1, -5}, TraceOptions{{0}, "", 1, 2, 0}})
             all.push_back([&scene, options] { return answer(scene.trace(options)); });
         for (const auto& [node, frame] : {std::pair{"none", 2}, std::pair{"create1", -5}, std::pair{"", 2}})
-            all.push_back([&scene, node = node, frame = frame] { return answer(scene.points_behind(node, frame)); });
+            all.push_back([&scene, node = node, frame = frame] { return answer(scene.points_after(node, frame)); });
         all.push_back([&scene] { return answer(SceneInside::fingerprint(scene)); });
         all.push_back([&scene] { return answer(SceneInside::take_inputs(scene)); });
         for (const std::int64_t number : {std::int64_t{0}, std::numeric_limits<std::int64_t>::min()})
-            all.push_back([&scene, number] { return answer(SceneInside::points_behind_all(scene, number)); });
+            all.push_back([&scene, number] { return answer(SceneInside::points_after_nodes(scene, number)); });
     }
 
     static void add_offers(std::vector<Hostile>& all, rapid::Scene& scene)

@@ -87,17 +87,17 @@ TEST_CASE("the points behind a node are those before it, changed by its formula"
         "end "
         "end) :gravity {} :solve {} :points('later', function(p) p.heat = 0 end)");
     const float height_before = height(good(scene.advance_to(3)), 0);
-    const SceneFrame warm = good(scene.points_behind("warm", 3));
+    const SceneFrame warm = good(scene.points_after("warm", 3));
     CHECK(warm.outputs() == std::vector<std::string>{"warm"});
     CHECK(warm.number() == 3);
     CHECK(warm.time() == Approx(2 / 24.0));
     CHECK(warm.fps() == 24);
     REQUIRE(warm.size() == 1);  // the other one died in frame 2
     CHECK(*warm.column("heat")->at<float>(0) == 18);
-    CHECK(good(scene.points_behind("warm", 2)).size() == 2);
-    CHECK(good(scene.points_behind("cull", 2)).size() == 1);
-    CHECK(*good(scene.points_behind("solve1", 3)).column("heat")->at<float>(0) == 18);
-    CHECK(*good(scene.points_behind("later", 3)).column("heat")->at<float>(0) == 0);
+    CHECK(good(scene.points_after("warm", 2)).size() == 2);
+    CHECK(good(scene.points_after("cull", 2)).size() == 1);
+    CHECK(*good(scene.points_after("solve1", 3)).column("heat")->at<float>(0) == 18);
+    CHECK(*good(scene.points_after("later", 3)).column("heat")->at<float>(0) == 0);
     CHECK_THAT(good(scene.picture(warm)), StartsWith("\x89PNG"));
     CHECK(scene.next_frame() == 1);
     CHECK(height(good(scene.advance_to(3)), 0) == height_before);
@@ -110,7 +110,7 @@ TEST_CASE("points behind no node, or before the first frame, are an error", "[re
         "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } }\n"
         ":points('warm', function(p, frame) if frame.number == 4 then error 'hot' end end) :solve {}");
     const auto fault = [&](const char* node, std::int64_t frame) {
-        const Result<SceneFrame> points = scene.points_behind(node, frame);
+        const Result<SceneFrame> points = scene.points_after(node, frame);
         REQUIRE_FALSE(points);
         return points.error();
     };
@@ -263,17 +263,17 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
     const std::string file = folder.write("late.lua", "while true do end");
     SceneOptions options;
     options.script_seconds = 0.2;
-    std::atomic<int> told = 0;
+    std::atomic<int> reported = 0;
     std::string text;
     SceneHooks hooks;
-    hooks.late = [&](const std::string& message) {
-        if (told++ == 0) text = message;
+    hooks.on_script_timeout = [&](const std::string& message) {
+        if (reported++ == 0) text = message;
         throw 1;  // ignored
     };
     const Result<Scene> scene = SceneInside::open(file, options, hooks);
     REQUIRE_FALSE(scene);
     CHECK(scene.error().kind == SceneError::TooLong);
-    CHECK(told >= 1);
+    CHECK(reported >= 1);
     CHECK_THAT(text, Contains("runs for more than 0.2 s"));
 }
 
@@ -285,7 +285,7 @@ TEST_CASE("a program is told of the files that a scene reads, before they are re
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10, speed = require "speed" } :solve {})");
     std::vector<std::string> read;
     SceneHooks hooks;
-    hooks.reads = [&](const std::string& path) {
+    hooks.on_file_read = [&](const std::string& path) {
         read.push_back(path);
         throw 1;  // ignored
     };
@@ -299,7 +299,7 @@ TEST_CASE("points tell their errors, sub-steps and sleep where a program asks fo
     const std::string file = folder.write("told.lua", R"(local rapid = require "rapid"
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 } :gravity {} :solve { substeps = 3 })");
     SceneHooks hooks;
-    hooks.tell_points = true;
+    hooks.per_point_diagnostics = true;
     Scene scene = good(SceneInside::open(file, {}, hooks));
     const SceneFrame frame = good(scene.advance_to(4));
     REQUIRE(frame.size() > 100);

@@ -48,7 +48,7 @@ RunOptions options(const test::TemporaryFolder& folder, RunFrames frames = {1, 8
 }
 
 // Records the callbacks of a run.
-struct Told {
+struct Reported {
     std::vector<RunFrame> frames;
     std::vector<std::string> lines, warnings;
     std::function<void(const RunFrame&)> on_frame;
@@ -66,9 +66,9 @@ struct Told {
     }
 };
 
-SceneRun made(RunOptions asked, RunListener listener = {}, SceneOptions scene = {})
+SceneRun made(RunOptions requested, RunListener listener = {}, SceneOptions scene = {})
 {
-    return good(SceneRun::make("cloud.lua", std::move(scene), std::move(asked), std::move(listener)));
+    return good(SceneRun::make("cloud.lua", std::move(scene), std::move(requested), std::move(listener)));
 }
 
 RunOutcome outcome_of(SceneRun& run)
@@ -77,27 +77,27 @@ RunOutcome outcome_of(SceneRun& run)
     return good(run.run());
 }
 
-RunOutcome complete(RunOptions asked, RunListener listener = {}, SceneOptions scene = {})
+RunOutcome complete(RunOptions requested, RunListener listener = {}, SceneOptions scene = {})
 {
-    SceneRun run = made(std::move(asked), std::move(listener), std::move(scene));
+    SceneRun run = made(std::move(requested), std::move(listener), std::move(scene));
     RunOutcome outcome = outcome_of(run);
     if (outcome.error) FAIL(outcome.error->text());
     REQUIRE(outcome.ending == RunOutcome::Complete);
     return outcome;
 }
 
-void check_wrong(const RunOptions& asked, const std::string& message)
+void check_wrong(const RunOptions& requested, const std::string& message)
 {
-    const Result<SceneRun> run = SceneRun::make("cloud.lua", {}, asked);
+    const Result<SceneRun> run = SceneRun::make("cloud.lua", {}, requested);
     REQUIRE_FALSE(run);
     CHECK(run.error().kind == SceneError::WrongCall);
     CHECK_THAT(run.error().message, Contains(message));
 }
 
-void check_unprepared(const RunOptions& asked, const std::string& message,
+void check_unprepared(const RunOptions& requested, const std::string& message,
                       SceneError::Kind kind = SceneError::WrongScene)
 {
-    SceneRun run = made(asked);
+    SceneRun run = made(requested);
     const Result<Done> prepared = run.prepare();
     REQUIRE_FALSE(prepared);
     CHECK(prepared.error().kind == kind);
@@ -112,29 +112,29 @@ void check_unprepared(const RunOptions& asked, const std::string& message,
 TEST_CASE("a run writes the points of the frames that a scene computes", "[run]")
 {
     const test::TemporaryFolder folder;
-    RunOptions asked = options(folder, {3, 7, 2});
-    asked.statistics = folder / "statistics.json";
-    asked.events = folder / "events.csv";
-    asked.profile = folder / "profile.json";
-    Told told;
-    SceneRun run = made(asked, told.listener());
+    RunOptions requested = options(folder, {3, 7, 2});
+    requested.statistics = folder / "statistics.json";
+    requested.events = folder / "events.csv";
+    requested.profile = folder / "profile.json";
+    Reported reported;
+    SceneRun run = made(requested, reported.listener());
     good(run.prepare());
     CHECK(run.first_frame() == 1);
     CHECK(run.frames().last == 7);
-    CHECK_FALSE(fs::exists(asked.statistics));
+    CHECK_FALSE(fs::exists(requested.statistics));
     const RunOutcome outcome = good(run.run());
     CHECK(outcome.ending == RunOutcome::Complete);
     CHECK(outcome.last_frame == 7);
     CHECK_THAT(outcome.summary, StartsWith("points "));
-    CHECK(told.warnings.empty());
-    REQUIRE(told.lines.size() == 1);
-    CHECK_THAT(told.lines.front(), Contains("cloud.0003.csv"));
+    CHECK(reported.warnings.empty());
+    REQUIRE(reported.lines.size() == 1);
+    CHECK_THAT(reported.lines.front(), Contains("cloud.0003.csv"));
 
     Scene scene = test::opened(cloud);
-    REQUIRE(told.frames.size() == 7);
+    REQUIRE(reported.frames.size() == 7);
     for (std::int64_t number = 1; number <= 7; ++number) {
         const SceneFrame frame = good(scene.advance_to(number));
-        const RunFrame& one = told.frames[static_cast<std::size_t>(number - 1)];
+        const RunFrame& one = reported.frames[static_cast<std::size_t>(number - 1)];
         CHECK(one.number == number);
         CHECK(one.points == frame.size());
         CHECK_FALSE(one.is_known);
@@ -144,11 +144,11 @@ TEST_CASE("a run writes the points of the frames that a scene computes", "[run]"
         good(frame.write(folder / "expected.csv"));
         CHECK(content(file) == content(folder / "expected.csv"));
     }
-    const auto statistics = nlohmann::json::parse(content(asked.statistics));
+    const auto statistics = nlohmann::json::parse(content(requested.statistics));
     CHECK(statistics.at("frames").size() == 7);
     CHECK(statistics.at("graph") == "cloud.lua");
-    CHECK_FALSE(nlohmann::json::parse(content(asked.profile)).empty());
-    CHECK(good(SceneFrame::read(asked.events)).size() > 100);
+    CHECK_FALSE(nlohmann::json::parse(content(requested.profile)).empty());
+    CHECK(good(SceneFrame::read(requested.events)).size() > 100);
 }
 
 TEST_CASE("a run that was ended goes on in another one to the same files", "[run]")
@@ -156,12 +156,12 @@ TEST_CASE("a run that was ended goes on in another one to the same files", "[run
     const test::TemporaryFolder whole, parts;
     complete(options(whole));
 
-    RunOptions asked = options(parts);
-    asked.cache = {parts / "cache", 3};
+    RunOptions requested = options(parts);
+    requested.cache = {parts / "cache", 3};
     {
-        Told told;
-        SceneRun run = made(asked, told.listener());
-        told.on_frame = [&](const RunFrame& frame) {
+        Reported reported;
+        SceneRun run = made(requested, reported.listener());
+        reported.on_frame = [&](const RunFrame& frame) {
             if (frame.number == 5) run.end_after_frame();
         };
         const RunOutcome outcome = outcome_of(run);
@@ -170,14 +170,14 @@ TEST_CASE("a run that was ended goes on in another one to the same files", "[run
         CHECK_FALSE(outcome.error);
         CHECK_FALSE(fs::exists(parts / "cloud.0006.csv"));
     }
-    Told told;
+    Reported reported;
     bool keeps = false;
-    RunListener listener = told.listener();
+    RunListener listener = reported.listener();
     listener.begins = [&](bool keeps_snapshots) { keeps = keeps_snapshots; };
-    complete(asked, listener);
+    complete(requested, listener);
     CHECK(keeps);
-    REQUIRE(told.frames.size() == 8);
-    for (const RunFrame& frame : told.frames) CHECK(frame.is_known == (frame.number <= 5));
+    REQUIRE(reported.frames.size() == 8);
+    for (const RunFrame& frame : reported.frames) CHECK(frame.is_known == (frame.number <= 5));
     for (int number = 1; number <= 8; ++number) {
         const std::string file = "cloud.000" + std::to_string(number) + ".csv";
         CHECK(content(whole / file) == content(parts / file));
@@ -187,14 +187,14 @@ TEST_CASE("a run that was ended goes on in another one to the same files", "[run
     SceneOptions other;
     other.set = {{"rate", 1000.0}};
     {
-        SceneRun refused = made(asked, {}, other);
+        SceneRun refused = made(requested, {}, other);
         good(refused.prepare());
         const Result<RunOutcome> outcome = refused.run();
         REQUIRE_FALSE(outcome);
         CHECK_THAT(outcome.error().message, Contains("rate was 2000, is 1000"));
     }
-    asked.cache.replace = true;
-    complete(asked, {}, other);
+    requested.cache.replace = true;
+    complete(requested, {}, other);
 }
 
 TEST_CASE("without a cache a run ends behind its frame all the same", "[run]")
@@ -216,9 +216,9 @@ TEST_CASE("the parts of a run have the points of the whole", "[run]")
     const SceneFrame whole = good(SceneFrame::read(folder / "cloud.0008.csv"));
     std::size_t points = 0;
     for (int number = 1; number <= 3; ++number) {
-        RunOptions asked = options(folder);
-        asked.part = {number, 3};
-        complete(asked);
+        RunOptions requested = options(folder);
+        requested.part = {number, 3};
+        complete(requested);
         points += good(SceneFrame::read(folder / ("cloud_part" + std::to_string(number) + "of3.0008.csv"))).size();
     }
     REQUIRE(whole.size() > 100);
@@ -246,12 +246,12 @@ TEST_CASE("the parts of a run have the points of the whole", "[run]")
 TEST_CASE("a frame that fails ends a run, and those before it are written", "[run]")
 {
     const test::TemporaryFolder folder;
-    RunOptions asked = options(folder);
-    asked.text = R"(local rapid = require "rapid"
+    RunOptions requested = options(folder);
+    requested.text = R"(local rapid = require "rapid"
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
   :points("late", function(p) if p.age > 0.15 then error("too old") end end) :solve {})";
-    asked.statistics = folder / "statistics.json";
-    SceneRun run = made(asked);
+    requested.statistics = folder / "statistics.json";
+    SceneRun run = made(requested);
     const RunOutcome outcome = outcome_of(run);
     CHECK(outcome.ending == RunOutcome::Failed);
     REQUIRE(outcome.error);
@@ -262,7 +262,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
     REQUIRE(outcome.last_frame >= 2);
     for (std::int64_t number = 1; number <= outcome.last_frame; ++number)
         CHECK(fs::exists(folder / ("cloud.000" + std::to_string(number) + ".csv")));
-    CHECK(nlohmann::json::parse(content(asked.statistics)).at("frames").size() ==
+    CHECK(nlohmann::json::parse(content(requested.statistics)).at("frames").size() ==
           static_cast<std::size_t>(outcome.last_frame));
 
     const Result<RunOutcome> again = run.run();
@@ -273,12 +273,12 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
 TEST_CASE("a run is cancelled from another thread", "[run]")
 {
     const test::TemporaryFolder folder;
-    RunOptions asked = options(folder, {1, 100000});
-    asked.files.outputs.clear();
+    RunOptions requested = options(folder, {1, 100000});
+    requested.files.outputs.clear();
     std::atomic<std::int64_t> frame = 0;
     RunListener listener;
     listener.frame = [&](const RunFrame& one) { frame = one.number; };
-    SceneRun run = made(asked, listener);
+    SceneRun run = made(requested, listener);
     std::thread other([&] {
         while (frame < 3) std::this_thread::yield();
         run.cancel();
@@ -294,25 +294,25 @@ TEST_CASE("a run is cancelled from another thread", "[run]")
 TEST_CASE("a run is abandoned between two frames, or not at all", "[run]")
 {
     const test::TemporaryFolder folder;
-    RunOptions asked = options(folder);
-    asked.statistics = folder / "statistics.json";
-    Told told;
-    SceneRun run = made(asked, told.listener());
+    RunOptions requested = options(folder);
+    requested.statistics = folder / "statistics.json";
+    Reported reported;
+    SceneRun run = made(requested, reported.listener());
     bool is_abandoned = true;
-    told.on_frame = [&](const RunFrame& frame) {  // during a callback
+    reported.on_frame = [&](const RunFrame& frame) {  // during a callback
         if (frame.number == 3) std::thread([&] { is_abandoned = SceneInside::abandon(run).has_value(); }).join();
         if (frame.number == 4) run.end_after_frame();
     };
     CHECK(outcome_of(run).last_frame == 4);
     CHECK_FALSE(is_abandoned);
 
-    asked.statistics = folder / "abandoned.json";
-    SceneRun prepared = made(asked);
+    requested.statistics = folder / "abandoned.json";
+    SceneRun prepared = made(requested);
     good(prepared.prepare());
     const std::optional<Abandoned> abandoned = SceneInside::abandon(prepared);
     REQUIRE(abandoned);
     CHECK(abandoned->unwritten.empty());
-    CHECK(nlohmann::json::parse(content(asked.statistics)).at("frames").empty());
+    CHECK(nlohmann::json::parse(content(requested.statistics)).at("frames").empty());
 }
 
 TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
@@ -321,9 +321,9 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     const RunOptions right = options(folder);
     CHECK_FALSE(SceneRun::make("", {}, right));
     const auto wrong = [&](const auto& change, const std::string& message) {
-        RunOptions asked = right;
-        change(asked);
-        check_wrong(asked, message);
+        RunOptions requested = right;
+        change(requested);
+        check_wrong(requested, message);
     };
     wrong([](RunOptions& o) { o.frames = RunFrames{1, 4, 0}; }, "frames 1-4x0");
     wrong([](RunOptions& o) { o.frames = RunFrames{4, 1}; }, "frames 4-1x1");
@@ -361,9 +361,9 @@ TEST_CASE("what is wrong with a scene and its files is found before the first fr
     const test::TemporaryFolder folder;
     const RunOptions right = options(folder);
     const auto wrong = [&](const auto& change, const std::string& message) {
-        RunOptions asked = right;
-        change(asked);
-        check_unprepared(asked, message);
+        RunOptions requested = right;
+        change(requested);
+        check_unprepared(requested, message);
     };
     wrong([](RunOptions& o) { o.text = "local rapid = require 'rapid'\nreturn rapid.creat {}"; }, "cloud.lua:2: ");
     wrong([](RunOptions& o) { o.text = std::nullopt; }, "cloud.lua");
@@ -407,17 +407,17 @@ TEST_CASE("runs at once do not write one file of a node", "[run]")
 {
     const test::TemporaryFolder folder;
     fs::create_directory(folder / "claims");
-    RunOptions asked = options(folder);
-    asked.text = R"(local rapid = require "rapid"
+    RunOptions requested = options(folder);
+    requested.text = R"(local rapid = require "rapid"
 return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :solve {}
   :write { file = ")" +
-                 (folder / "node.####.csv").string() + R"(" })";
-    asked.files.outputs.clear();
-    asked.claims = folder / "claims";
-    asked.statistics = folder / "a.json";
-    complete(asked);
-    asked.statistics = folder / "b.json";
-    check_unprepared(asked, "node.####.csv");
+                     (folder / "node.####.csv").string() + R"(" })";
+    requested.files.outputs.clear();
+    requested.claims = folder / "claims";
+    requested.statistics = folder / "a.json";
+    complete(requested);
+    requested.statistics = folder / "b.json";
+    check_unprepared(requested, "node.####.csv");
 }
 
 TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
@@ -431,23 +431,23 @@ TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
     for (const OutputFormat& format : SceneInside::output_formats())
         CHECK(good(SceneInside::output_format("a.####" + format.extension)).is_film == format.is_film);
 
-    RunOptions asked = options(folder);
-    asked.files.outputs = {folder / "points/{output}/a.####.csv", folder / "b.####.csv"};
-    asked.statistics = folder / "told/s.json";
-    asked.cache.folder = folder / "cache";
-    const std::vector<std::string> folders = good(SceneInside::output_folders(asked));
+    RunOptions requested = options(folder);
+    requested.files.outputs = {folder / "points/{output}/a.####.csv", folder / "b.####.csv"};
+    requested.statistics = folder / "told/s.json";
+    requested.cache.folder = folder / "cache";
+    const std::vector<std::string> folders = good(SceneInside::output_folders(requested));
     CHECK(folders == std::vector<std::string>{folder / "points", folder.path(), folder / "told", folder / "cache"});
     for (const std::string& one : folders) CHECK(fs::is_directory(one));
-    asked.part = {2, 4};
-    asked.files.outputs = {folder / "{part}/a.####.csv"};
-    asked.statistics = folder / "told{part}/s.json";
-    asked.claims = folder / "claims";
-    CHECK(good(SceneInside::output_folders(asked)) ==
+    requested.part = {2, 4};
+    requested.files.outputs = {folder / "{part}/a.####.csv"};
+    requested.statistics = folder / "told{part}/s.json";
+    requested.claims = folder / "claims";
+    CHECK(good(SceneInside::output_folders(requested)) ==
           std::vector<std::string>{folder / "2of4", folder / "told2of4", folder / "cache", folder / "claims"});
     CHECK(fs::is_directory(folder / "told2of4"));
     CHECK_FALSE(fs::exists(folder / "told{part}"));
-    asked.files.outputs = {"/proc/none/a.####.csv"};
-    CHECK_FALSE(SceneInside::output_folders(asked));
+    requested.files.outputs = {"/proc/none/a.####.csv"};
+    CHECK_FALSE(SceneInside::output_folders(requested));
 }
 
 TEST_CASE("what a plan keeps for files is explained", "[run]")

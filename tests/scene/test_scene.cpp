@@ -374,7 +374,7 @@ TEST_CASE("a stop that is asked for ends opening, and all that a scene does late
         const std::jthread other = after(stop, 50);
         CHECK(scene.advance().error().kind == SceneError::Cancelled);
         CHECK(scene.restart().error().kind == SceneError::Cancelled);
-        CHECK(SceneInside::points_behind_all(scene, 1).error().kind == SceneError::Cancelled);
+        CHECK(SceneInside::points_after_nodes(scene, 1).error().kind == SceneError::Cancelled);
         CHECK(scene.shapes(1).error().kind == SceneError::Cancelled);
         CHECK(SceneInside::arguments(scene, 1).error().kind == SceneError::Cancelled);
         CHECK(first.size() > 0);
@@ -388,21 +388,21 @@ TEST_CASE("a stop that is asked for ends opening, and all that a scene does late
 TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
 {
     const test::TemporaryFolder folder;
-    std::vector<std::string> told;
+    std::vector<std::string> reported;
     SceneHooks hooks;
     hooks.parameters = [&](const std::vector<SceneParameter>& parameters) {
-        for (const SceneParameter& parameter : parameters) told.push_back(parameter.name);
+        for (const SceneParameter& parameter : parameters) reported.push_back(parameter.name);
         throw std::runtime_error("dropped");
     };
     const auto file = folder.write("scene.lua",
                                    "local rapid = require 'rapid'\nlocal s = rapid.param('steps', 0, 'sub-steps')\n"
                                    "return rapid.create {} :solve { substeps = s }");
     CHECK_FALSE(SceneInside::open(file, {}, hooks));
-    CHECK(told == std::vector<std::string>{"steps"});
+    CHECK(reported == std::vector<std::string>{"steps"});
     SceneOptions right;
     right.set = {{"steps", 2.0}};
     CHECK(good(SceneInside::open(file, right, hooks)).next_frame() == 1);
-    CHECK(told.size() == 2);
+    CHECK(reported.size() == 2);
 }
 
 // A frame that takes minutes without a script; the test ends because it is cancelled.
@@ -432,16 +432,16 @@ TEST_CASE("another thread cancels a frame that is long in itself", "[scene]")
 
 TEST_CASE("the progress callback is told of each frame, and ends the run", "[scene]")
 {
-    std::vector<std::int64_t> told;
+    std::vector<std::int64_t> reported;
     SceneOptions options;
     options.progress = [&](std::int64_t frame, std::int64_t last) {
         CHECK(last == 9);
-        told.push_back(frame);
+        reported.push_back(frame);
         return frame < 4;
     };
     Scene scene = opened(cloud, options);
     CHECK(scene.advance_to(9).error().kind == SceneError::Cancelled);
-    CHECK(told == std::vector<std::int64_t>{1, 2, 3, 4});
+    CHECK(reported == std::vector<std::int64_t>{1, 2, 3, 4});
     Scene whole = opened(cloud);
     good(whole.advance_to(4));
     CHECK(bits_of(good(scene.advance())) == run(whole, 5));

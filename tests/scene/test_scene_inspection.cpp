@@ -78,7 +78,7 @@ TEST_CASE("a scene that tells points has the attributes of its solve", "[inspect
     const test::TemporaryFolder folder;
     const auto file = folder.write("scene.lua", std::string("local rapid = require 'rapid'\n") + warm);
     SceneHooks hooks;
-    hooks.tell_points = true;
+    hooks.per_point_diagnostics = true;
     Scene scene = good(SceneInside::open(file, {}, hooks));
     for (const char* const name : {"error", "substeps", "asleep"}) {
         CHECK(found(good(SceneInside::attributes(scene)), name).is_kept);
@@ -106,12 +106,12 @@ TEST_CASE("points behind all nodes are those behind each, and the scene stays wh
     good(scene.advance_to(3));
     const SceneSnapshot snapshot = good(scene.save());
     good(scene.advance_to(5));
-    const auto from_start = good(SceneInside::points_behind_all(scene, 4));
+    const auto from_start = good(SceneInside::points_after_nodes(scene, 4));
     CHECK(scene.next_frame() == 6);
     const SceneFrame sixth = good(scene.advance());
 
     Scene again = opened(warm);
-    const auto from_snapshot = good(SceneInside::points_behind_all(again, 4, snapshot));
+    const auto from_snapshot = good(SceneInside::points_after_nodes(again, 4, snapshot));
     check_equal(sixth, good(again.advance_to(6)));
     REQUIRE(from_start.size() == from_snapshot.size());
     for (const auto& [node, points] : from_start) {
@@ -120,7 +120,7 @@ TEST_CASE("points behind all nodes are those behind each, and the scene stays wh
         CHECK(points.number() == 4);
         CHECK(points.time() == Approx(3 / 24.0));
         check_equal(points, from_snapshot.at(node));
-        check_equal(points, good(again.points_behind(node, 4)));
+        check_equal(points, good(again.points_after(node, 4)));
     }
     CHECK(from_start.contains("warm"));
     CHECK(from_start.contains("solve1"));
@@ -131,25 +131,25 @@ TEST_CASE("points behind all nodes are other ones where parameters are", "[inspe
     Scene scene = opened(
         "local x = rapid.param('x', 1, 'm')\n"
         "return rapid.create { points = rapid.points.from { P = {{x, 0, 0}} } } :solve {}");
-    CHECK(good(SceneInside::points_behind_all(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 1);
+    CHECK(good(SceneInside::points_after_nodes(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 1);
     good(scene.set("x", 4.0));
-    CHECK(good(SceneInside::points_behind_all(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 4);
+    CHECK(good(SceneInside::points_after_nodes(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 4);
 }
 
 TEST_CASE("a wrong frame or snapshot for the points behind nodes is refused", "[inspection]")
 {
     Scene scene = opened(warm);
-    const SceneError early = SceneInside::points_behind_all(scene, 0).error();
+    const SceneError early = SceneInside::points_after_nodes(scene, 0).error();
     CHECK(early.kind == SceneError::WrongCall);
     CHECK_THAT(early.message, Contains("before the scene's first, 1"));
 
     good(scene.advance_to(3));
     const SceneSnapshot third = good(scene.save());
-    CHECK_THAT(SceneInside::points_behind_all(scene, 3, third).error().message,
+    CHECK_THAT(SceneInside::points_after_nodes(scene, 3, third).error().message,
                Contains("behind frame 3; frame 3 takes one"));
     Scene other = opened("return rapid.create {} :solve {}");
     good(other.advance());
-    CHECK_THAT(SceneInside::points_behind_all(scene, 3, good(other.save())).error().message,
+    CHECK_THAT(SceneInside::points_after_nodes(scene, 3, good(other.save())).error().message,
                Contains("of another graph"));
     CHECK(good(scene.advance()).number() == 4);
 }
@@ -160,10 +160,10 @@ TEST_CASE("a frame that fails has no points behind nodes, and the frames before 
         "return rapid.create { points = rapid.points.grid {} }\n"
         ":points('hot', function(p, frame) if frame.number == 3 then error 'hot' end end) :solve {}");
     CHECK(scene.advance_to(3).error().kind == SceneError::FailedFrame);
-    const SceneError error = SceneInside::points_behind_all(scene, 3).error();
+    const SceneError error = SceneInside::points_after_nodes(scene, 3).error();
     CHECK(error.kind == SceneError::FailedFrame);
     CHECK(error.node == "hot");
-    CHECK(good(SceneInside::points_behind_all(scene, 2)).contains("hot"));
+    CHECK(good(SceneInside::points_after_nodes(scene, 2)).contains("hot"));
 }
 
 TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
@@ -213,7 +213,7 @@ TEST_CASE("a graph without places has the nodes of the one that is laid out", "[
 
     // The same graph with another value keeps its layout.
     const GraphLayout kept = layout;
-    layout.places = "{}";
+    layout.positions = "{}";
     CHECK_FALSE(good(SceneInside::graph_json(scene, &layout)) == laid_out);
     layout.graph = "of another one";
     CHECK(good(SceneInside::graph_json(scene, &layout)) == laid_out);

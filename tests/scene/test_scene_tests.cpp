@@ -14,7 +14,7 @@ namespace {
 using Catch::Contains;
 using test::good;
 
-struct Told {
+struct Reported {
     std::vector<SceneTestEvent> events;
 
     std::function<void(const SceneTestEvent& event)> listener()
@@ -44,19 +44,19 @@ TEST_CASE("each test of a file is told when it starts and ends", "[tests]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);
-    Told told;
-    good(run_scene_tests(file, {}, told.listener()));
-    CHECK(told.lines() == std::vector<std::string>{"started a file holds", "passed a file holds",
-                                                   "started a file fails", "failed a file fails",
-                                                   "started a file waits", "skipped a file waits"});
-    CHECK_THAT(told.events[3].message, Contains("test_three.lua:3: "));
+    Reported reported;
+    good(run_scene_tests(file, {}, reported.listener()));
+    CHECK(reported.lines() == std::vector<std::string>{"started a file holds", "passed a file holds",
+                                                       "started a file fails", "failed a file fails",
+                                                       "started a file waits", "skipped a file waits"});
+    CHECK_THAT(reported.events[3].message, Contains("test_three.lua:3: "));
 }
 
 TEST_CASE("tests are chosen by name, and those before one that ended its process are left out", "[tests]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);
-    Told named, rest;
+    Reported named, rest;
     good(run_scene_tests(file, {"file h", 0, 0, {}}, named.listener()));
     CHECK(named.lines() == std::vector<std::string>{"started a file holds", "passed a file holds"});
     good(run_scene_tests(file, {"", 2, 0, {}}, rest.listener()));
@@ -73,13 +73,14 @@ TEST_CASE("a scene that a test runs is stopped when its script takes too long, a
     const std::string file = folder.write("test_endless.lua", "it('ends', function() rapid.run('" + scene +
                                                                   "', { frames = {1, 2}, script_timeout = 0.2 }) end)\n"
                                                                   "it('goes on', function() end)\n");
-    Told told;
+    Reported reported;
     std::string late;
     SceneTestOptions options;
-    options.late = [&](const std::string& message) { late = message; };
-    good(run_scene_tests(file, options, told.listener()));
-    CHECK(told.lines() == std::vector<std::string>{"started ends", "failed ends", "started goes on", "passed goes on"});
-    CHECK_THAT(told.events[1].message, Contains("runs for more than 0.2 s"));
+    options.on_script_timeout = [&](const std::string& message) { late = message; };
+    good(run_scene_tests(file, options, reported.listener()));
+    CHECK(reported.lines() ==
+          std::vector<std::string>{"started ends", "failed ends", "started goes on", "passed goes on"});
+    CHECK_THAT(reported.events[1].message, Contains("runs for more than 0.2 s"));
     CHECK_THAT(late, Contains("runs for more than 0.2 s"));
 }
 
@@ -87,11 +88,11 @@ TEST_CASE("a file that can't be run is broken, and wrong options are refused", "
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_bad.lua", "it('never ends', function()\n");
-    Told told;
-    good(run_scene_tests(file, {}, told.listener()));
-    REQUIRE(told.events.size() == 1);
-    CHECK(told.events[0].kind == SceneTestEvent::Broken);
-    CHECK_THAT(told.events[0].message, Contains("test_bad.lua"));
+    Reported reported;
+    good(run_scene_tests(file, {}, reported.listener()));
+    REQUIRE(reported.events.size() == 1);
+    CHECK(reported.events[0].kind == SceneTestEvent::Broken);
+    CHECK_THAT(reported.events[0].message, Contains("test_bad.lua"));
 
     CHECK(run_scene_tests(file, {"", -1, 0, {}}, {}).error().kind == SceneError::WrongCall);
     CHECK(run_scene_tests(file, {"", 0, -1, {}}, {}).error().kind == SceneError::WrongCall);
@@ -101,13 +102,13 @@ TEST_CASE("what the program throws while it is told is an error behind the last 
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);
-    int told = 0;
+    int reported = 0;
     const Result<Done> done = run_scene_tests(file, {}, [&](const SceneTestEvent&) {
-        ++told;
+        ++reported;
         throw std::runtime_error("not now");
     });
     REQUIRE_FALSE(done);
-    CHECK(told == 1);
+    CHECK(reported == 1);
     CHECK_THAT(done.error().message, Contains("the program's listener threw: not now"));
 }
 

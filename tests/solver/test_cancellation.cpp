@@ -15,9 +15,9 @@ using test::Scene;
 TEST_CASE("a step of hours ends when another thread cancels it", "[solve][threads]")
 {
     const bool is_barrier = GENERATE(false, true);
-    std::vector<Vec3f> places;
-    for (int i = 0; i < 20000; ++i) places.emplace_back(0.01f * static_cast<float>(i), 1, 0);
-    Scene scene(points(places));
+    std::vector<Vec3f> positions;
+    for (int i = 0; i < 20000; ++i) positions.emplace_back(0.01f * static_cast<float>(i), 1, 0);
+    Scene scene(points(positions));
     std::atomic<bool> has_begun = false;
     scene.force([&](const auto&, std::size_t) {
         has_begun = true;
@@ -42,7 +42,7 @@ TEST_CASE("a step of hours ends when another thread cancels it", "[solve][thread
     CHECK(message == Cancellation::cancelled().message());
 
     // Nothing is cancelled outside the scope.
-    Scene next(points(places));
+    Scene next(points(positions));
     next.gravity();
     next.options.interacts = is_barrier;
     CHECK_NOTHROW(next.run(1));

@@ -87,9 +87,9 @@ TEST_CASE("the residue is what the frame has changed beside gravity and what is 
     after.kinetic += 0.5;
     CHECK_FALSE(residue({}).is_rounding());
     CHECK(residue({}).energy == Approx(0.5 / (2.5 + 1)));  // of the kinetic energy, plus the energy from gravity
-    EnergyChanges told;
-    told.contacts = 0.5;
-    CHECK(residue(told).is_rounding());
+    EnergyChanges reported;
+    reported.contacts = 0.5;
+    CHECK(residue(reported).is_rounding());
     after.kinetic -= 1;  // breaking rows remove energy
     CHECK(residue({}).is_rounding());
 

@@ -160,9 +160,9 @@ TEST_CASE("forces are evaluated at the middle of each point's own sub-step", "[s
     });
     scene.frame_length(1).substeps(2).run(1);
 
-    using Told = std::vector<std::array<double, 3>>;
-    CHECK(heard[0] == Told{{0.25, 0.5, 0.25}, {0.75, 0.5, 0.75}});
-    CHECK(heard[1] == Told{{0.625, 0.25, 0.125}, {0.875, 0.25, 0.375}});
+    using Reported = std::vector<std::array<double, 3>>;
+    CHECK(heard[0] == Reported{{0.25, 0.5, 0.25}, {0.75, 0.5, 0.75}});
+    CHECK(heard[1] == Reported{{0.625, 0.25, 0.125}, {0.875, 0.25, 0.375}});
 }
 
 TEST_CASE("sets of no, one and two points are advanced", "[solve][extreme]")

@@ -253,15 +253,15 @@ return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, F =
   end)
 
   it("is told as exact where it is", function()
-    local function told(shape)
+    local function reported(shape)
       local result = scene.command("run", ([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 20, 0}} } }
   :spring { target = %s, stiffness = 1e6 } :solve {}]]):format(shape), "-f 1-6")
       assert.equal(0, result.status, result.stderr)
       return result.stderr .. result.stdout
     end
-    assert.truthy(told("rapid.shape.plane {}"):find("spring1: omega dt = 41.7; treated exactly", 1, true))
-    local curved = told("rapid.shape.sphere { radius = 1 }")
+    assert.truthy(reported("rapid.shape.plane {}"):find("spring1: omega dt = 41.7; treated exactly", 1, true))
+    local curved = reported("rapid.shape.sphere { radius = 1 }")
     assert.falsy(curved:find("treated exactly", 1, true), curved)
     assert.truthy(curved:find("spring1: omega dt = 0.%d+ at 1 sub%-step"), curved) -- the angle around the center
   end)

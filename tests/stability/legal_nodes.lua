@@ -190,13 +190,13 @@ local rule = {  -- for parameters that exclude each other
 local special = { name = true, reads = true, writes = true }
 
 local function call(name, given)
-  local texts = {}
+  local strings = {}
   if name == "merge" then return "  :merge(other)\n" end
-  if types[name].other_params then texts[1] = "own = 0.25" end
+  if types[name].other_params then strings[1] = "own = 0.25" end
   for _, param in ipairs(types[name].params) do
-    if given[param.name] then texts[#texts + 1] = param.name .. " = " .. given[param.name] end
+    if given[param.name] then strings[#strings + 1] = param.name .. " = " .. given[param.name] end
   end
-  return ("  :%s { %s }\n"):format(name, table.concat(texts, ", "))
+  return ("  :%s { %s }\n"):format(name, table.concat(strings, ", "))
 end
 
 -- Returns a call with the required arguments and those that define the node's purpose.

@@ -19,9 +19,9 @@ local allowed = 0.01  -- of the largest energy in motion or stored in springs
 
 -- Returns the statistics of each frame from --stats.
 local function statistics(description)
-  local told = scene.command("run", passive_scenes.text(description),
+  local reported = scene.command("run", passive_scenes.text(description),
     ("-f 1-%d --quiet --stats stats.json"):format(description.frames))
-  assert(told.status == 0, told.stderr)
+  assert(reported.status == 0, reported.stderr)
   return json.decode(scene.folder:read "stats.json").frames
 end
 
@@ -57,13 +57,13 @@ end)
 local by = { "by_contacts", "by_friction", "by_shapes", "by_rods", "by_pins", "by_drag" }
 
 local is_off = fault_of(function(description, result)
-  local energy, told, lively, rounding = mechanical_energy.of(description, result), 0, 0, 0
+  local energy, reported, lively, rounding = mechanical_energy.of(description, result), 0, 0, 0
   for _, one in ipairs(energy) do lively = math.max(lively, one.lively) end
   for _, one in ipairs(statistics(description)) do
     if one.frame > 1 and not one.ledger then return end  -- nothing couples the points
-    for _, name in ipairs(by) do told = told + (one.ledger and one.ledger[name] or 0) end
+    for _, name in ipairs(by) do reported = reported + (one.ledger and one.ledger[name] or 0) end
     rounding = rounding + energy[one.frame].rounding
-    local off = energy[one.frame].total - energy[1].total - told
+    local off = energy[one.frame].total - energy[1].total - reported
     if math.abs(off) > allowed * lively + rounding then
       return ("in frame %d points have %.3g J more than the ledger says, %.3g of what is in motion or stored"):format(
         one.frame, off, off / lively), math.abs(off) / lively
@@ -85,12 +85,12 @@ local function none_of(fault, draw, list)
   assert.equal("", table.concat(faults, "\n\n"))
 end
 
--- Checks the first scenes of the seed for which `wanted` returns true.
-local function none(fault, draw, wanted)
+-- Checks the first scenes of the seed for which `is_selected` returns true.
+local function none(fault, draw, is_selected)
   local list, number = {}, 0
   while #list < scenes do
     number = number + 1
-    if wanted(draw(seed, number)) then list[#list + 1] = {seed, number} end
+    if is_selected(draw(seed, number)) then list[#list + 1] = {seed, number} end
   end
   none_of(fault, draw, list)
 end

@@ -11,7 +11,7 @@ local rapid = require "rapid"
 
 local path = assert(os.getenv "UNCHANGED_TESTS")
 local record = assert(io.open(assert(os.getenv "UNCHANGED_RECORD"), "wb"))
-local most_points = 2000 -- hashed one by one; of larger sets every nth, and the sums and bounds of all
+local max_points = 2000 -- hashed one by one; of larger sets every nth, and the sums and bounds of all
 
 local current = "outside of tests"
 
@@ -53,7 +53,7 @@ end
 
 local function hash_of(points)
   local count = #points
-  local step = math.max(1, math.floor(count / most_points))
+  local step = math.max(1, math.floor(count / max_points))
   local hash = mixed(14695981039346656037ULL, count)
   for _, name in ipairs(points:names()) do
     hash = mixed_text(hash, name)

@@ -167,19 +167,19 @@ local params = { "stiffness", "damping", "linear", "quadratic", "strength", "sha
 local words = { response = true, method = true }
 
 local function node_text(node, place_of)
-  local texts = {}
+  local strings = {}
   if node.pairs then
     local list = {}
     for i, pair in ipairs(node.pairs) do list[i] = ("{%d, %d}"):format(place_of[pair[1]], place_of[pair[2]]) end
-    texts[1] = ("pairs = {%s}"):format(table.concat(list, ", "))
+    strings[1] = ("pairs = {%s}"):format(table.concat(list, ", "))
   end
   for _, name in ipairs(params) do
     local value = node[name]
     if node.kind == "spring" and name == "radius" then
       local along = node.along and (":transform(%s)"):format(node.along) or ""
-      if value then texts[#texts + 1] = ("target = rapid.shape.sphere { radius = %.9g }%s"):format(value, along) end
+      if value then strings[#strings + 1] = ("target = rapid.shape.sphere { radius = %.9g }%s"):format(value, along) end
     elseif value then
-      texts[#texts + 1] = ("%s = %s"):format(name, words[name] and ("%q"):format(value) or written(value))
+      strings[#strings + 1] = ("%s = %s"):format(name, words[name] and ("%q"):format(value) or written(value))
     end
   end
   local group = ""
@@ -187,9 +187,9 @@ local function node_text(node, place_of)
     local list = {}
     for i, point in ipairs(node.points) do list[i] = ("p.id == %d"):format(place_of[point] - 1) end
     group = ('  :group { name = "held", where = function(p) return %s end }\n'):format(table.concat(list, " or "))
-    table.insert(texts, 1, 'group = "held"')
+    table.insert(strings, 1, 'group = "held"')
   end
-  return ("%s  :%s { %s }\n"):format(group, node.kind, table.concat(texts, ", "))
+  return ("%s  :%s { %s }\n"):format(group, node.kind, table.concat(strings, ", "))
 end
 
 function passive_scenes.text(scene)

@@ -7,12 +7,12 @@
 -- its fault has at least a hundredth of the size.
 local passive_scenes = require "tests.verification.passive_scenes"
 
-local most_tries = 300
+local max_tries = 300
 
 return function(scene, fault_of)
   local fault, size = fault_of(scene)
   local least, tries, found = size / 100, 0, true
-  while found and tries < most_tries do
+  while found and tries < max_tries do
     found = false
     for _, simpler in ipairs(passive_scenes.simpler(scene)) do
       tries = tries + 1

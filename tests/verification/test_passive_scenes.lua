@@ -15,7 +15,7 @@ local seed = tonumber(os.getenv "PASSIVE_SEED") or 1
 local allowed = 0.01  -- of the largest energy in motion or stored in springs
 
 -- Returns the energy that contacts have added up to a frame, as reported by the run, J.
-local function told(text, frame)
+local function reported(text, frame)
   local run = scene.command("run", text, ("-f 1-%d --quiet --stats stats.json"):format(frame))
   assert(run.status == 0, run.stderr)
   local sum = 0
@@ -31,7 +31,7 @@ local function fault_of(description)
   local part, frame, gain = mechanical_energy.gain(description, result)
   collectgarbage()  -- the collector does not see a result's memory outside of Lua
   if not part or part <= allowed then return end
-  local excess = gain - told(text, frame)
+  local excess = gain - reported(text, frame)
   if excess <= allowed * gain / part then return end
   return ("%.3g J more in frame %d, %.3g of what is in motion or stored, and %.3g J told"):format(gain, frame, part,
     gain - excess), part
@@ -63,12 +63,12 @@ local function none_gains(list)
   assert.equal("", table.concat(faults, "\n\n"))
 end
 
--- Returns the first scenes of the seed for which `wanted` returns true.
-local function drawn(wanted)
+-- Returns the first scenes of the seed for which `is_selected` returns true.
+local function drawn(is_selected)
   local list, number = {}, 0
   while #list < scenes do
     number = number + 1
-    if wanted(nodes_of(passive_scenes.scene(seed, number))) then list[#list + 1] = {seed, number} end
+    if is_selected(nodes_of(passive_scenes.scene(seed, number))) then list[#list + 1] = {seed, number} end
   end
   return list
 end

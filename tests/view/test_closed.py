@@ -353,14 +353,14 @@ def requests_nested_without_end_end_nothing(bench):
 @test
 def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
     browser = bench.ready()
-    told = bench.path / "told"
+    reported = bench.path / "told"
     for folder, path in ((bench.path / "programs", str(bench.path / "programs")), (bench.path, ":.")):
         folder.mkdir(exist_ok=True)
         (folder / "xdg-open").write_text(
-            f"#!/bin/sh\nls -l /proc/$$/fd >{told}.new\necho \"$1\" >>{told}.new\nmv {told}.new {told}\n",
+            f"#!/bin/sh\nls -l /proc/$$/fd >{reported}.new\necho \"$1\" >>{reported}.new\nmv {reported}.new {reported}\n",
             encoding="ascii")
         (folder / "xdg-open").chmod(0o755)
-        told.unlink(missing_ok=True)
+        reported.unlink(missing_ok=True)
         environment = {**os.environ, "DISPLAY": ":0", "PATH": path + ":/usr/bin:/bin"}
         if folder == bench.path:  # the scene's folder
             environment["PATH"] = ":."
@@ -370,10 +370,10 @@ def the_browser_that_it_starts_gets_an_address_for_once_and_no_sockets(bench):
             port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\w+)\n", view.stdout.readline()).groups()
             if folder == bench.path:
                 wait_for(lambda: answers(int(port)))
-                assert not told.exists(), "the program of the current folder was run"
+                assert not reported.exists(), "the program of the current folder was run"
                 continue
-            wait_for(told.exists)
-            *files, address = told.read_text(encoding="utf-8").splitlines()
+            wait_for(reported.exists)
+            *files, address = reported.read_text(encoding="utf-8").splitlines()
             assert "socket:" not in "".join(files), files
             another = re.fullmatch(rf"http://127\.0\.0\.1:{port}/\?token=(\w+)", address)[1]
             assert another != token

@@ -96,13 +96,13 @@ TEST_CASE("a page gets positions, velocities and speeds within half a step, howe
     const std::size_t every = GENERATE(1, 2);
     CAPTURE(count, every);
     const std::vector<Moving> points = random_points(count);
-    FrameWish wish;
-    wish.velocities = true;
-    wish.most = every == 1 ? count : (count + 1) / 2;
-    const Received message(frame_message(3, frame_of(points), wish, CheckedJson::object()));
+    FrameOptions frame_options;
+    frame_options.velocities = true;
+    frame_options.most = every == 1 ? count : (count + 1) / 2;
+    const Received message(frame_message(3, frame_of(points), frame_options, CheckedJson::object()));
 
     std::vector<Moving> shown;
-    for (std::size_t i = 0; i<count; i += count> wish.most ? every : 1) shown.push_back(points[i]);
+    for (std::size_t i = 0; i<count; i += count> frame_options.most ? every : 1) shown.push_back(points[i]);
     Triple low = shown[0].P, high = shown[0].P;
     double least = length(shown[0].v), most = least, fastest = 0;  // fastest: along an axis
     for (const auto& [P, v] : shown) {
@@ -143,9 +143,9 @@ TEST_CASE("of points above a number those are shown whose id is a multiple of a 
     std::vector<std::int64_t> ids(100);
     for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(i);
     const SceneFrame points = points_with_ids(ids);
-    FrameWish wish;
-    wish.most = 30;
-    const ShownPoints shown = shown_points(points, wish);
+    FrameOptions frame_options;
+    frame_options.most = 30;
+    const ShownPoints shown = shown_points(points, frame_options);
     CHECK(shown.every == 4);
     REQUIRE(shown.count == 25);
     for (std::size_t k = 0; k < shown.count; ++k)
@@ -154,11 +154,11 @@ TEST_CASE("of points above a number those are shown whose id is a multiple of a 
 
 TEST_CASE("of points that have one id, as files of others may have them, some are shown")
 {
-    FrameWish wish;
+    FrameOptions frame_options;
     for (const std::int64_t id : {std::int64_t{0}, INT64_MIN, std::int64_t{1}, std::int64_t{-1}})
         for (const std::size_t most : {0, 1, 7}) {
-            wish.most = most;
-            CHECK(shown_points(points_with_ids(std::vector<std::int64_t>(20, id)), wish).count <= most);
+            frame_options.most = most;
+            CHECK(shown_points(points_with_ids(std::vector<std::int64_t>(20, id)), frame_options).count <= most);
         }
 }
 
@@ -170,7 +170,7 @@ TEST_CASE("the numbers of texts are their places in the alphabet, among the poin
         "id,Px,Py,Pz,vx,vy,vz,name\n0,0,0,0,3,4,0,\"pear\"\n1,0,0,0,0,0,0,\"apple\"\n2,0,0,0,0,0,2,\"pear\"\n"
         "3,0,0,0,0,0,0,\"fig\"\n")));
     CHECK(numbers_of(points, "name") == std::vector<float>{2, 0, 2, 1});
-    const Places some = {0, 3};
+    const Indices some = {0, 3};
     CHECK(numbers_of(points, "name", &some) == std::vector<float>{1, 0});
     CHECK(numbers_of(points, "speed") == std::vector<float>{5, 0, 2, 0});
     CHECK_THROWS_WITH(numbers_of(points, "heat"), "the points have no attribute \"heat\" here");

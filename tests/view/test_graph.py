@@ -13,10 +13,10 @@ def a_click_on_a_node_shows_the_points_as_they_leave_it(bench):
     # Solve has not moved the points yet: bead 3 is five metres above the row.
     assert abs(top - 7) < 1e-4, top
     browser.run("document.querySelector('#graph [data-node=warm_up]').dispatchEvent(new Event('click'))")
-    told = browser.wait("(() => { const t = document.getElementById('node').innerText; return /warm_up/i.test(t) && t })()")
+    reported = browser.wait("(() => { const t = document.getElementById('node').innerText; return /warm_up/i.test(t) && t })()")
     for what, names in (("reads", {"P", "heat"}), ("writes", {"heat"})):
-        line = next(line for line in told.splitlines() if line.startswith(what))
-        assert names <= set(line[len(what):].replace(",", " ").split()), told
+        line = next(line for line in reported.splitlines() if line.startswith(what))
+        assert names <= set(line[len(what):].replace(",", " ").split()), reported
     browser.run("document.querySelector('#graph [data-node=lift]').dispatchEvent(new Event('click'))")
     browser.wait("rapidView.picture.message.after === 'lift'")
     assert "line 12" in browser.run("return document.getElementById('node').innerText")

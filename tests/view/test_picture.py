@@ -78,9 +78,9 @@ def colours_by_an_attribute_with_its_range(bench):
     low, high = browser.run("return rapidView.picture.message.ranges.value")
     assert abs(low - min(heat)) < 1e-5 and abs(high - max(heat)) < 1e-4
     choose(browser, "group", "warm")
-    wanted = sum(row["group:warm"] for row in bench.rows(12))
-    assert 0 < wanted < 40
-    browser.wait(f"document.body.dataset.shown === '{int(wanted)}'")
+    expected = sum(row["group:warm"] for row in bench.rows(12))
+    assert 0 < expected < 40
+    browser.wait(f"document.body.dataset.shown === '{int(expected)}'")
 
 
 @test
@@ -93,8 +93,8 @@ def colours_by_the_estimated_error(bench):
     go(browser, 12)
     low, high = browser.run("return rapidView.picture.message.ranges.value")
     # The largest is the one in the statistics.
-    wanted = statistics(bench, text, "1-12")[12]["error"]
-    assert abs(high - wanted["position_max"]) <= 1e-6 * wanted["position_max"], (high, wanted)
+    expected = statistics(bench, text, "1-12")[12]["error"]
+    assert abs(high - expected["position_max"]) <= 1e-6 * expected["position_max"], (high, expected)
     values = column(browser, 12, "error")
     assert None not in values and values.index(max(values)) < 20 and low < high / 100
     # In the first frame nothing has moved yet.
@@ -190,9 +190,9 @@ def the_camera_goes_to_the_command_line_and_back(bench):
 def more_points_than_the_page_holds_are_shown_by_id(bench):
     browser = bench.ready()
     for most, every in ((40, 1), (39, 2), (20, 2), (10, 4), (9, 8)):
-        shown, told, total = browser.promise(f"rapidView.ask('frame', {{frame: 5, most: {most}}})"
+        shown, reported, total = browser.promise(f"rapidView.ask('frame', {{frame: 5, most: {most}}})"
                                              ".then((m) => [m.shown, m.every, m.total])")
-        assert (shown, told, total) == (40 // every, every, 40), (most, shown, told)
+        assert (shown, reported, total) == (40 // every, every, 40), (most, shown, reported)
     rows = bench.rows(5)
     P = browser.promise("rapidView.ask('frame', {frame: 5, most: 10}).then((m) => m.box)")
     chosen = [row["Px"] for row in rows if row["id"] % 4 == 0]
@@ -227,10 +227,10 @@ def keys_are_listed_and_themes_change(bench):
     for word in ("Space", "orbit", "Esc"):
         assert word in listed
     # Every control has a tooltip.
-    untold = browser.run("""return [...document.querySelectorAll(
+    unreported = browser.run("""return [...document.querySelectorAll(
       'button:not(dialog button), select, input, [role=separator], [tabindex="0"]:not(#canvas), canvas:not(#canvas, #legend *)')]
       .filter((c) => !c.title && !c.querySelector('title')).map((c) => c.outerHTML)""")
-    assert untold == [], untold
+    assert unreported == [], unreported
 
 
 @test

@@ -51,8 +51,8 @@ def tells_the_life_of_a_point(bench):
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if 9.81 * (middle - 1 + math.exp(-middle)) < 1.96 else (low, middle)
-    told = float(contact.split(",")[-1].split()[0])
-    assert "meets floor" in contact and abs(told - low) < 1e-3, (contact, low)
+    reported = float(contact.split(",")[-1].split()[0])
+    assert "meets floor" in contact and abs(reported - low) < 1e-3, (contact, low)
     assert "born in create1" in browser.run("return document.querySelector('#life .birth').innerText")
 
 
@@ -119,8 +119,8 @@ def a_region_tells_counts_and_ranges(bench):
     heats = [row["heat"] for row in bench.rows(1)]
     for name, values in (("speed", speeds), ("heat", heats)):
         line = next(line for line in text.splitlines() if line.startswith(name))
-        told = [float(number) for number in line.split()[1:]]
-        for number, value in zip(told, (min(values), sum(values) / len(values), max(values))):
+        reported = [float(number) for number in line.split()[1:]]
+        for number, value in zip(reported, (min(values), sum(values) / len(values), max(values))):
             assert abs(number - value) <= 1e-3 * abs(value), (line, value)
 
 
@@ -177,10 +177,10 @@ def seconds_of_the_stages_are_those_of_the_frame(bench):
     go(browser, 12)
     browser.wait("rapidView.state.statistics.length === 30")
     browser.run("document.getElementById('figures-tab').click()")
-    told = browser.wait("""[...document.querySelectorAll('#figures figure')].filter((f) => f.offsetParent)
+    reported = browser.wait("""[...document.querySelectorAll('#figures figure')].filter((f) => f.offsetParent)
       .map((f) => f.querySelector('figcaption').innerText).find((t) => t.includes('scripts'))""")
-    wanted = browser.run("return rapidView.state.statistics[11].seconds")
+    expected = browser.run("return rapidView.state.statistics[11].seconds")
     units = {"µs": 1e-6, "ms": 1e-3, "s": 1.0}
-    numbers = [float(number) * units[of] for number, of in re.findall(r"([\d.]+(?:e-?\d+)?) (µs|ms|s)\b", told)]
+    numbers = [float(number) * units[of] for number, of in re.findall(r"([\d.]+(?:e-?\d+)?) (µs|ms|s)\b", reported)]
     for number, stage in zip(numbers, ("solve", "script", "graph")):
-        assert abs(number - wanted[stage]) <= 0.01 * wanted[stage] + 1e-6, (told, wanted)
+        assert abs(number - expected[stage]) <= 0.01 * expected[stage] + 1e-6, (reported, expected)

@@ -241,9 +241,9 @@ def the_set_options_are_those_of_the_command(bench):
     wait_for_run(browser, run)
     browser.click("#copy-set")
     browser.wait("/height=1.5/.test(document.getElementById('dock-note').textContent)")
-    told = browser.run("return document.getElementById('dock-note').textContent").removeprefix("copied: ")
+    reported = browser.run("return document.getElementById('dock-note').textContent").removeprefix("copied: ")
     (bench.path / "same.lua").write_text(SCENE, encoding="utf-8")
-    subprocess.run(f"'{bench.rapid}' run same.lua -f 7 --quiet -o set.####.csv {told}", shell=True, cwd=bench.path, check=True)
+    subprocess.run(f"'{bench.rapid}' run same.lua -f 7 --quiet -o set.####.csv {reported}", shell=True, cwd=bench.path, check=True)
     with open(bench.path / "set.0007.csv", encoding="ascii") as file:
         row = next(csv.DictReader(file))
     point = browser.promise(f"rapidView.ask('point', {{frame: 7, id: {row['id']}}})")

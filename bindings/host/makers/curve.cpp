@@ -62,11 +62,11 @@ public:
         const std::int64_t nearest = std::clamp(frame - order_.offset, order_.first, order_.last);
         const int held = static_cast<int>(order_.file_of(frame).value_or(nearest));
         const std::lock_guard lock(mutex_);
-        for (const auto& [number, curves] : kept_)
+        for (const auto& [number, curves] : recent_)
             if (number == held) return curves;
-        kept_.emplace_front(held, read(held));
-        if (kept_.size() > most_kept) kept_.pop_back();
-        return kept_.front().second;
+        recent_.emplace_front(held, read(held));
+        if (recent_.size() > max_recent) recent_.pop_back();
+        return recent_.front().second;
     }
     bool has(std::int64_t frame) const override { return order_.file_of(frame).has_value(); }
     FrameRange range() const override
@@ -75,7 +75,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t most_kept = 8;  // the same as for files of a mesh
+    static constexpr std::size_t max_recent = 8;  // the same as for files of a mesh
 
     CurvesPtr read(int frame) const
     {
@@ -94,7 +94,7 @@ private:
     bool closed_;
     CurvesPtr first_;
     mutable std::mutex mutex_;
-    mutable std::deque<std::pair<int, CurvesPtr>> kept_;  // most recent first
+    mutable std::deque<std::pair<int, CurvesPtr>> recent_;  // most recent first
 };
 
 struct ReadCurve : SequenceOptions {

@@ -5,7 +5,7 @@
 #include "bindings/host/makers/grid_files.h"
 #include "bindings/host/makers/points_of_grid.h"
 #include "bindings/host/makers/written_vdb.h"
-#include "runtime/shapes/level_set/least_voxel.h"
+#include "runtime/shapes/level_set/min_voxel.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {
@@ -85,19 +85,19 @@ struct WriteGrids {
 RAPID_MAKER(WriteGrids);
 
 // The parameter `at`: the values of the function at each node, evaluated by lua/rapid.lua.
-struct PlaceFunction {
+struct PositionFunction {
     static constexpr std::string_view param_type = "function of a place";
 
     std::vector<double> values;  // three per node, z fastest
 };
 
-void read_value(const Param& param, const Value& value, PlaceFunction& function)
+void read_value(const Param& param, const Value& value, PositionFunction& function)
 {
     rapid::read_value(param, value, function.values);
 }
 
 struct GridFrom {
-    PlaceFunction at;
+    PositionFunction at;
     Vec3d size, center, origin;
     std::vector<double> nodes;
     double voxel;
@@ -110,7 +110,7 @@ struct GridFrom {
             .required()
             .param(&GridFrom::size, "size", Vec3d(1, 1, 1), any_number(), "m", "full edge lengths")
             .param(&GridFrom::center, "center", Vec3d(0, 0, 0), any_number(), "m", "centre")
-            .param(&GridFrom::voxel, "voxel", 0.1, at_least(least_voxel), "m", "distance between nodes")
+            .param(&GridFrom::voxel, "voxel", 0.1, at_least(min_voxel), "m", "distance between nodes")
             .param(&GridFrom::origin, "origin", Value(), any_number(), "m", "lowest corner")
             .internal()
             .param(&GridFrom::nodes, "nodes", Value(), at_least(1), "", "number of nodes along each axis")

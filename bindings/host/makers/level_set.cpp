@@ -12,8 +12,8 @@
 #include "bindings/host/makers/grid_files.h"
 #include "bindings/host/makers/written_vdb.h"
 #include "runtime/graph/points_object.h"
-#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
+#include "runtime/shapes/level_set/min_voxel.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 
@@ -30,7 +30,7 @@ struct Grid {
     static void declare(MakerDeclaration<T>& declaration)
     {
         declaration
-            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
+            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(min_voxel), "m", "edge of a voxel")
             .param(static_cast<double T::*>(&T::half_width), "half_width", 3.0, at_least(1.5), "voxels",
                    "width of the band on each side of the surface");
     }
@@ -173,9 +173,9 @@ struct FromPoints : Grid {
         const Strided<Vec3f> P = set.P().read();
         const Strided<float> r = given.read(set);
         const std::size_t n = set.size();
-        std::vector<Vec3f> places;
-        for (std::size_t i = 0; i < n; ++i) places.push_back(P[i]);
-        return level_set_from_points(places, std::span(r.data, r.stride ? n : 1), options());
+        std::vector<Vec3f> positions;
+        for (std::size_t i = 0; i < n; ++i) positions.push_back(P[i]);
+        return level_set_from_points(positions, std::span(r.data, r.stride ? n : 1), options());
     }
 };
 RAPID_MAKER(FromPoints);
@@ -250,7 +250,7 @@ struct ResampleLevelSet {
         return maker<ResampleLevelSet>("levelset.resample", "Returns the same surface with voxels of another size.")
             .param(&ResampleLevelSet::levelset, "levelset", Value(), any_number(), "", "level set to resample")
             .required()
-            .param(&ResampleLevelSet::voxel, "voxel", Value(), at_least(least_voxel), "m", "edge of a voxel")
+            .param(&ResampleLevelSet::voxel, "voxel", Value(), at_least(min_voxel), "m", "edge of a voxel")
             .required();
     }
     ObjectPtr make(MakeContext&) const { return resample_level_set(levelset, voxel); }

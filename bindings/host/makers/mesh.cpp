@@ -30,23 +30,23 @@ struct ReadMesh : SequenceOptions {
         check(path, pattern.has_frame());
         if (!pattern.has_frame()) {
             const MeshPtr mesh = read_mesh(context.resolve(path));
-            tell_left_out(*mesh, context);
+            warn_of_skipped(*mesh, context);
             return mesh;
         }
         const auto files = pattern.existing();
         if (context.on_read)
             for (const auto& [frame, file] : files) context.on_read(file);
         auto sequence = std::make_shared<MeshSequence>(files, pattern.text(), order());
-        tell_left_out(*sequence->rest(), context);
+        warn_of_skipped(*sequence->rest(), context);
         return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion({}));
     }
 
 private:
-    static void tell_left_out(const Mesh& mesh, MakeContext& context)
+    static void warn_of_skipped(const Mesh& mesh, MakeContext& context)
     {
         const auto* detailed = dynamic_cast<const DetailedMesh*>(&mesh);
         if (!detailed) return;
-        for (const std::string& what : detailed->left_out)
+        for (const std::string& what : detailed->skipped)
             context.warnings.push_back(
                 fmt::format("rapid.mesh.read: \"{}\": {} can't be read, and is left out", mesh.name, what));
     }

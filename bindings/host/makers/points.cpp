@@ -6,7 +6,7 @@
 #include "bindings/host/makers/sequence_options.h"
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/frame_pattern.h"
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/io/format.h"
 
@@ -57,9 +57,9 @@ private:
     // Reads points. The file's ids identify the same points in other files; without ids their order does.
     static ObjectPtr read(const std::filesystem::path& file, MakeContext& context)
     {
-        const LeftOut left_out;
+        const SkippedContents skipped;
         PointSet points = read_points(file);
-        for (const std::string& what : left_out.list())
+        for (const std::string& what : skipped.list())
             context.warnings.push_back(
                 fmt::format("rapid.points.read: \"{}\": {} can't be read, and is left out", file.string(), what));
         if (!has_ids(points)) return numbered(std::move(points));
@@ -100,9 +100,10 @@ struct GridPoints {
         if (!(nx * ny * nz <= 2147483648.0))
             throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
                                     describe(Value(size)), spacing, nx * ny * nz));
-        constexpr double bytes_a_point = 2 * (sizeof(Vec3f) + sizeof(Vec3f) + sizeof(std::int64_t));  // with the state
-        if (const double bytes = nx * ny * nz * bytes_a_point; !fits_in_memory(bytes))
-            throw beyond_memory(
+        constexpr double bytes_per_point =
+            2 * (sizeof(Vec3f) + sizeof(Vec3f) + sizeof(std::int64_t));  // with the state
+        if (const double bytes = nx * ny * nz * bytes_per_point; !fits_in_memory(bytes))
+            throw memory_exceeded(
                 fmt::format("size {} at spacing {}: {:.3g} points", describe(Value(size)), spacing, nx * ny * nz),
                 bytes, "give a larger spacing");
         PointSet points;

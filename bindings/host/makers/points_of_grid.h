@@ -7,7 +7,7 @@
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
-#include "runtime/shapes/level_set/least_voxel.h"
+#include "runtime/shapes/level_set/min_voxel.h"
 
 namespace rapid {
 
@@ -26,7 +26,7 @@ struct PointsOfGrid {
                    "", "points that are spread over the voxels")
             .required();
         declaration
-            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(least_voxel), "m", "edge of a voxel")
+            .param(static_cast<double T::*>(&T::voxel), "voxel", 0.1, at_least(min_voxel), "m", "edge of a voxel")
             .param(static_cast<std::optional<PerPoint<float>> T::*>(&T::radius), "radius", Value(), above(0), "m",
                    "radius over which a point is spread, at least a voxel; the default is 1.5 voxels")
             .param(static_cast<PerPoint<float> T::*>(&T::weight), "weight", 1.0, at_least(0), "",
@@ -39,15 +39,15 @@ struct PointsOfGrid {
         const PointSet& set = points->points;
         const std::size_t n = set.size();
         const Strided<Vec3f> P = set.P().read();
-        places_.clear();
-        for (std::size_t i = 0; i < n; ++i) places_.push_back(P[i]);
+        positions_.clear();
+        for (std::size_t i = 0; i < n; ++i) positions_.push_back(P[i]);
         usual_ = static_cast<float>(1.5 * voxel);
         const Strided<float> r = radius ? radius->read(set) : Strided<float>{&usual_, 0}, w = weight.read(set);
-        return {places_, std::span(r.data, r.stride ? n : 1), std::span(w.data, w.stride ? n : 1), {}, voxel};
+        return {positions_, std::span(r.data, r.stride ? n : 1), std::span(w.data, w.stride ? n : 1), {}, voxel};
     }
 
 private:
-    mutable std::vector<Vec3f> places_;
+    mutable std::vector<Vec3f> positions_;
     mutable float usual_ = 0;
 };
 

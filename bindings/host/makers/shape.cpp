@@ -9,7 +9,7 @@ namespace {
 
 using Values = std::vector<ShapeValue>;
 
-Param param_of(const ShapeParam& declared, std::size_t place)
+Param param_of(const ShapeParam& declared, std::size_t index)
 {
     Param param;
     param.name = declared.name;
@@ -21,8 +21,8 @@ Param param_of(const ShapeParam& declared, std::size_t place)
             param.type = param_type<T>();
             param.fallback = fallback;
             if (std::is_same_v<T, double> && declared.positive) param.range = above(0);
-            param.assign = [place](const Param& self, void* values, const Value& value) {
-                read_value(self, value, (*static_cast<Values*>(values))[place].template emplace<T>());
+            param.assign = [index](const Param& self, void* values, const Value& value) {
+                read_value(self, value, (*static_cast<Values*>(values))[index].template emplace<T>());
             };
         },
         declared.fallback);

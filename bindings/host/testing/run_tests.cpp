@@ -22,7 +22,7 @@ namespace {
 // Context of the functions that Lua calls.
 struct Host {
     const TestOptions& options;
-    const std::function<void(const TestEvent&)>& tell;
+    const std::function<void(const TestEvent&)>& report;
 };
 
 Host& host_of(lua_State* L) { return *static_cast<Host*>(lua_touserdata(L, lua_upvalueindex(1))); }
@@ -96,7 +96,7 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
         add(session.take_warnings());
         add(plan.warnings);
         Evaluator evaluator(plan);
-        evaluator.leave_out_errors();
+        evaluator.disable_error_estimates();
         if (run.check_declarations) evaluator.check_declarations();
         while (evaluator.next_frame() <= run.last) {
             FrameResult result = evaluator.advance();
@@ -108,11 +108,11 @@ std::vector<std::string> run_scene(const SceneRun& run, const std::function<void
     });
 }
 
-void push_list(lua_State* L, const std::vector<std::string>& texts)
+void push_list(lua_State* L, const std::vector<std::string>& strings)
 {
     lua_newtable(L);
-    for (std::size_t i = 0; i < texts.size(); ++i) {
-        lua_pushstring(L, texts[i].c_str());
+    for (std::size_t i = 0; i < strings.size(); ++i) {
+        lua_pushstring(L, strings[i].c_str());
         lua_rawseti(L, -2, static_cast<int>(i) + 1);
     }
 }
@@ -168,11 +168,11 @@ int run(lua_State* L)
 }
 
 // tell(kind, name, message): reports an event.
-int tell(lua_State* L)
+int report(lua_State* L)
 {
     constexpr const char* kinds[] = {"started", "passed", "failed", "skipped", "broken", nullptr};
-    host_of(L).tell({static_cast<TestEvent::Kind>(luaL_checkoption(L, 1, nullptr, kinds)), checked_text_at(L, 2),
-                     luaL_optstring(L, 3, "")});
+    host_of(L).report({static_cast<TestEvent::Kind>(luaL_checkoption(L, 1, nullptr, kinds)), checked_text_at(L, 2),
+                       luaL_optstring(L, 3, "")});
     return 0;
 }
 
@@ -198,9 +198,9 @@ void set_path(lua_State* L)
 }  // namespace
 
 void run_test_file(const std::filesystem::path& file, const TestOptions& options,
-                   const std::function<void(const TestEvent&)>& tell_event)
+                   const std::function<void(const TestEvent&)>& on_event)
 {
-    Host host{options, tell_event};
+    Host host{options, on_event};
     const std::unique_ptr<lua_State, decltype(&lua_close)> state(luaL_newstate(), &lua_close);
     lua_State* L = state.get();
     luaL_openlibs(L);
@@ -210,7 +210,7 @@ void run_test_file(const std::filesystem::path& file, const TestOptions& options
     if (luaL_loadfile(L, runner.c_str()) != 0) throw Error(lua_tostring(L, -1));
     lua_newtable(L);
     push_function(L, host, "run", run);
-    push_function(L, host, "tell", tell);
+    push_function(L, host, "tell", report);
     register_points(L);
     lua_pushstring(L, file.c_str());
     lua_pushstring(L, options.filter.c_str());

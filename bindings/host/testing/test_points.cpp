@@ -24,8 +24,8 @@ namespace {
 
 struct TestedPoints {
     PointSet set;
-    std::string source;                                    // for messages: "frame 48", "frame 48, output sparks"
-    std::unordered_map<std::int64_t, std::size_t> places;  // index by id; built on first use
+    std::string source;                                     // for messages: "frame 48", "frame 48, output sparks"
+    std::unordered_map<std::int64_t, std::size_t> indices;  // index by id; built on first use
 };
 
 // A value as numbers: 1, 3 (vec3), 4 (quaternion, x y z w) or none (a string).
@@ -199,8 +199,8 @@ int value(lua_State* L)
     const TestedPoints& points = points_at(L, 1);
     const auto place = static_cast<std::size_t>(luaL_checkinteger(L, 2)) - 1;
     const AnyColumn& any = column_of(points, checked_text_at(L, 3));
-    if (const auto* texts = std::get_if<Column<Token>>(&any)) {
-        const std::string_view text = (*texts)[place].text();
+    if (const auto* strings = std::get_if<Column<Token>>(&any)) {
+        const std::string_view text = (*strings)[place].text();
         return lua_pushlstring(L, text.data(), text.size()), 1;
     }
     return std::visit([&](const auto& column) { return push(L, numbers_of(column[place])); }, any);
@@ -225,10 +225,10 @@ int within(lua_State* L)
 int place_of(lua_State* L)
 {
     TestedPoints& points = points_at(L, 1);
-    if (points.places.empty())
-        for (std::size_t i = 0; i < points.set.size(); ++i) points.places.emplace(points.set.id()[i], i);
-    const auto found = points.places.find(static_cast<std::int64_t>(luaL_checknumber(L, 2)));
-    if (found == points.places.end()) return 0;
+    if (points.indices.empty())
+        for (std::size_t i = 0; i < points.set.size(); ++i) points.indices.emplace(points.set.id()[i], i);
+    const auto found = points.indices.find(static_cast<std::int64_t>(luaL_checknumber(L, 2)));
+    if (found == points.indices.end()) return 0;
     lua_pushinteger(L, static_cast<lua_Integer>(found->second) + 1);
     return 1;
 }

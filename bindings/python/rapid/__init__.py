@@ -17,7 +17,7 @@ import numpy
 
 from ._library import (Camera, Column, Error, Find, FrameDone, Frames, Int, Int64, Line, Log, MergeProgress, Merged,
                        Mesh as MeshStruct, Node, Options, Outcome, Parameter, Plane, Progress, RunOptions, Statistics,
-                       UInt64, Value, call, encoded, from_value, get, library, lines, sized, texts, to_settings, value_of)
+                       UInt64, Value, call, encoded, from_value, get, library, lines, sized, strings, to_settings, value_of)
 from ._interrupt import interruptible
 from ._offers import Constraint, Edit, Force, Mesh, Points, Shape, from_numpy, make_offers
 
@@ -79,9 +79,9 @@ def _picture(function, *arguments):
 
 
 def _camera(position, target, fov):
-    def place(of):
+    def coordinates(of):
         return None if of is None else (c_double * 3)(*of)
-    return Camera(place(position), place(target), fov or 0)
+    return Camera(coordinates(position), coordinates(target), fov or 0)
 
 
 class Frame:
@@ -128,13 +128,13 @@ class Frame:
         """Returns a column with a value for each point, even if all points share one value: no stride is 0."""
         return self._array("frame_expanded", name)
 
-    def places(self, ids):
+    def indices(self, ids):
         """Returns the index in the columns of each id, or 2**32 - 1 if no point has that id."""
         ids = numpy.ascontiguousarray(ids, numpy.int64)
-        places = numpy.empty(len(ids), numpy.uint32)
-        call("frame_places", self._handle.value, ids.ctypes.data_as(ctypes.POINTER(c_int64)), len(ids),
-             places.ctypes.data_as(ctypes.POINTER(c_uint32)))
-        return places
+        indices = numpy.empty(len(ids), numpy.uint32)
+        call("frame_indices", self._handle.value, ids.ctypes.data_as(ctypes.POINTER(c_int64)), len(ids),
+             indices.ctypes.data_as(ctypes.POINTER(c_uint32)))
+        return indices
 
     @staticmethod
     def text_of(token):
@@ -147,12 +147,12 @@ class Frame:
 
     def categories(self, name):
         """Returns the sorted distinct strings of a column, and for each point the index of its string in that list."""
-        tokens, places = numpy.unique(self._array("frame_column", name, texts=False), return_inverse=True)
+        tokens, indices = numpy.unique(self._array("frame_column", name, strings=False), return_inverse=True)
         words = [self.text_of(int(token)) for token in tokens]
         order = sorted(range(len(words)), key=words.__getitem__)
         rank = numpy.empty(len(words), numpy.int32)
         rank[order] = numpy.arange(len(words), dtype=numpy.int32)
-        return [words[k] for k in order], rank[places]
+        return [words[k] for k in order], rank[indices]
 
     def group(self, name):
         """Returns a boolean for each point: true if the point is in the group."""
@@ -228,12 +228,12 @@ class Frame:
         """Frees the memory now instead of at garbage collection. Arrays that are still referenced keep theirs."""
         self._handle = _Released
 
-    def _array(self, function, name, texts=True):
+    def _array(self, function, name, strings=True):
         column = sized(Column)
         call(function, self._handle.value, name.encode(), byref(column))
-        if column.type == _string and texts:
-            different, places = self.categories(name)
-            return numpy.array(different or [""])[places]
+        if column.type == _string and strings:
+            different, indices = self.categories(name)
+            return numpy.array(different or [""])[indices]
         dtype = numpy.dtype(_types[column.type])
         shape = (column.count,) if column.components == 1 else (column.count, column.components)
         if column.count == 0:
@@ -262,9 +262,9 @@ class Shapes:
     @property
     def meshes(self):
         result = []
-        for place in range(value_of("shapes_mesh_count", self._handle.value)):
+        for index in range(value_of("shapes_mesh_count", self._handle.value)):
             one = sized(MeshStruct)
-            call("shapes_mesh", self._handle.value, place, byref(one))
+            call("shapes_mesh", self._handle.value, index, byref(one))
             result.append({"role": ["collider", "emitter"][one.role],
                            "positions": self._array(one.positions, one.corner_count, numpy.float32),
                            "triangles": self._array(one.triangles, one.triangle_count, numpy.int32)})
@@ -273,9 +273,9 @@ class Shapes:
     @property
     def planes(self):
         result = []
-        for place in range(value_of("shapes_plane_count", self._handle.value)):
+        for index in range(value_of("shapes_plane_count", self._handle.value)):
             one = sized(Plane)
-            call("shapes_plane", self._handle.value, place, byref(one))
+            call("shapes_plane", self._handle.value, index, byref(one))
             result.append({"normal": tuple(one.normal), "offset": one.offset})
         return result
 
@@ -346,7 +346,7 @@ class _Program:
         options.set, options.set_count = settings, len(settings)
         if seed is not None:
             options.seed = ctypes.pointer(c_uint64(UInt64.checked(seed)))
-        options.paths, options.path_count = texts(paths, "paths", "folders")
+        options.paths, options.path_count = strings(paths, "paths", "folders")
         options.threads, options.script_seconds = Int.checked(threads), script_seconds
         options.script_memory, options.memory = UInt64.checked(script_memory), UInt64.checked(memory)
         options.estimate_errors, options.keep_all = bool(estimate_errors), bool(keep_all)
@@ -464,9 +464,9 @@ class Scene(_Program):
     def parameters(self):
         """The parameters by name: {"value", "default", "doc"}."""
         result = {}
-        for place in range(value_of("scene_parameter_count", self._handle.value)):
+        for index in range(value_of("scene_parameter_count", self._handle.value)):
             one = sized(Parameter)
-            call("scene_parameter", self._handle.value, place, byref(one))
+            call("scene_parameter", self._handle.value, index, byref(one))
             result[one.name.decode()] = {"value": from_value(one.value), "default": from_value(one.fallback),
                                          "doc": (one.doc or b"").decode()}
         return result
@@ -475,9 +475,9 @@ class Scene(_Program):
     def nodes(self):
         """The nodes, [{"name", "type", "file", "line"}], in the order in which the scene creates them."""
         result = []
-        for place in range(value_of("scene_node_count", self._handle.value)):
+        for index in range(value_of("scene_node_count", self._handle.value)):
             one = sized(Node)
-            call("scene_node", self._handle.value, place, byref(one))
+            call("scene_node", self._handle.value, index, byref(one))
             result.append({"name": one.name.decode(), "type": one.type.decode(), "file": one.file.decode(),
                            "line": one.line})
         return result
@@ -544,10 +544,10 @@ class Scene(_Program):
         """Returns what the plan keeps and prunes, and why, as `rapid explain --json` reports it."""
         return json.loads(get("scene_explain", self._handle.value, c_char_p()).value)
 
-    def points_behind(self, node, frame):
+    def points_after(self, node, frame):
         """Returns the points as they leave a node in a frame, as a Frame whose output has the node's name. Afterwards
         the scene is at its start."""
-        return self._frame("scene_points_behind", node.encode(), frame)
+        return self._frame("scene_points_after", node.encode(), frame)
 
     def graph(self, form="svg"):
         """Returns the scene's graph: "dot" in Graphviz's language, "svg" as a picture, "json" as nodes and edges with
@@ -562,8 +562,8 @@ class Scene(_Program):
     def trace(self, ids, first, last, create=None):
         """Returns the lives of points, selected by id, in the frames from first to last, as `rapid trace --json`
         reports them. create: the name of the node that creates the points. Afterwards the scene is at its start."""
-        text, places = c_char_p(), (c_int64 * len(ids))(*(Int64.checked(one) for one in ids))
-        self._call("scene_trace", self._handle.value, places, len(ids), create.encode() if create else None, first, last,
+        text, numbers = c_char_p(), (c_int64 * len(ids))(*(Int64.checked(one) for one in ids))
+        self._call("scene_trace", self._handle.value, numbers, len(ids), create.encode() if create else None, first, last,
                    byref(text))
         return json.loads(text.value)
 
@@ -613,7 +613,7 @@ class Run(_Program):
         options.text = None if text is None else encoded(text)
         if frames is not None:
             options.frames = ctypes.pointer(Frames(*frames) if len(frames) == 3 else Frames(*frames, 1))
-        options.outputs, options.output_count = texts(outputs, "outputs", "patterns")
+        options.outputs, options.output_count = strings(outputs, "outputs", "patterns")
         options.width, options.height = Int.checked(width), Int.checked(height)
         options.camera = _camera(position, target, fov)
         for name, path in (("statistics", statistics), ("profile", profile), ("events", events), ("cache", cache)):
@@ -622,11 +622,11 @@ class Run(_Program):
         options.part, options.part_count = part or (0, 0)
         options.sample = sample
         if frame:
-            options.frame = FrameDone(self._guard(lambda _, *told: frame(*told[:3], bool(told[3])), None))
+            options.frame = FrameDone(self._guard(lambda _, *values: frame(*values[:3], bool(values[3])), None))
         if line:
-            options.line = Line(self._guard(lambda _, told: line(told.decode()), None))
+            options.line = Line(self._guard(lambda _, values: line(values.decode()), None))
         if warning:
-            options.warning = Line(self._guard(lambda _, told: warning(told.decode()), None))
+            options.warning = Line(self._guard(lambda _, values: warning(values.decode()), None))
         of_scene = self._scene_options(**scene)
         self._options = options, of_scene
         handle = c_void_p()
@@ -672,14 +672,14 @@ def merge_files(parts, output, progress=None):
     returns False. Returns {"parts", "frames", "points"}. No scene may run at the same time."""
     merged, raised = sized(Merged), []
 
-    def told(_, frame, points):
+    def report(_, frame, points):
         try:
             return int(progress is None or progress(frame, points) is not False)
         except BaseException as error:
             raised.append(error)
             return 0
     try:
-        call("merge_files", *texts(parts, "parts", "patterns"), encoded(str(output)), MergeProgress(told), None, byref(merged))
+        call("merge_files", *strings(parts, "parts", "patterns"), encoded(str(output)), MergeProgress(report), None, byref(merged))
     except Error as error:
         if raised:
             raise raised[0] from error

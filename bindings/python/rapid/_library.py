@@ -202,8 +202,8 @@ def _load():
 
 library = _load()
 
-_texts = ["message", "file", "node", "text", "script_stack"]
-for _text in _texts:
+_strings = ["message", "file", "node", "text", "script_stack"]
+for _text in _strings:
     getattr(library, f"rapid_error_{_text}").restype = c_char_p
     getattr(library, f"rapid_error_{_text}").argtypes = [c_void_p]
 library.rapid_error_line.argtypes = library.rapid_error_release.argtypes = [c_void_p]
@@ -250,7 +250,7 @@ for _name, _types in {
         "frame_statistics": [c_void_p, POINTER(Statistics)],
         "frame_statistics_json": [c_void_p, _text],
         "frame_profile_json": [c_void_p, _text],
-        "frame_places": [c_void_p, POINTER(c_int64), Size, POINTER(c_uint32)],
+        "frame_indices": [c_void_p, POINTER(c_int64), Size, POINTER(c_uint32)],
         "frame_column": [c_void_p, _Text, POINTER(Column)],
         "frame_group": [c_void_p, _Text, POINTER(Column)],
         "frame_expanded": [c_void_p, _Text, POINTER(Column)],
@@ -270,7 +270,7 @@ for _name, _types in {
         "call_add_rod": [POINTER(Call), Int64, Int64, c_double, c_double],
         "scene_offer": [c_void_p, c_void_p],
         "scene_explain": [c_void_p, _text],
-        "scene_points_behind": [c_void_p, _Text, Int64, _handle],
+        "scene_points_after": [c_void_p, _Text, Int64, _handle],
         "scene_graph": [c_void_p, Int, _text],
         "scene_trace": [c_void_p, POINTER(c_int64), Size, _Text, Int64, Int64, _text],
         "offers_release": [c_void_p],
@@ -311,7 +311,7 @@ def call(name, *arguments):
         return
     try:
         message, file, node, text, stack = (getattr(library, f"rapid_error_{part}")(fault).decode()
-                                            for part in _texts)
+                                            for part in _strings)
         raise Error(STATUS.get(status, str(status)), message, file, library.rapid_error_line(fault), node, text, stack)
     finally:
         library.rapid_error_release(fault)
@@ -347,7 +347,7 @@ def lines(name, handle):
     return text.decode().split("\n") if text else []
 
 
-def texts(values, name, what):
+def strings(values, name, what):
     """Returns an array of strings for the library, and its length."""
     if isinstance(values, (str, bytes)):
         raise TypeError(f"{name} = {values!r}; it must be a list of {what}")
@@ -393,6 +393,6 @@ def from_value(value):
 
 def to_settings(values):
     settings = (Setting * len(values))()
-    for place, (name, value) in enumerate(values.items()):
-        settings[place].name, settings[place].value = encoded(name), to_value(value, name)
+    for index, (name, value) in enumerate(values.items()):
+        settings[index].name, settings[index].value = encoded(name), to_value(value, name)
     return settings

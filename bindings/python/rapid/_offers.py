@@ -18,9 +18,9 @@ _string = 6
 
 def _tokens(array):
     """Returns the library's tokens for strings."""
-    texts, places = numpy.unique(array, return_inverse=True)
-    tokens = [get("frame_token_of", encoded(str(text)), ctypes.c_uint32()).value for text in texts]
-    return numpy.array(tokens, numpy.uint32)[places]
+    strings, indices = numpy.unique(array, return_inverse=True)
+    tokens = [get("frame_token_of", encoded(str(text)), ctypes.c_uint32()).value for text in strings]
+    return numpy.array(tokens, numpy.uint32)[indices]
 
 
 class _Arrays:
@@ -88,8 +88,8 @@ class Points:
 
     def offer(self, offers, name, _callbacks):
         columns = (Column * len(self._arrays))()
-        for place, (attribute, (array, type_)) in enumerate(self._arrays.items()):
-            columns[place].name, columns[place].type, columns[place].data = encoded(attribute), type_, array.ctypes.data
+        for index, (attribute, (array, type_)) in enumerate(self._arrays.items()):
+            columns[index].name, columns[index].type, columns[index].data = encoded(attribute), type_, array.ctypes.data
         call("offers_points", offers, encoded(name), self._count, columns, len(columns))
 
 
@@ -160,14 +160,14 @@ class _Node:
         node = sized(NodeType)
         node.name, node.doc, node.kind = encoded(self._name), encoded(self._doc), self._kind
         parameters = (NodeParameter * len(self._parameters))()
-        for place, (name, value) in enumerate(self._parameters.items()):
-            parameters[place].name, parameters[place].doc = encoded(name), b""
-            parameters[place].fallback = to_value(value, name)
+        for index, (name, value) in enumerate(self._parameters.items()):
+            parameters[index].name, parameters[index].doc = encoded(name), b""
+            parameters[index].fallback = to_value(value, name)
         node.parameters, node.parameter_count = parameters, len(parameters)
         for what, columns in (("read", self._reads), ("write", self._writes)):
             array = (NodeColumn * len(columns))()
-            for place, (name, width) in enumerate(columns):
-                array[place].name, array[place].type = encoded(name), 1 if width == 3 else 0
+            for index, (name, width) in enumerate(columns):
+                array[index].name, array[index].type = encoded(name), 1 if width == 3 else 0
             setattr(node, what + "s", array)
             setattr(node, what + "_count", len(columns))
         node.call = NodeCall(callbacks.guard(lambda _, now: self._run(now.contents), 1))
@@ -196,8 +196,8 @@ class Now:
         self._now, self._columns = now, {}
         one, three = (now.count,), (now.count, 3)
         for pointers, columns, output in ((now.reads, node._reads, False), (now.writes, node._writes, True)):
-            for place, (name, width) in enumerate(columns):
-                self._columns[name] = arrays.add(pointers[place], one if width == 1 else three, output)
+            for index, (name, width) in enumerate(columns):
+                self._columns[name] = arrays.add(pointers[index], one if width == 1 else three, output)
         if now.id:
             self.P, self.id = arrays.add(now.P, three), arrays.add(now.id, one)
         elif now.P:

@@ -46,15 +46,15 @@ void Cone::turn(std::span<Vec3d> vectors, std::span<const Draws> draws) const
 {
     for (std::size_t begin = 0; begin < vectors.size(); begin += lanes) {
         const std::uint32_t count = static_cast<std::uint32_t>(std::min<std::size_t>(lanes, vectors.size() - begin));
-        Indices places;  // lanes beyond the last vector repeat it
+        Indices indices;  // lanes beyond the last vector repeat it
         for (std::uint32_t l = 0; l < lanes; ++l)
-            places[l] = static_cast<std::uint32_t>(begin) + std::min(l, count - 1);
+            indices[l] = static_cast<std::uint32_t>(begin) + std::min(l, count - 1);
         Doubles u, w;
         for (std::uint32_t l = 0; l < lanes; ++l) {
-            u[l] = draws[places[l]][cone_draw];
-            w[l] = draws[places[l]][turn_draw];
+            u[l] = draws[indices[l]][cone_draw];
+            w[l] = draws[indices[l]][turn_draw];
         }
-        scatter(turned(gather(vectors, places), depth_, u, w), vectors, places, count);
+        scatter(turned(gather(vectors, indices), depth_, u, w), vectors, indices, count);
     }
 }
 

@@ -21,7 +21,7 @@ namespace rapid {
 inline constexpr double whole_tolerance = 1e-9;
 
 // Memory per newborn point with common attributes, in the state and in copies within a frame.
-inline constexpr double bytes_a_birth = 2 * 64;
+inline constexpr double bytes_per_birth = 2 * 64;
 
 inline constexpr std::size_t trial_births = 64;  // per frame, in a trial (Evaluator::examine)
 

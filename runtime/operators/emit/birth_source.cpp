@@ -104,19 +104,19 @@ private:
 };
 
 // v counts as the rate of change if the error of the paths it predicts is below this fraction of the actual paths.
-constexpr double most_off = 0.5;
+constexpr double max_off = 0.5;
 
 bool is_rate_of_change(const PointSet& now, const PointSet& before, std::span<const std::uint32_t> place, double dt)
 {
-    double off = 0, way = 0;
+    double off = 0, distance2 = 0;
     for (std::size_t i = 0; i < place.size(); ++i) {
         if (place[i] == IdIndex::none) continue;
         const Vec3d d = now.P()[i].cast<double>() - before.P()[place[i]].cast<double>();
         const Vec3d mean = 0.5 * (now.v()[i].cast<double>() + before.v()[place[i]].cast<double>());
         off += (d - dt * mean).squaredNorm();
-        way += d.squaredNorm();
+        distance2 += d.squaredNorm();
     }
-    return way > 0 && off <= most_off * most_off * way;
+    return distance2 > 0 && off <= max_off * max_off * distance2;
 }
 
 // The curves along which the points of a source travel in one step, if the source is another set at each step: a
@@ -336,9 +336,9 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
                                                  : moving_points_->motion());
         path_ = rigid_path(motion, clock, end, path);
     } else {
-        const PlacesOn on = from_ == "volume"   ? PlacesOn::Volume
-                            : from_ == "points" ? PlacesOn::Vertices
-                                                : PlacesOn::Faces;
+        const BirthDomain on = from_ == "volume"   ? BirthDomain::Volume
+                               : from_ == "points" ? BirthDomain::Vertices
+                                                   : BirthDomain::Faces;
         take_mesh(moving_mesh_->at(clock, end));
         path_ = deforming_path(*moving_mesh_, clock, end, path, on);
     }

@@ -46,7 +46,7 @@ Births BirthClock::at_rate(double rate, std::int64_t frame, double fps)
     }
     const double at_end = due_by(frame, fps);
     const double before = static_cast<double>(born_), count = std::floor(at_end) - before;
-    StateReader::expect(is_between(count, 0, most_births));
+    StateReader::expect(is_between(count, 0, max_births));
     Births births = at_once(static_cast<std::size_t>(count), fps);
     births.due = at_end - before;
     births.per_second = rate;
@@ -98,7 +98,7 @@ BirthAges::BirthAges(const std::optional<BirthAge>& age, const std::string& birt
 {
 }
 
-void BirthAges::find(const Births& births, const Items& places_in_frame, std::span<const Birthplace> places,
+void BirthAges::find(const Births& births, const Items& indices_in_frame, std::span<const Birthplace> birthplaces,
                      std::span<const Draws> draws, std::span<double> L) const
 {
     const AnyColumn* own = age_ && !age_->attribute.empty() ? source_.values().find(age_->attribute) : nullptr;
@@ -106,11 +106,11 @@ void BirthAges::find(const Births& births, const Items& places_in_frame, std::sp
         if (common_)
             L[i] = *common_;
         else if (own)
-            L[i] = static_cast<double>(source_.value(std::get<Column<float>>(*own).read(), places[i]));
+            L[i] = static_cast<double>(source_.value(std::get<Column<float>>(*own).read(), birthplaces[i]));
         else if (age_)
             L[i] = age_->interval.at(draws[i][age_draw]);
         else
-            L[i] = even_ ? births.even_age(places_in_frame[i]) : h_ * draws[i][age_draw];
+            L[i] = even_ ? births.even_age(indices_in_frame[i]) : h_ * draws[i][age_draw];
     }
 }
 

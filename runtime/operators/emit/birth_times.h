@@ -71,12 +71,12 @@ public:
     {
         keep(total_, rate_, anchor_, carry_, born_);
         if constexpr (Archive::is_loading::value)
-            StateReader::expect(total_ <= most_births && born_ <= total_ && rate_ >= 0 && std::isfinite(rate_) &&
-                                std::isfinite(carry_) && std::abs(anchor_) <= most_births);
+            StateReader::expect(total_ <= max_births && born_ <= total_ && rate_ >= 0 && std::isfinite(rate_) &&
+                                std::isfinite(carry_) && std::abs(anchor_) <= max_births);
     }
 
 private:
-    static constexpr std::int64_t most_births = std::int64_t{1} << 53;  // also the limit of frames
+    static constexpr std::int64_t max_births = std::int64_t{1} << 53;  // also the limit of frames
 
     double due_by(std::int64_t frame, double fps) const;
 
@@ -90,10 +90,10 @@ private:
 // The births of a frame, or the part of them that belongs to a subset.
 struct Chosen {
     const Births& births;
-    std::vector<std::uint32_t> places;  // indices in the frame of those that belong to the subset
+    std::vector<std::uint32_t> indices;  // indices in the frame of those that belong to the subset
     bool are_all;
 
-    std::size_t size() const { return are_all ? births.count : places.size(); }
+    std::size_t size() const { return are_all ? births.count : indices.size(); }
     // Return the chosen births from index `first` on, numbered within the frame, and within the emitter.
     Items in_frame(std::size_t first) const { return items(0, first); }
     Items numbers(std::size_t first) const { return items(births.first, first); }
@@ -101,7 +101,7 @@ struct Chosen {
 private:
     Items items(std::uint64_t base, std::size_t first) const
     {
-        return are_all ? Items(base + first) : Items(base, places.data() + first);
+        return are_all ? Items(base + first) : Items(base, indices.data() + first);
     }
 };
 
@@ -111,7 +111,7 @@ inline Chosen choose(const Births& births, const Subset& subset, std::int64_t ne
     Chosen chosen{births, {}, subset.is_all()};
     if (chosen.are_all) return chosen;
     for (std::size_t i = 0; i < births.count; ++i)
-        if (subset.has(next_id + static_cast<std::int64_t>(i))) chosen.places.push_back(static_cast<std::uint32_t>(i));
+        if (subset.has(next_id + static_cast<std::int64_t>(i))) chosen.indices.push_back(static_cast<std::uint32_t>(i));
     return chosen;
 }
 
@@ -139,9 +139,9 @@ public:
     // The age of all newborn points, s; empty if they differ.
     const std::optional<double>& common() const { return common_; }
 
-    // Finds the ages L of some births, s. places_in_frame: their numbers among the births of this frame; spans have
+    // Finds the ages L of some births, s. indices_in_frame: their numbers among the births of this frame; spans have
     // shape [n]. The draws are read only if ages are random.
-    void find(const Births& births, const Items& places_in_frame, std::span<const Birthplace> places,
+    void find(const Births& births, const Items& indices_in_frame, std::span<const Birthplace> birthplaces,
               std::span<const Draws> draws, std::span<double> L) const;
 
 private:

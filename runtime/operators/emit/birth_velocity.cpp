@@ -17,25 +17,25 @@ BirthVelocity::BirthVelocity(const Vec3d& velocity, const Interval& speed, doubl
         !has_v || source_v_differs_ ? Vec3d(Vec3d::Zero()) : Vec3d(inherit * source.values().v()[0].cast<double>());
 }
 
-void BirthVelocity::find(std::span<const Birthplace> places, std::span<const Draws> draws,
+void BirthVelocity::find(std::span<const Birthplace> birthplaces, std::span<const Draws> draws,
                          std::span<const Draws> speed_draws, std::span<const Vec3d> source_motion,
                          std::span<Vec3f> v) const
 {
     const bool moves = inherit_ != 0 && source_.moves();
     const Strided<Vec3f> source_v = source_.values().v().read();
     std::array<Vec3d, 64> buffer;
-    for (std::size_t begin = 0; begin < places.size(); begin += buffer.size()) {
-        const std::size_t size = std::min(buffer.size(), places.size() - begin);
+    for (std::size_t begin = 0; begin < birthplaces.size(); begin += buffer.size()) {
+        const std::size_t size = std::min(buffer.size(), birthplaces.size() - begin);
         const std::span<Vec3d> own = std::span(buffer).first(size);
         for (std::size_t k = 0; k < size; ++k) {
             const double speed = speed_.is_single() ? speed_.min : speed_.at(speed_draws[begin + k][0]);
-            own[k] = velocity_ + speed * places[begin + k].N.cast<double>();
+            own[k] = velocity_ + speed * birthplaces[begin + k].N.cast<double>();
         }
         if (is_random_) cone_.turn(own, draws.subspan(begin, size));
         for (std::size_t k = 0; k < size; ++k) {
             const std::size_t i = begin + k;
             Vec3d sum = inherited_ + own[k];
-            if (source_v_differs_) sum += inherit_ * source_.value(source_v, places[i]).cast<double>();
+            if (source_v_differs_) sum += inherit_ * source_.value(source_v, birthplaces[i]).cast<double>();
             if (moves) sum += inherit_ * source_motion[i];
             v[i] = sum.cast<float>();
         }

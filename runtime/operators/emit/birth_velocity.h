@@ -31,7 +31,7 @@ public:
 
     // source_motion: velocities of the birthplaces, read if the source moves. Spans have shape [n]. speed_draws: by
     // speed_use, read if speed is random.
-    void find(std::span<const Birthplace> places, std::span<const Draws> draws, std::span<const Draws> speed_draws,
+    void find(std::span<const Birthplace> birthplaces, std::span<const Draws> draws, std::span<const Draws> speed_draws,
               std::span<const Vec3d> source_motion, std::span<Vec3f> v) const;
 
 private:

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "runtime/base/parallel.h"
-#include "runtime/operators/goal/free_places.h"
+#include "runtime/operators/goal/free_positions.h"
 #include "runtime/points/id_index.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/motion/mesh_surface.h"
@@ -46,26 +46,26 @@ void read_value(const Param& param, const Value& value, GoalTarget& target)
                                 param.name, describe(*object)));
 }
 
-class GoalPlaces::Kind {
+class GoalPositions::Kind {
 public:
     virtual ~Kind() = default;
     virtual void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
-                      std::span<Vec3f> places) = 0;
+                      std::span<Vec3f> positions) = 0;
 
 protected:
     // Sets places[i] to place(i) for each member.
     template <class F>
-    static void for_each_member(Strided<std::uint8_t> members, std::span<Vec3f> places, const F& place)
+    static void for_each_member(Strided<std::uint8_t> members, std::span<Vec3f> positions, const F& position_of)
     {
-        for_each_chunk(places.size(), [&](std::size_t begin, std::size_t end) {
+        for_each_chunk(positions.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                if (members[i]) places[i] = place(i);
+                if (members[i]) positions[i] = position_of(i);
         });
     }
 };
 
 // A target position is a point: the one with the same id, or by order of ids, cyclically.
-class GoalPlaces::OfPoints : public Kind {
+class GoalPositions::OfPoints : public Kind {
 public:
     OfPoints(const PointSet& points, MotionPtr motion, std::string by)
         : of_(points), motion_(std::move(motion)), by_(std::move(by))
@@ -78,7 +78,7 @@ public:
     }
 
     void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock&, const Evaluation& now,
-              std::span<Vec3f> places) override
+              std::span<Vec3f> positions) override
     {
         const Eigen::Affine3d pose = motion_ ? motion_->at(now.frame).affine() : Eigen::Affine3d::Identity();
         const auto at = [&](std::uint32_t k) -> Vec3d { return pose * std::as_const(of_).P()[k].cast<double>(); };
@@ -86,14 +86,14 @@ public:
         if (by_ == "nearest") {
             take_nearest(points, members, at);
             const Strided<std::int64_t> numbers = std::as_const(points).column<std::int64_t>(goal_number).read();
-            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            return for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
                 return at(static_cast<std::uint32_t>(numbers[i])).cast<float>();
             });
         }
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         const std::vector<std::uint32_t> order = by_ == "random" ? shuffled(now.random) : std::vector<std::uint32_t>();
         const IdIndex index(std::as_const(of_).id());
-        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+        for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
             const auto k = static_cast<std::uint32_t>(number_of(id[i]) % n);
             if (!order.empty()) return at(order[k]).cast<float>();
             const std::uint32_t same = index[id[i]];
@@ -121,19 +121,19 @@ private:
         const Strided<Vec3f> P = std::as_const(points).P().read();
         const auto n = static_cast<std::int64_t>(of_.size());
         const Strided<std::int64_t> known = std::as_const(points).column<std::int64_t>(goal_number).read();
-        std::vector<std::uint32_t> takers(of_.size()), open;
+        std::vector<std::uint32_t> occupancy(of_.size()), open;
         for (std::uint32_t i = 0; i < points.size(); ++i) {
             if (!members[i]) continue;
             if (known[i] >= 0 && known[i] < n)
-                ++takers[static_cast<std::size_t>(known[i])];
+                ++occupancy[static_cast<std::size_t>(known[i])];
             else
                 open.push_back(i);
         }
         if (open.empty()) return;
         std::sort(open.begin(), open.end(), [&](std::uint32_t a, std::uint32_t b) { return id[a] < id[b]; });
-        std::vector<Vec3d> places;
-        for (std::uint32_t k = 0; k < of_.size(); ++k) places.push_back(at(k));
-        FreePlaces free(std::move(places), std::move(takers));
+        std::vector<Vec3d> positions;
+        for (std::uint32_t k = 0; k < of_.size(); ++k) positions.push_back(at(k));
+        FreePositions free(std::move(positions), std::move(occupancy));
         const std::span<std::int64_t> numbers = points.column<std::int64_t>(goal_number).write();
         for (const std::uint32_t i : open) numbers[i] = free.take(P[i].cast<double>());
     }
@@ -145,7 +145,7 @@ private:
 
 // By id, a target position is a vertex; at random, a position on the surface that each point gets from its id for all
 // times.
-class GoalPlaces::OfMesh : public Kind {
+class GoalPositions::OfMesh : public Kind {
 public:
     OfMesh(MeshPtr rest, std::shared_ptr<const AnimatedMesh> moving, std::string by)
         : rest_(std::move(rest)), moving_(std::move(moving)), by_(std::move(by))
@@ -156,23 +156,23 @@ public:
     }
 
     void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
-              std::span<Vec3f> places) override
+              std::span<Vec3f> positions) override
     {
         const MeshPtr mesh = mesh_at(clock, now.frame);
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         if (by_ == "id")
-            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            return for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
                 return mesh->positions[static_cast<std::size_t>(number_of(id[i]) % mesh->positions.size())];
             });
         if (by_ == "random")
-            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            return for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
                 Birthplace place;
                 scatter_->place(now.random, number_of(id[i]), {&place, 1});
                 return on_face(*mesh, place.element, place.b1, place.b2);
             });
         const MovingBodyPtr surface = mesh_surface(mesh);
         const Strided<Vec3f> P = std::as_const(points).P().read();
-        for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+        for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
             const Vec3d from = P[i].cast<double>();
             const std::int32_t face = surface->material_at(from, 0).face;
             const auto corner = [&](int k) -> Vec3d { return corner_of(*mesh, face, k).cast<double>(); };
@@ -210,7 +210,7 @@ private:
     ScatterPtr scatter_;
 };
 
-class GoalPlaces::OfShape : public Kind {
+class GoalPositions::OfShape : public Kind {
 public:
     OfShape(ShapePtr shape, MotionPtr motion, const std::string& by)
         : shape_(std::move(shape)), motion_(std::move(motion))
@@ -222,19 +222,19 @@ public:
     }
 
     void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock&, const Evaluation& now,
-              std::span<Vec3f> places) override
+              std::span<Vec3f> positions) override
     {
         const Eigen::Affine3d pose = motion_ ? motion_->at(now.frame).affine() : Eigen::Affine3d::Identity();
         const Eigen::Affine3d to_rest = pose.inverse();
         const Strided<std::int64_t> id = std::as_const(points).id().read();
         const Strided<Vec3f> P = std::as_const(points).P().read();
         if (scatter_)
-            return for_each_member(members, places, [&](std::size_t i) -> Vec3f {
+            return for_each_member(members, positions, [&](std::size_t i) -> Vec3f {
                 Birthplace place;
                 scatter_->place(now.random, number_of(id[i]), {&place, 1});
                 return (pose * place.P.cast<double>()).cast<float>();
             });
-        for_each_chunk(places.size(), [&](std::size_t begin, std::size_t end) {
+        for_each_chunk(positions.size(), [&](std::size_t begin, std::size_t end) {
             std::vector<std::size_t> which;
             std::vector<Vec3d> at;
             for (std::size_t i = begin; i < end; ++i) {
@@ -243,7 +243,7 @@ public:
                 at.push_back(to_rest * P[i].cast<double>());
             }
             go_to_surface(at);
-            for (std::size_t k = 0; k < at.size(); ++k) places[which[k]] = (pose * at[k]).cast<float>();
+            for (std::size_t k = 0; k < at.size(); ++k) positions[which[k]] = (pose * at[k]).cast<float>();
         });
     }
 
@@ -264,7 +264,7 @@ private:
     ScatterPtr scatter_;
 };
 
-GoalPlaces::GoalPlaces(const GoalTarget& target, const std::string& by)
+GoalPositions::GoalPositions(const GoalTarget& target, const std::string& by)
 {
     if (const auto points = as<PointsObject>(target.object))
         kind_ = std::make_unique<OfPoints>(points->points, nullptr, by);
@@ -281,14 +281,14 @@ GoalPlaces::GoalPlaces(const GoalTarget& target, const std::string& by)
                                           as<AnimatedShape>(target.object)->motion(), by);
 }
 
-GoalPlaces::~GoalPlaces() = default;
-GoalPlaces::GoalPlaces(GoalPlaces&&) noexcept = default;
-GoalPlaces& GoalPlaces::operator=(GoalPlaces&&) noexcept = default;
+GoalPositions::~GoalPositions() = default;
+GoalPositions::GoalPositions(GoalPositions&&) noexcept = default;
+GoalPositions& GoalPositions::operator=(GoalPositions&&) noexcept = default;
 
-void GoalPlaces::find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
-                      std::span<Vec3f> places)
+void GoalPositions::find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock,
+                         const Evaluation& now, std::span<Vec3f> positions)
 {
-    kind_->find(points, members, clock, now, places);
+    kind_->find(points, members, clock, now, positions);
 }
 
 }  // namespace rapid

@@ -32,18 +32,18 @@ struct GoalTarget {
 void read_value(const Param& param, const Value& value, GoalTarget& target);
 
 // The positions of a target at the end of a frame.
-class GoalPlaces {
+class GoalPositions {
 public:
     // by: "id", "random" or "nearest". Throws Error if the target has no positions of that kind.
-    GoalPlaces(const GoalTarget& target, const std::string& by);
-    ~GoalPlaces();
-    GoalPlaces(GoalPlaces&&) noexcept;
-    GoalPlaces& operator=(GoalPlaces&&) noexcept;
+    GoalPositions(const GoalTarget& target, const std::string& by);
+    ~GoalPositions();
+    GoalPositions(GoalPositions&&) noexcept;
+    GoalPositions& operator=(GoalPositions&&) noexcept;
 
-    // Finds the positions of points whose member is 1; places: shape [points.size()]. Stores goal_number if points
+    // Finds the positions of points whose member is 1; positions: shape [points.size()]. Stores goal_number if points
     // take a position.
     void find(PointSet& points, Strided<std::uint8_t> members, const FrameClock& clock, const Evaluation& now,
-              std::span<Vec3f> places);
+              std::span<Vec3f> positions);
 
 private:
     class Kind;

@@ -21,7 +21,7 @@ const T* contiguous(const Strided<T>& values, std::size_t begin, std::size_t end
 }  // namespace
 
 std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
-                       const std::function<void(std::span<const std::uint8_t>)>& bury)
+                       const std::function<void(std::span<const std::uint8_t>)>& before_removal)
 {
     auto* ages = points.find<float>("age");
     if (!ages || points.empty()) return 0;
@@ -56,7 +56,7 @@ std::size_t age_points(PointSet& points, const std::string& group, double frame_
     });
     const std::size_t before = points.size();
     if (!lives) return 0;
-    bury(keep);
+    before_removal(keep);
     points.keep(keep);
     return before - points.size();
 }

@@ -47,6 +47,6 @@ private:
 // Advances the ages of the group's points by their `dt`, or by a frame, and removes points that have reached their
 // `life`. Calls bury(stays) before removal: their mask is 0. Returns the number that died.
 std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
-                       const std::function<void(std::span<const std::uint8_t>)>& bury);
+                       const std::function<void(std::span<const std::uint8_t>)>& before_removal);
 
 }  // namespace rapid

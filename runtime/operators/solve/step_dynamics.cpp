@@ -24,7 +24,7 @@ namespace {
 
 // Limits of voxels for a level set, and for one whose band is wider than the shape itself, which takes about 4 s to
 // fill and 1.5 GiB to store: points that large collide well without such small voxels.
-constexpr double most_voxels = 0x1p31, most_voxels_of_wide_band = 0x1p27;
+constexpr double max_voxels = 0x1p31, max_voxels_of_wide_band = 0x1p27;
 
 LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& collider)
 {
@@ -32,7 +32,7 @@ LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& 
     const Eigen::Array3d size = shape->bounds().sizes().array() / shape->voxel();
     const double band = needed / shape->voxel();
     const double voxels = (size + 2 * band).prod() - (size - 2 * band).max(0).prod();
-    const double most = band > size.maxCoeff() ? most_voxels_of_wide_band : most_voxels;
+    const double most = band > size.maxCoeff() ? max_voxels_of_wide_band : max_voxels;
     if (voxels > most)
         throw Error(fmt::format("points with a radius of {:.4g} m need a band of {:.0f} voxels of {:g} m around its "
                                 "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",

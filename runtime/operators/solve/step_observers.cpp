@@ -67,14 +67,14 @@ public:
         log_.reset();
     }
 
-    void bury(const Step& step, std::span<const std::uint8_t> stays) override
+    void before_removal(const Step& step, std::span<const std::uint8_t> stays) override
     {
-        std::vector<std::uint32_t> places;
+        std::vector<std::uint32_t> indices;
         for (std::size_t i = 0; i < stays.size(); ++i)
-            if (!stays[i]) places.push_back(static_cast<std::uint32_t>(i));
-        if (places.empty()) return;
+            if (!stays[i]) indices.push_back(static_cast<std::uint32_t>(i));
+        if (indices.empty()) return;
         StepRecord& record = *step.flow.simulation->record;
-        const PointSet& old = record.old = step.flow.points.select(places);
+        const PointSet& old = record.old = step.flow.points.select(indices);
         const Strided<float> age = old.column<float>("age").read(), life = old.column<float>("life").read();
         for (std::size_t i = 0; i < old.size(); ++i)
             record.old_at.push_back(record.time - std::max(0.0, double(age[i]) - double(life[i])));
@@ -127,7 +127,7 @@ public:
 
     void begin(Step& step, const PointSet& entered) override
     {
-        note_left_out(step);
+        note_excluded(step);
         const PointSet& points = step.flow.points;
         const bool alone = step.moves_alone();
         shadows_.begin(points, !alone || is_closed_form(points, step.run, step.options), step.options.h);
@@ -162,18 +162,18 @@ public:
 
 private:
     // Notes parameters that are functions of the frame and not included in the errors.
-    static void note_left_out(const Step& step)
+    static void note_excluded(const Step& step)
     {
         const auto& varying = step.flow.simulation->varying;
-        std::vector<std::string>& left_out = step.now.figures.left_out_of_errors;
+        std::vector<std::string>& excluded = step.now.figures.left_out_of_errors;
         step.flow.dynamics.visit_in_order([&](const auto& dynamic) {
             using D = std::decay_t<decltype(*dynamic)>;
             if (step.tolerance && std::is_same_v<D, Interaction>)
-                left_out.push_back(dynamic->node + ", whose kicks with a tolerance are at the ends of frames");
+                excluded.push_back(dynamic->node + ", whose kicks with a tolerance are at the ends of frames");
             const auto found = varying.find(dynamic->node);
             if (found == varying.end()) return;
             for (const std::string& param : found->second)
-                left_out.push_back(
+                excluded.push_back(
                     fmt::format("{}.{}, a function of the frame that is called once in each", dynamic->node, param));
         });
     }
@@ -182,8 +182,8 @@ private:
     void check_tolerance(Step& step, const PointSet& moved)
     {
         if (!step.tolerance || shadows_.idle()) return;
-        step.beyond = tolerance_check_.beyond(shadows_.before(), moved, step.finer, step.options, step.allowed_error(),
-                                              2 * step.max_substeps);
+        step.beyond_tolerance = tolerance_check_.beyond_tolerance(shadows_.before(), moved, step.finer, step.options,
+                                                                  step.allowed_error(), 2 * step.max_substeps);
     }
 
     void compare_sample(Step& step, const PointSet& moved)
@@ -229,7 +229,7 @@ public:
         warn(step);
     }
 
-    void bury(const Step& step, std::span<const std::uint8_t> stays) override
+    void before_removal(const Step& step, std::span<const std::uint8_t> stays) override
     {
         if (all_newborn_ && std::find(stays.begin(), stays.end(), 1) == stays.end())
             step.warn("all points die in the frame of their birth; give them a longer life");
@@ -281,7 +281,7 @@ private:
         else if (result.ledger)
             figures.ledger = result.ledger;
         figures.penetration_max = std::max(figures.penetration_max, result.penetration_max);
-        figures.beyond_tolerance += std::max(step.done.beyond, step.beyond);
+        figures.beyond_tolerance += std::max(step.done.beyond_tolerance, step.beyond_tolerance);
     }
 
     static void warn(const Step& step)
@@ -304,16 +304,16 @@ private:
                             "half_width shows it farther"
                           : "points are in a shape, with no way out: between shapes that leave no room, or in its "
                             "middle; let them be born outside, or move the shapes apart");
-        if (step.done.beyond > 0)
+        if (step.done.beyond_tolerance > 0)
             step.warn(
                 fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps or "
                             "the tolerance",
                             step.done.substeps, *step.tolerance));
-        if (step.beyond > step.done.beyond)
+        if (step.beyond_tolerance > step.done.beyond_tolerance)
             step.warn(
                 fmt::format("by a sample, {} points are farther than {:g} m from where other sub-steps take them: the "
                             "forces change within a sub-step; take more substeps to begin with",
-                            step.beyond, *step.tolerance));
+                            step.beyond_tolerance, *step.tolerance));
     }
 
     // Returns true if any collider's shape knows its distance only within a band.
@@ -326,7 +326,7 @@ private:
     bool all_newborn_ = false;
 };
 
-// Adds per-point figures to the result of Solve as attributes, for inspection (Evaluator::tell_points):
+// Adds per-point figures to the result of Solve as attributes, for inspection (Evaluator::add_per_point_diagnostics):
 //
 //   error     m, the estimated error of the position; nan if the point is not in the sample
 //   substeps  that the frame took for the point
@@ -337,13 +337,13 @@ class PointFigures final : public StepObserver {
 public:
     bool observes(const Step& step) const override
     {
-        return StepObserver::observes(step) && step.flow.simulation->tells_points;
+        return StepObserver::observes(step) && step.flow.simulation->per_point_diagnostics;
     }
 
     // Nothing has moved yet.
     void start(Flow& flow) override
     {
-        if (flow.simulation->tells_points) annotate(flow.points);
+        if (flow.simulation->per_point_diagnostics) annotate(flow.points);
     }
 
     // Points take individual substeps if there is a tolerance.
@@ -367,7 +367,7 @@ public:
 
     void annotate(PointSet& points) override
     {
-        const IdIndex places(points.id());
+        const IdIndex indices(points.id());
         // Adds a column with this value, and other values at the points with these ids.
         const auto add = [&]<class T, class V>(const char* name, T all, T fallback, Strided<std::int64_t> ids,
                                                const std::vector<V>& values) {
@@ -376,7 +376,7 @@ public:
             if (!values.empty() && !points.empty()) {
                 const std::span<T> to = column.write();
                 for (std::size_t k = 0; k < values.size(); ++k)
-                    if (const std::uint32_t i = places[ids[k]]; i != IdIndex::none) to[i] = values[k];
+                    if (const std::uint32_t i = indices[ids[k]]; i != IdIndex::none) to[i] = values[k];
             }
             points.set(name, std::move(column));
         };
@@ -400,7 +400,7 @@ private:
 
 double Step::allowed_error() const { return *tolerance / flow.simulation->subframes; }
 
-Tolerated Step::advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by) const
+ToleranceResult Step::advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by) const
 {
     if (!tolerance) return {solve(points, dynamics, with), with.substeps, 0};
     return solve_within(points, dynamics, with, allowed_error() / (finer_by * finer_by), finer_by * max_substeps);

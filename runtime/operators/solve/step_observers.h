@@ -25,10 +25,10 @@ struct Step {
     const int max_substeps;                 // with a tolerance
     SolveOptions options = {};
     Dynamics run = {}, finer = {};  // for the points; for shadows, with twice the substeps
-    Tolerated done = {};            // after the advance
+    ToleranceResult done = {};      // after the advance
 
     // Findings of observers that later ones read.
-    std::uint64_t beyond = 0;            // points that miss the tolerance, from a sample
+    std::uint64_t beyond_tolerance = 0;  // points that miss the tolerance, from a sample
     std::vector<std::int64_t> ids = {};  // of the points whose errors are known
     std::vector<double> errors = {};     // m, by ids
     bool is_exact = false;               // all points are exactly on their trajectories
@@ -44,7 +44,8 @@ struct Step {
     double allowed_error() const;  // m, from the tolerance
     // Advances points by the step: with the substeps of the options, or with those that the tolerance needs. With
     // twice as fine steps, the allowed error is a quarter.
-    Tolerated advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by = 1) const;
+    ToleranceResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with,
+                            int finer_by = 1) const;
     void note_errors(std::span<const std::int64_t> of, std::vector<double> found);
     void warn(const std::string& text) const;
 };
@@ -64,7 +65,7 @@ public:
     // Is called after they have moved. moved: the points before the kicks at the end of the step.
     virtual void end(Step&, const PointSet& /*moved*/) {}
     // Is called when points with mask 0 have reached the end of their lives, before they are removed.
-    virtual void bury(const Step&, std::span<const std::uint8_t> /*stays*/) {}
+    virtual void before_removal(const Step&, std::span<const std::uint8_t> /*stays*/) {}
     // Adds attributes to the result of Solve that are not part of the state.
     virtual void annotate(PointSet&) {}
 

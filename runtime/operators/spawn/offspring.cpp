@@ -27,12 +27,12 @@ struct Offspring::Columns {
     std::span<float> dt, birthtime, life;
     std::vector<DrawValues> drawn;
     // Each copies an attribute of a parent to the births from `first` on.
-    std::vector<std::function<void(const Brood& brood, std::size_t first, std::size_t count)>> inherit;
+    std::vector<std::function<void(const Children& children, std::size_t first, std::size_t count)>> inherit;
 };
 
-Offspring::Offspring(const ParentPaths& parents, const std::vector<Brood>& broods, const Traits& traits,
+Offspring::Offspring(const ParentPaths& parents, const std::vector<Children>& all_children, const Traits& traits,
                      const Evaluation& now)
-    : parents_(parents), broods_(broods), traits_(traits), newborn_(traits.newborn), now_(now)
+    : parents_(parents), all_children_(all_children), traits_(traits), newborn_(traits.newborn), now_(now)
 {
 }
 
@@ -46,7 +46,7 @@ void Offspring::make_columns(PointSet& points) const
 
 std::size_t Offspring::append_to(PointSet& points, std::int64_t& next_id, std::size_t most) const
 {
-    const std::size_t all = broods_.empty() ? 0 : broods_.back().first + broods_.back().count;
+    const std::size_t all = all_children_.empty() ? 0 : all_children_.back().first + all_children_.back().count;
     const std::size_t n = std::min(all, most);
     if (n == 0) return 0;
     std::vector<AttributeSpec> common = {{"age", 0.0f}};
@@ -92,13 +92,13 @@ void Offspring::add_inherited(PointSet& points, std::size_t n, Columns& columns)
                 const std::span<T> to = column.write().last(n);
                 const bool is_mass = traits_.splits && name == "mass", is_radius = traits_.splits && name == "pscale";
                 const T fallback = column.fallback();
-                columns.inherit.push_back([=, this](const Brood& brood, std::size_t first, std::size_t count) {
-                    const ParentPaths::Parent& parent = parents_[brood.parent];
+                columns.inherit.push_back([=, this](const Children& children, std::size_t first, std::size_t count) {
+                    const ParentPaths::Parent& parent = parents_[children.parent];
                     const Column<T>* from = parent.set->find<T>(name);
-                    T value = from ? (*from)[parent.place] : fallback;
+                    T value = from ? (*from)[parent.index] : fallback;
                     if constexpr (std::is_same_v<T, float>) {
-                        if (is_mass) value = value / static_cast<float>(brood.count);
-                        if (is_radius) value = value / std::cbrt(static_cast<float>(brood.count));
+                        if (is_mass) value = value / static_cast<float>(children.count);
+                        if (is_radius) value = value / std::cbrt(static_cast<float>(children.count));
                     }
                     std::fill_n(to.begin() + static_cast<std::ptrdiff_t>(first), count, value);
                 });
@@ -113,34 +113,35 @@ void Offspring::fill(const Columns& columns, std::size_t begin, std::size_t end)
     const Cone cone(newborn_.spread);
     const StepRecord& record = parents_.record();
     const bool turns = newborn_.spread > 0 && (!is_zero(newborn_.speed) || newborn_.velocity != Vec3d::Zero());
-    auto brood = std::upper_bound(broods_.begin(), broods_.end(), begin,
-                                  [](std::size_t i, const Brood& b) { return i < b.first; }) -
-                 1;
+    auto children = std::upper_bound(all_children_.begin(), all_children_.end(), begin,
+                                     [](std::size_t i, const Children& b) { return i < b.first; }) -
+                    1;
     std::array<Draws, 64> draws;
     std::array<Vec3d, 64> own, of_parent;  // m/s
     for (std::size_t i = begin; i < end;) {
-        if (i >= brood->first + brood->count) ++brood;
-        const std::size_t k = i - brood->first;
-        const std::size_t count = std::min({brood->count - k, end - i, draws.size()});
-        const std::int64_t parent = parents_.id(parents_[brood->parent]);
-        const std::uint64_t number = number_of(parent, brood->number + k);
+        if (i >= children->first + children->count) ++children;
+        const std::size_t k = i - children->first;
+        const std::size_t count = std::min({children->count - k, end - i, draws.size()});
+        const std::int64_t parent = parents_.id(parents_[children->parent]);
+        const std::uint64_t number = number_of(parent, children->number + k);
         uniform4(now_.random, number, draw_use, std::span(draws).first(count));
-        for (const auto& inherit : columns.inherit) inherit(*brood, i, count);
+        for (const auto& inherit : columns.inherit) inherit(*children, i, count);
         for (const DrawValues& draw : columns.drawn) draw(i, count, number);
-        const ParentPaths::Parent& of = parents_[brood->parent];
-        ParentPaths::Piece piece = parents_.piece(of, brood->begin);
+        const ParentPaths::Parent& of = parents_[children->parent];
+        ParentPaths::Piece piece = parents_.piece(of, children->begin);
         for (std::size_t j = 0; j < count; ++j) {
-            double t = brood->begin;
-            if (brood->spacing > 0)
-                t += (static_cast<double>(k + j + 1) - brood->due) * brood->spacing;
-            else if (brood->end > brood->begin)
-                t += draws[j][age_draw] * (brood->end - brood->begin);
-            t = std::min(t, brood->end);
+            double t = children->begin;
+            if (children->spacing > 0)
+                t += (static_cast<double>(k + j + 1) - children->due) * children->spacing;
+            else if (children->end > children->begin)
+                t += draws[j][age_draw] * (children->end - children->begin);
+            t = std::min(t, children->end);
             if (!piece.holds(t)) piece = parents_.piece(of, t);
-            const ParentPaths::Moment moment = brood->hit == Brood::no_hit ? piece.at(t) : moment_of_hit(brood->hit);
+            const ParentPaths::Moment moment =
+                children->hit == Children::no_hit ? piece.at(t) : moment_of_hit(children->hit);
             of_parent[j] = moment.v;
             own[j] = newborn_.velocity;
-            if (!is_zero(newborn_.speed)) own[j] += speed_of(number + j) * normal_of(*brood, moment.v);
+            if (!is_zero(newborn_.speed)) own[j] += speed_of(number + j) * normal_of(*children, moment.v);
             columns.P[i + j] = moment.P.cast<float>();
             const double L = record.h - t + traits_.wait;
             if (!columns.dt.empty()) columns.dt[i + j] = static_cast<float>(L);
@@ -161,19 +162,19 @@ double Offspring::speed_of(std::uint64_t number) const
                                       : newborn_.speed.at(uniform4(now_.random, number, speed_use)[0]);
 }
 
-ParentPaths::Moment Offspring::moment_of_hit(std::uint32_t place) const
+ParentPaths::Moment Offspring::moment_of_hit(std::uint32_t index) const
 {
-    const LoggedHit& hit = parents_.record().hits[place];
+    const LoggedHit& hit = parents_.record().hits[index];
     return {hit.P.cast<double>(), hit.v1.cast<double>()};
 }
 
 // Returns the direction of `speed`: the surface normal at a hit, the parent's attribute N, or its direction of motion.
-Vec3d Offspring::normal_of(const Brood& brood, const Vec3d& v) const
+Vec3d Offspring::normal_of(const Children& children, const Vec3d& v) const
 {
-    if (brood.hit != Brood::no_hit) return parents_.record().hits[brood.hit].n.cast<double>();
-    const ParentPaths::Parent& parent = parents_[brood.parent];
+    if (children.hit != Children::no_hit) return parents_.record().hits[children.hit].n.cast<double>();
+    const ParentPaths::Parent& parent = parents_[children.parent];
     const Column<Vec3f>* normals = parent.set->find<Vec3f>("N");
-    const Vec3d along = normals ? Vec3d((*normals)[parent.place].cast<double>()) : v;
+    const Vec3d along = normals ? Vec3d((*normals)[parent.index].cast<double>()) : v;
     const double length = along.norm();
     return length > 0 ? Vec3d(along / length) : Vec3d(Vec3d::UnitY());
 }

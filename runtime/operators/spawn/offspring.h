@@ -23,7 +23,7 @@ struct Traits {
 class Offspring {
 public:
     // All arguments must outlive it.
-    Offspring(const ParentPaths& parents, const std::vector<Brood>& broods, const Traits& traits,
+    Offspring(const ParentPaths& parents, const std::vector<Children>& all_children, const Traits& traits,
               const Evaluation& now);
 
     // Appends the first `most` births, or all if there are fewer, with ids from next_id on. Returns their number.
@@ -39,11 +39,11 @@ private:
     void add_inherited(PointSet& points, std::size_t n, Columns& columns) const;
     void fill(const Columns& columns, std::size_t begin, std::size_t end) const;
     double speed_of(std::uint64_t number) const;
-    ParentPaths::Moment moment_of_hit(std::uint32_t place) const;
-    Vec3d normal_of(const Brood& brood, const Vec3d& v) const;
+    ParentPaths::Moment moment_of_hit(std::uint32_t index) const;
+    Vec3d normal_of(const Children& children, const Vec3d& v) const;
 
     const ParentPaths& parents_;
-    const std::vector<Brood>& broods_;
+    const std::vector<Children>& all_children_;
     const Traits& traits_;
     const Newborn& newborn_;
     const Evaluation& now_;

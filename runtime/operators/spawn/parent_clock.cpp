@@ -14,7 +14,7 @@
 namespace rapid {
 namespace {
 
-constexpr double most_of_parent = 4294967295;  // births: their numbers are half of a counter
+constexpr double max_births_of_parent = 4294967295;  // births: their numbers are half of a counter
 
 double whole_births(double due) { return std::floor(due + whole_tolerance); }
 
@@ -50,7 +50,7 @@ public:
     {
         if (comparison_.attribute == "P") return component(paths_.at(parent, t).P);
         if (comparison_.attribute == "v") return component(paths_.at(parent, t).v);
-        const double after = value(*parent.set, parent.place), T = parent.path_end - parent.begin;
+        const double after = value(*parent.set, parent.index), T = parent.path_end - parent.begin;
         const bool starts_here = parent.before != ParentPaths::none;
         if (!starts_here || !(T > 0)) return after;
         const double before = value(paths_.record().before, parent.before);
@@ -154,8 +154,8 @@ public:
         if (attribute_.empty()) return value_;
         for (const auto& [set, values] : of_set_) {
             if (set != parent.set) continue;
-            const double value = values[parent.place];
-            if (value >= 0 && value <= most_of_parent) return value;
+            const double value = values[parent.index];
+            if (value >= 0 && value <= max_births_of_parent) return value;
             throw Error(fmt::format("{} = rapid.attr \"{}\": parent {} has {:g}; it must be at least 0", what_,
                                     attribute_, id, value));
         }
@@ -231,14 +231,14 @@ public:
             take_stream(i, parent, state);
     }
 
-    std::vector<Brood> broods;
+    std::vector<Children> all_children;
 
 private:
     void take_stream(std::uint32_t i, const ParentPaths::Parent& parent, State& state)
     {
-        Brood brood{};
-        brood.begin = plan_.birth == "end" ? parent.end : parent.begin;
-        brood.end = plan_.birth == "begin" ? parent.begin : parent.end;
+        Children children{};
+        children.begin = plan_.birth == "end" ? parent.end : parent.begin;
+        children.end = plan_.birth == "begin" ? parent.begin : parent.end;
         const std::int64_t id = parents_.id(parent);
         const bool even = plan_.birth == "even";
         const double T = parent.end - parent.begin;
@@ -246,17 +246,17 @@ private:
             const double of_frame = parents_.record().h > 0 ? std::floor(counts_->of(parent, id)) : 0;
             const double births =
                 std::floor(of_frame * (plan_.part + 1) / plan_.parts) - std::floor(of_frame * plan_.part / plan_.parts);
-            if (even && births > 0) brood.spacing = T / births;
-            return add(i, state, births, brood);
+            if (even && births > 0) children.spacing = T / births;
+            return add(i, state, births, children);
         }
         const double rate = rates_->of(parent, id);
         // Parents that are born together do not emit simultaneously, unless births are even.
         if (!state.is_known && !even) state.due = uniform4(random_, static_cast<std::uint64_t>(id), phase_use)[0];
         state.is_known = true;
         const double due = state.due + rate * T, births = whole_births(due);
-        if (even && rate > 0) brood.spacing = 1 / rate, brood.due = state.due;
+        if (even && rate > 0) children.spacing = 1 / rate, children.due = state.due;
         state.due = std::max(0.0, due - births);
-        add(i, state, births, brood);
+        add(i, state, births, children);
     }
 
     void take_events(std::uint32_t i, const ParentPaths::Parent& parent, State& state)
@@ -279,7 +279,7 @@ private:
                 take_comparison(i, parent, state);
                 break;
             case BirthEvent::Tests: {
-                const bool holds = parent.is_alive && holds_[parent.place];
+                const bool holds = parent.is_alive && holds_[parent.index];
                 if (holds && !state.held) add_at(i, state, parent.end);
                 state.held = holds;
             }
@@ -315,27 +315,27 @@ private:
         state.held = last;
     }
 
-    void add_at(std::uint32_t i, State& state, double t, std::uint32_t hit = Brood::no_hit)
+    void add_at(std::uint32_t i, State& state, double t, std::uint32_t hit = Children::no_hit)
     {
         const ParentPaths::Parent& parent = parents_[i];
-        Brood brood{};
-        brood.hit = hit;
-        brood.begin = brood.end = t;
-        add(i, state, counts_ ? std::floor(counts_->of(parent, parents_.id(parent))) : 1, brood);
+        Children children{};
+        children.hit = hit;
+        children.begin = children.end = t;
+        add(i, state, counts_ ? std::floor(counts_->of(parent, parents_.id(parent))) : 1, children);
     }
 
-    void add(std::uint32_t i, State& state, double births, Brood brood)
+    void add(std::uint32_t i, State& state, double births, Children children)
     {
         if (plan_.limit) births = std::min(births, *plan_.limit - std::min(*plan_.limit, double(state.born)));
-        births = std::min(births, most_of_parent - double(state.born));
+        births = std::min(births, max_births_of_parent - double(state.born));
         if (!(births >= 1)) return;
-        brood.parent = i;
-        brood.number = state.born;
-        brood.first = total_;
-        brood.count = static_cast<std::size_t>(births);
-        total_ += brood.count;
-        state.born += brood.count;
-        broods.push_back(brood);
+        children.parent = i;
+        children.number = state.born;
+        children.first = total_;
+        children.count = static_cast<std::size_t>(births);
+        total_ += children.count;
+        state.born += children.count;
+        all_children.push_back(children);
     }
 
     const ParentPaths& parents_;
@@ -347,7 +347,7 @@ private:
     std::size_t total_ = 0;
 };
 
-std::vector<Brood> ParentClock::births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now)
+std::vector<Children> ParentClock::births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now)
 {
     Tally tally(parents, plan, now);
     const IdIndex known(ids_);
@@ -359,14 +359,14 @@ std::vector<Brood> ParentClock::births(const ParentPaths& parents, const BirthPl
         State state;
         if (next < states_.size() && std::as_const(ids_)[next] == id)
             state = states_[next++];
-        else if (const std::uint32_t place = known[id]; place != IdIndex::none)
-            state = states_[place], next = place + 1;
+        else if (const std::uint32_t index = known[id]; index != IdIndex::none)
+            state = states_[index], next = index + 1;
         tally.take(i, state);
         if (parents[i].is_alive) states.push_back(state);
     }
     ids_ = parents.living().id();
     states_ = std::move(states);
-    return std::move(tally.broods);
+    return std::move(tally.all_children);
 }
 
 }  // namespace rapid

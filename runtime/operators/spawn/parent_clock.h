@@ -82,7 +82,7 @@ struct BirthEvent {
 void read_value(const Param& param, const Value& value, BirthEvent& field);
 
 // The children of one parent: born at one time, or over the parent's time in the step.
-struct Brood {
+struct Children {
     static constexpr std::uint32_t no_hit = UINT32_MAX;
 
     std::uint32_t parent;         // index among the paths
@@ -106,7 +106,7 @@ struct BirthPlan {
 class ParentClock {
 public:
     // Returns the children of a step, by parent, then by time. Must be called for the steps in order.
-    std::vector<Brood> births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now);
+    std::vector<Children> births(const ParentPaths& parents, const BirthPlan& plan, const Evaluation& now);
 
     template <class Archive>
     void serialize(Archive& keep)

@@ -81,7 +81,7 @@ void ParentPaths::take_hits()
 
 ParentPaths::Piece ParentPaths::piece(const Parent& parent, double t) const
 {
-    Moment to = states_of(parent).at(parent.place);
+    Moment to = states_of(parent).at(parent.index);
     if (parent.before == none) return piece_between(to, to, parent.end, parent.end);
     Moment from = before_.at(parent.before);
     double begin = parent.begin, end = parent.path_end;

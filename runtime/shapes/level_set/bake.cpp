@@ -12,15 +12,15 @@
 namespace rapid {
 namespace {
 
-using Place = BlockTable::Place;
+using BlockCoord = BlockTable::BlockCoord;
 
 constexpr int block = BakedGrid::block, edge = BakedGrid::edge;
 
-// Returns the block at `place` and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
-std::array<BlockValues, 8> neighbourhood(const BlockTable::Reader& at, const Place& place)
+// Returns the block at `coord` and its seven upper neighbours: bit 2 of the index is +x, bit 1 +y, bit 0 +z.
+std::array<BlockValues, 8> neighbourhood(const BlockTable::Reader& at, const BlockCoord& coord)
 {
     std::array<BlockValues, 8> blocks;
-    for (int n = 0; n < 8; ++n) blocks[n] = at(place + Place(n >> 2, n >> 1 & 1, n & 1));
+    for (int n = 0; n < 8; ++n) blocks[n] = at(coord + BlockCoord(n >> 2, n >> 1 & 1, n & 1));
     return blocks;
 }
 
@@ -142,8 +142,8 @@ private:
     // constant beyond.
     void cover()
     {
-        low_ = blocks_.with_values.min() - Place::Ones();
-        baked_.blocks = blocks_.with_values.max() - low_ + Place::Ones();
+        low_ = blocks_.with_values.min() - BlockCoord::Ones();
+        baked_.blocks = blocks_.with_values.max() - low_ + BlockCoord::Ones();
         baked_.origin = blocks_.to_world((block * low_).cast<double>());
         in_slab_ = std::size_t(baked_.blocks.y()) * baked_.blocks.z();
         baked_.index.resize(in_slab_ * baked_.blocks.x());
@@ -151,7 +151,7 @@ private:
         varying_.assign(baked_.blocks.x() + 1, 0);
     }
 
-    Place position(std::size_t b) const
+    BlockCoord position(std::size_t b) const
     {
         const std::size_t in = b % in_slab_, n_z = std::size_t(baked_.blocks.z());
         return {static_cast<int>(b / in_slab_), static_cast<int>(in / n_z), static_cast<int>(in % n_z)};
@@ -178,7 +178,7 @@ private:
 
     bool has_values_above(std::size_t b) const
     {
-        const Place at = position(b), &n = baked_.blocks;
+        const BlockCoord at = position(b), &n = baked_.blocks;
         for (int k = 1; k < 8; ++k) {
             const int x = at.x() + (k >> 2), y = at.y() + (k >> 1 & 1), z = at.z() + (k & 1);
             if (x < n.x() && y < n.y() && z < n.z() && has_values_[(std::size_t(x) * n.y() + y) * n.z() + z])
@@ -227,7 +227,7 @@ private:
 
     const BlockTable& blocks_;
     BakedGrid baked_;
-    Place low_ = Place::Zero();             // lowest block
+    BlockCoord low_ = BlockCoord::Zero();   // lowest block
     std::size_t in_slab_ = 0;               // blocks per slab of x
     std::vector<std::uint8_t> has_values_;  // per block
     std::vector<std::int32_t> varying_;     // blocks with values in the slabs before x, shape [blocks x + 1]

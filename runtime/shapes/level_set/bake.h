@@ -19,8 +19,8 @@ struct BlockValues {
 };
 
 struct BlockTable {
-    using Place = Eigen::Vector3i;  // in blocks
-    using Reader = std::function<BlockValues(const Place& place)>;
+    using BlockCoord = Eigen::Vector3i;  // in blocks
+    using Reader = std::function<BlockValues(const BlockCoord& coord)>;
 
     Eigen::AlignedBox3i with_values;                // range of the blocks with values; empty if there are none
     double voxel, background;                       // m

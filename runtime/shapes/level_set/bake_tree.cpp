@@ -12,18 +12,18 @@ BakedGrid bake(const openvdb::FloatGrid& grid)
     BlockTable blocks{{}, grid.voxelSize()[0], grid.background(), {}, {}};
     openvdb::CoordBBox leaves;
     if (grid.tree().evalLeafBoundingBox(leaves)) {
-        const auto place = [](const openvdb::Coord& c) {
-            return BlockTable::Place(c.x() >> 3, c.y() >> 3, c.z() >> 3);
+        const auto coord = [](const openvdb::Coord& c) {
+            return BlockTable::BlockCoord(c.x() >> 3, c.y() >> 3, c.z() >> 3);
         };
-        blocks.with_values = {place(leaves.min()), place(leaves.max())};
+        blocks.with_values = {coord(leaves.min()), coord(leaves.max())};
     }
     blocks.to_world = [&](const Vec3d& P) {
         const auto there = grid.indexToWorld(openvdb::Vec3d(P.x(), P.y(), P.z()));
         return Vec3d(there[0], there[1], there[2]);
     };
     blocks.reader = [&] {
-        return [accessor = std::make_shared<const Accessor>(grid.tree())](const BlockTable::Place& place) {
-            const openvdb::Coord lowest(8 * place.x(), 8 * place.y(), 8 * place.z());
+        return [accessor = std::make_shared<const Accessor>(grid.tree())](const BlockTable::BlockCoord& coord) {
+            const openvdb::Coord lowest(8 * coord.x(), 8 * coord.y(), 8 * coord.z());
             if (const auto* leaf = accessor->probeConstLeaf(lowest)) return BlockValues{leaf->buffer().data(), 0};
             return BlockValues{nullptr, accessor->getValue(lowest)};
         };

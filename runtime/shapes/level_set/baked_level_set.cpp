@@ -12,7 +12,7 @@ namespace {
 // Returns the value, which the first call creates. Isolation stops the thread from taking other work meanwhile, which
 // might need the same mutex.
 template <class Ptr, class Make>
-const Ptr& once(std::mutex& mutex, Ptr& value, const Make& make)
+const Ptr& computed_once(std::mutex& mutex, Ptr& value, const Make& make)
 {
     const std::lock_guard lock(mutex);
     if (!value) tbb::this_task_arena::isolate([&] { value = make(); });
@@ -26,11 +26,11 @@ BakedLevelSet::BakedLevelSet(BakedGrid baked, std::uint64_t active_voxels, Sourc
 {
 }
 
-const LevelSetGridPtr& BakedLevelSet::grid() const { return once(grid_mutex_, grid_, source_.grid); }
+const LevelSetGridPtr& BakedLevelSet::grid() const { return computed_once(grid_mutex_, grid_, source_.grid); }
 
 MeshPtr BakedLevelSet::surface() const
 {
-    return once(surface_mutex_, surface_, [this] { return surface_of_grid(*grid()); });
+    return computed_once(surface_mutex_, surface_, [this] { return surface_of_grid(*grid()); });
 }
 
 LevelSetPtr BakedLevelSet::with_band(double metres) const

@@ -25,13 +25,13 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     constexpr double most = 2147483648.0;  // 2^31
     // Covers the blocks during the build and the baked copy: 30 to 60 bytes per voxel of a smooth surface at half
     // widths of 3 to 10, where a third to two thirds of a leaf is in the band.
-    constexpr double bytes_a_voxel = 64;
+    constexpr double bytes_per_voxel = 64;
 
     // Far from the surface leaves are full.
-    constexpr double bytes_a_voxel_around = 16;
+    constexpr double bytes_per_voxel_around = 16;
 
     // Covers the index and, while it is built, the index of the measured blocks and the flags of blocks with values.
-    constexpr double bytes_a_block = 2 * sizeof(std::int32_t) + 1;
+    constexpr double bytes_per_block = 2 * sizeof(std::int32_t) + 1;
 
     // For a convex body the volume of the outer band is area h + M h² + 4/3 pi h³ (Steiner's formula). M is at most
     // that of the bounds, pi times the sum of their edges.
@@ -41,7 +41,7 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     const double around = M_PI * size.sum() * h * h + 4.0 / 3 * M_PI * h * h * h;
     const double near = std::min(in_band, across.prod()), voxels = std::min(near + around, across.prod());
     const double indexed = (across / BakedGrid::block + Vec3d::Constant(2)).prod();
-    const double bytes = near * bytes_a_voxel + (voxels - near) * bytes_a_voxel_around + indexed * bytes_a_block;
+    const double bytes = near * bytes_per_voxel + (voxels - near) * bytes_per_voxel_around + indexed * bytes_per_block;
 
     // The larger voxel at which the band (which shrinks with its square) and the index (with its cube) fit.
     const auto larger = [&](double band_excess, double index_excess) {
@@ -54,8 +54,8 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
                         what, options.voxel, voxels, indexed, larger(voxels / most, indexed / most)));
     if (fits_in_memory(bytes)) return;
     const double memory = static_cast<double>(memory_budget());
-    throw beyond_memory(fmt::format("{} with voxel = {:g} m", what, options.voxel), bytes,
-                        fmt::format("a voxel of at least {:.3g} m fits", larger(bytes / memory, bytes / memory)));
+    throw memory_exceeded(fmt::format("{} with voxel = {:g} m", what, options.voxel), bytes,
+                          fmt::format("a voxel of at least {:.3g} m fits", larger(bytes / memory, bytes / memory)));
 }
 
 }  // namespace rapid

@@ -34,8 +34,8 @@ struct Formula {
 
 // Finds the blocks that the band may touch. Descends an octree and prunes cubes whose centre is farther from the
 // surface than the half width plus half their diagonal. Coordinates are in blocks.
-void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_width, const VoxelBlocks::Place& lowest,
-                 int size, std::vector<VoxelBlocks::Place>& found)
+void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_width,
+                 const VoxelBlocks::BlockCoord& lowest, int size, std::vector<VoxelBlocks::BlockCoord>& found)
 {
     const double half = 0.5 * VoxelBlocks::edge * size;  // voxels
     const Vec3d center = frame.to_world((VoxelBlocks::edge * lowest).cast<double>() + Vec3d::Constant(half));
@@ -46,7 +46,8 @@ void find_blocks(const Formula& formula, const VoxelFrame& frame, double half_wi
     }
     const int h = size / 2;
     for (int n = 0; n < 8; ++n)
-        find_blocks(formula, frame, half_width, lowest + h * VoxelBlocks::Place(n >> 2, n >> 1 & 1, n & 1), h, found);
+        find_blocks(formula, frame, half_width, lowest + h * VoxelBlocks::BlockCoord(n >> 2, n >> 1 & 1, n & 1), h,
+                    found);
 }
 
 VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
@@ -56,23 +57,24 @@ VoxelBlocks measure(const Formula& formula, const LevelSetOptions& options)
     const VoxelFrame& frame = blocks.frame;
 
     const auto block_of = [&](const Vec3d& P) {
-        return VoxelBlocks::Place((frame.to_voxels(P) / edge).array().floor().matrix().cast<int>());
+        return VoxelBlocks::BlockCoord((frame.to_voxels(P) / edge).array().floor().matrix().cast<int>());
     };
     const Vec3d beyond = Vec3d::Constant(blocks.half_width + frame.voxel);
-    const VoxelBlocks::Place low = block_of(formula.bounds.min() - beyond);
-    const VoxelBlocks::Place across = block_of(formula.bounds.max() + beyond) - low;
-    std::vector<VoxelBlocks::Place> found;
+    const VoxelBlocks::BlockCoord low = block_of(formula.bounds.min() - beyond);
+    const VoxelBlocks::BlockCoord across = block_of(formula.bounds.max() + beyond) - low;
+    std::vector<VoxelBlocks::BlockCoord> found;
     find_blocks(formula, frame, blocks.half_width, low,
                 static_cast<int>(std::bit_ceil(static_cast<unsigned>(across.maxCoeff() + 1))), found);
 
     blocks.resize(found.size());
-    blocks.places = std::move(found);
+    blocks.coords = std::move(found);
     const float background = blocks.background();
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         const std::span<float, VoxelBlocks::voxels> values = blocks.of(b);
-        const VoxelBlocks::Place lowest = edge * blocks.places[b];
+        const VoxelBlocks::BlockCoord lowest = edge * blocks.coords[b];
         for (int v = 0; v < int(VoxelBlocks::voxels); ++v) {
-            const VoxelBlocks::Place voxel = lowest + VoxelBlocks::Place(v / (edge * edge), v / edge % edge, v % edge);
+            const VoxelBlocks::BlockCoord voxel =
+                lowest + VoxelBlocks::BlockCoord(v / (edge * edge), v / edge % edge, v % edge);
             const auto phi = static_cast<float>(formula.distance(frame.to_world(voxel.cast<double>())));
             const bool is_near = std::abs(phi) < background;
             values[v] = is_near ? phi : std::copysign(background, phi);

@@ -133,14 +133,14 @@ FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::strin
     }
 }
 
-const ApartReader<FloatGrid::Ptr> fog_reader("fog", read_fog, send_grid<FloatGrid>, receive_grid<FloatGrid>);
+const SandboxedReader<FloatGrid::Ptr> fog_reader("fog", read_fog, send_grid<FloatGrid>, receive_grid<FloatGrid>);
 
 DensityGridPtr fog_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(fog_reader, path, name);
+    const FloatGrid::Ptr grid = read_grid_sandboxed<FloatGrid>(fog_reader, path, name);
     try {
         return std::make_shared<OpenDensityGrid>(grid);
     } catch (const Error& error) {

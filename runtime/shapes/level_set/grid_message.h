@@ -1,5 +1,5 @@
-// Grids in messages between processes (files/read_apart.h): the tree's tiles and leaves, its map if that is linear, its
-// class and background. The receiver checks them: values must be finite, and the grid must fit the tables that are
+// Grids in messages between processes (files/read_sandboxed.h): the tree's tiles and leaves, its map if that is linear,
+// its class and background. The receiver checks them: values must be finite, and the grid must fit the tables that are
 // built from it.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 #include "runtime/base/error.h"
 #include "runtime/base/openvdb_grids.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 
 namespace rapid {
 
@@ -106,8 +106,8 @@ typename Grid::Ptr receive_grid(MessageReader& message)
 
 // Reads a grid in another process. Adds the file's name to errors.
 template <class Grid>
-typename Grid::Ptr read_grid_apart(const ApartReader<typename Grid::Ptr>& reader, const std::filesystem::path& path,
-                                   const std::string& name)
+typename Grid::Ptr read_grid_sandboxed(const SandboxedReader<typename Grid::Ptr>& reader,
+                                       const std::filesystem::path& path, const std::string& name)
 {
     try {
         return reader(path, name);

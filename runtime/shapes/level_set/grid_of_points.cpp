@@ -40,12 +40,12 @@ public:
     float weight(std::size_t i) const { return points_.weight[points_.weight.size() == 1 ? 0 : i]; }
     // Returns the radius in voxels, at least 1: a smaller one might reach no voxel centre.
     double radius(std::size_t i) const { return std::max(1.0, given_radius(i) / points_.voxel); }
-    Vec3d place(std::size_t i) const { return points_.P[i].cast<double>() / points_.voxel; }
+    Vec3d position(std::size_t i) const { return points_.P[i].cast<double>() / points_.voxel; }
 
     void check(std::size_t i) const
     {
         const double r = radius(i);
-        if (!points_.P[i].allFinite() || !(place(i).cwiseAbs().maxCoeff() + r < (1 << 30)))
+        if (!points_.P[i].allFinite() || !(position(i).cwiseAbs().maxCoeff() + r < (1 << 30)))
             throw Error(
                 fmt::format("point {} is at ({}, {}, {}); a place must be finite, and within 2^30 voxels of the "
                             "origin",
@@ -57,15 +57,15 @@ public:
             throw Error(fmt::format("point {} has the weight {:g}; it must be at least 0, and finite", i, weight(i)));
     }
 
-    Eigen::Vector3i first(std::size_t i) const { return (place(i).array() - radius(i)).ceil().cast<int>().matrix(); }
-    Eigen::Vector3i last(std::size_t i) const { return (place(i).array() + radius(i)).floor().cast<int>().matrix(); }
+    Eigen::Vector3i first(std::size_t i) const { return (position(i).array() - radius(i)).ceil().cast<int>().matrix(); }
+    Eigen::Vector3i last(std::size_t i) const { return (position(i).array() + radius(i)).floor().cast<int>().matrix(); }
 
     // Calls f(voxel, numerator of W) for the voxels of a point that lie in a box, z fastest.
     template <class F>
     void visit(std::size_t i, const Eigen::Vector3i& low, const Eigen::Vector3i& high, const F& f) const
     {
         const Eigen::Vector3i from = first(i).cwiseMax(low), to = last(i).cwiseMin(high);
-        const Vec3d P = place(i);
+        const Vec3d P = position(i);
         const double per_square = 1 / (radius(i) * radius(i));
         Eigen::Vector3i at;
         for (at.x() = from.x(); at.x() <= to.x(); ++at.x())
@@ -98,8 +98,8 @@ Eigen::Vector3i leaf_of(const Eigen::Vector3i& voxel)
 void require_memory(const Spread& points, double bytes)
 {
     if (!fits_in_memory(bytes))
-        throw beyond_memory(fmt::format("a grid of {} points", points.size()), bytes,
-                            "give a larger voxel or a smaller radius");
+        throw memory_exceeded(fmt::format("a grid of {} points", points.size()), bytes,
+                              "give a larger voxel or a smaller radius");
 }
 
 // Finds which points reach into which leaves, sorted by leaf, then by point. Skips points of weight 0.
@@ -152,9 +152,10 @@ Sums sums_of(const Spread& points, const SpreadPoints& given, std::span<const do
         const double share = shares[reach.point];
         const auto add = [&](const Eigen::Vector3i& voxel, double part) {
             const Eigen::Vector3i at = voxel - low;
-            const auto place = static_cast<std::size_t>((at.x() * leaf_edge + at.y()) * leaf_edge + at.z());
-            sums.weight[place] += share * part;
-            if (!sums.vectors.empty()) sums.vectors[place] += share * part * given.vectors[reach.point].cast<double>();
+            const auto position = static_cast<std::size_t>((at.x() * leaf_edge + at.y()) * leaf_edge + at.z());
+            sums.weight[position] += share * part;
+            if (!sums.vectors.empty())
+                sums.vectors[position] += share * part * given.vectors[reach.point].cast<double>();
         };
         points.visit(reach.point, low, high, add);
     }
@@ -187,8 +188,9 @@ typename Grid::Ptr grid_of(const SpreadPoints& given, const char* name, const F&
             const Sums sums = sums_of(points, given, shares, those);
             const Reach& at = those.front();
             made[k] = std::make_unique<Leaf>(Coord(at.x * leaf_edge, at.y * leaf_edge, at.z * leaf_edge));
-            for (std::size_t place = 0; place < sums.weight.size(); ++place)
-                if (sums.weight[place] > 0) made[k]->setValueOn(static_cast<openvdb::Index>(place), value(sums, place));
+            for (std::size_t position = 0; position < sums.weight.size(); ++position)
+                if (sums.weight[position] > 0)
+                    made[k]->setValueOn(static_cast<openvdb::Index>(position), value(sums, position));
         }
     };
     for_each_chunk(leaves.size(), make, /*size=*/16);
@@ -204,8 +206,8 @@ typename Grid::Ptr grid_of(const SpreadPoints& given, const char* name, const F&
 DensityGridPtr density(const SpreadPoints& points)
 {
     const double volume = points.voxel * points.voxel * points.voxel;
-    auto grid = grid_of<FloatGrid>(points, "density", [&](const Sums& sums, std::size_t place) {
-        return static_cast<float>(sums.weight[place] / volume);
+    auto grid = grid_of<FloatGrid>(points, "density", [&](const Sums& sums, std::size_t position) {
+        return static_cast<float>(sums.weight[position] / volume);
     });
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     return std::make_shared<OpenDensityGrid>(grid);
@@ -214,8 +216,8 @@ DensityGridPtr density(const SpreadPoints& points)
 VectorGridPtr vectors(const SpreadPoints& points)
 {
     return std::make_shared<OpenVectorGrid>(
-        grid_of<Vec3SGrid>(points, "v", [](const Sums& sums, std::size_t place) -> openvdb::Vec3s {
-            const Vec3d mean = sums.vectors[place] / sums.weight[place];
+        grid_of<Vec3SGrid>(points, "v", [](const Sums& sums, std::size_t position) -> openvdb::Vec3s {
+            const Vec3d mean = sums.vectors[position] / sums.weight[position];
             return openvdb::Vec3s(openvdb::Vec3d(mean.x(), mean.y(), mean.z()));
         }));
 }

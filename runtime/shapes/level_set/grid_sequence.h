@@ -71,19 +71,19 @@ private:
     {
         if (!frame) return nullptr;
         const std::lock_guard lock(mutex_);
-        for (const auto& [number, grid] : kept_)
+        for (const auto& [number, grid] : recent_)
             if (number == *frame) return grid;
-        kept_.emplace_front(*frame, read_(files_.files.at(*frame)));
-        if (kept_.size() > most_kept) kept_.pop_back();
-        return kept_.front().second;
+        recent_.emplace_front(*frame, read_(files_.files.at(*frame)));
+        if (recent_.size() > max_recent) recent_.pop_back();
+        return recent_.front().second;
     }
 
-    static constexpr std::size_t most_kept = 4;  // two for this frame, two for the start of the next
+    static constexpr std::size_t max_recent = 4;  // two for this frame, two for the start of the next
 
     SequenceFiles files_;
     std::function<Grid(const std::filesystem::path&)> read_;
     mutable std::mutex mutex_;
-    mutable std::deque<std::pair<int, Grid>> kept_;  // most recent first
+    mutable std::deque<std::pair<int, Grid>> recent_;  // most recent first
 };
 
 }  // namespace rapid

@@ -61,15 +61,15 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
     }
 }
 
-const ApartReader<FloatGrid::Ptr> level_set_reader("level set", read_level_set_grid, send_grid<FloatGrid>,
-                                                   receive_grid<FloatGrid>);
+const SandboxedReader<FloatGrid::Ptr> level_set_reader("level set", read_level_set_grid, send_grid<FloatGrid>,
+                                                       receive_grid<FloatGrid>);
 
 LevelSetPtr level_set_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_apart<FloatGrid>(level_set_reader, path, name);
+    const FloatGrid::Ptr grid = read_grid_sandboxed<FloatGrid>(level_set_reader, path, name);
     if (grid->activeVoxelCount() == 0)
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));

@@ -109,7 +109,7 @@ LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& 
             throw Error(
                 fmt::format("mesh \"{}\" encloses nothing with voxel = {:g} m: {} of its edges have one face, and "
                             "outside reaches its inside through them; {}",
-                            mesh->name, options.voxel, open.boundary_edges, how_to_close_a_mesh));
+                            mesh->name, options.voxel, open.boundary_edges, open_mesh_remedy));
         const Vec3f size = mesh->bounds().sizes();
         if (size.minCoeff() == 0)
             throw Error(

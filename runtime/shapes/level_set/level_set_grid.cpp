@@ -40,7 +40,7 @@ openvdb::FloatGrid::Ptr tree_of(const VoxelBlocks& blocks)
     grid->setTransform(transform_of(blocks.frame));
     std::vector<std::unique_ptr<Leaf>> leaves(blocks.size());
     tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t b) {
-        const VoxelBlocks::Place lowest = VoxelBlocks::edge * blocks.places[b];
+        const VoxelBlocks::BlockCoord lowest = VoxelBlocks::edge * blocks.coords[b];
         leaves[b] = std::make_unique<Leaf>(openvdb::Coord(lowest.x(), lowest.y(), lowest.z()), blocks.background());
         std::ranges::copy(blocks.of(b), leaves[b]->buffer().data());
         for (std::size_t word = 0; word < blocks.in_band[b].size(); ++word)
@@ -61,13 +61,13 @@ LevelSetGridPtr level_set_grid(const openvdb::FloatGrid::Ptr& grid)
 
 namespace {
 
-LevelSetGridPtr of_blocks(const VoxelBlocks& blocks)
+LevelSetGridPtr from_blocks(const VoxelBlocks& blocks)
 {
     initialize_openvdb();
     return level_set_grid(tree_of(blocks));
 }
 
-std::shared_ptr<const BakedLevelSet> of_grid(const LevelSetGridPtr& grid, std::function<LevelSetPtr(double)> rebuild)
+std::shared_ptr<const BakedLevelSet> from_grid(const LevelSetGridPtr& grid, std::function<LevelSetPtr(double)> rebuild)
 {
     return std::make_shared<BakedLevelSet>(bake(*grid->grid), grid->grid->activeVoxelCount(),
                                            BakedLevelSet::Source{[grid] { return grid; }, std::move(rebuild)});
@@ -89,8 +89,8 @@ MeshPtr surface_of(const LevelSetGrid& grid)
     return mesh;
 }
 
-RAPID_DEFINE(grid_of_blocks, of_blocks);
-RAPID_DEFINE(level_set_of_grid, of_grid);
+RAPID_DEFINE(grid_of_blocks, from_blocks);
+RAPID_DEFINE(level_set_of_grid, from_grid);
 RAPID_DEFINE(surface_of_grid, surface_of);
 
 }  // namespace

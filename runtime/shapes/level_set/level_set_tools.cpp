@@ -10,8 +10,8 @@
 #include <cmath>
 
 #include "runtime/base/error.h"
-#include "runtime/shapes/level_set/least_voxel.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
+#include "runtime/shapes/level_set/min_voxel.h"
 #include "runtime/shapes/level_set/placed.h"
 
 namespace rapid {
@@ -24,7 +24,7 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 // Voxel sizes with a smaller relative difference are equal up to rounding.
 constexpr double same_size = 1e-6;
 // Voxels whose offset is below this fraction of a voxel coincide.
-constexpr double same_place = 1e-4;
+constexpr double same_position = 1e-4;
 
 // Returns a level set with axis-aligned voxels. A rotated level set is resampled.
 BakedPtr on_axes(const LevelSetPtr& shape)
@@ -92,10 +92,10 @@ FloatGrid::Ptr aligned(const LevelSetPtr& shape, const FloatGrid& like, double h
     const double voxel = like.voxelSize()[0];
     if (!grid || std::abs(grid->voxel() - voxel) > same_size * voxel)
         return resampled_to(shape, like.transform(), half_width);
-    const openvdb::Vec3d place = like.worldToIndex(grid_of(*grid).indexToWorld(Coord(0)));
-    const Coord whole = Coord::round(place);
-    const openvdb::Vec3d off = place - whole.asVec3d();
-    if (std::max({std::abs(off[0]), std::abs(off[1]), std::abs(off[2])}) > same_place)
+    const openvdb::Vec3d position = like.worldToIndex(grid_of(*grid).indexToWorld(Coord(0)));
+    const Coord whole = Coord::round(position);
+    const openvdb::Vec3d off = position - whole.asVec3d();
+    if (std::max({std::abs(off[0]), std::abs(off[1]), std::abs(off[2])}) > same_position)
         return resampled_to(shape, like.transform(), half_width);
     const auto wide = std::static_pointer_cast<const BakedLevelSet>(grid->with_band(half_width));
     return rebanded(grid_of(*wide), like.transform(), 1, 0, half_width, whole);
@@ -164,9 +164,9 @@ LevelSetPtr moved(const LevelSetPtr& shape, const Pose& pose)
         return std::make_shared<PlacedLevelSet>(turned->rest(), pose * turned->pose());
     if (!pose.rotation.vec().isZero(0)) return std::make_shared<PlacedLevelSet>(shape, pose);
     const BakedPtr grid = std::dynamic_pointer_cast<const BakedLevelSet>(shape);
-    if (const double voxel = pose.scale * grid->voxel(); !(voxel >= least_voxel))
+    if (const double voxel = pose.scale * grid->voxel(); !(voxel >= min_voxel))
         throw Error(fmt::format("the scaled level set would have voxels of {:g} m; they must be at least {:g} m", voxel,
-                                least_voxel));
+                                min_voxel));
     auto transform = grid_of(*grid).transform().copy();
     transform->postScale(pose.scale);
     transform->postTranslate({pose.translation.x(), pose.translation.y(), pose.translation.z()});

@@ -15,7 +15,7 @@
 namespace rapid {
 namespace {
 
-using Place = Eigen::Vector3i;
+using BlockCoord = Eigen::Vector3i;
 using Corners = std::array<Vec3d, 3>;
 
 // Returns the corners of a triangle in an order that does not depend on its orientation.
@@ -29,7 +29,7 @@ Corners corners_of(const Mesh& mesh, std::int32_t triangle)
 
 // A triangle that may lie within the band of a block.
 struct Near {
-    Place block;
+    BlockCoord block;
     std::int32_t triangle;
 
     bool operator<(const Near& other) const
@@ -48,16 +48,16 @@ public:
         Box3d bounds;
         for (const Vec3d& corner : corners) bounds.extend(corner);
         const auto block_of = [](const Vec3d& P) {
-            return Place((P / MeshBand::block).array().floor().matrix().cast<int>());
+            return BlockCoord((P / MeshBand::block).array().floor().matrix().cast<int>());
         };
         lowest_ = block_of(bounds.min() - Vec3d::Constant(half_width));
         highest_ = block_of(bounds.max() + Vec3d::Constant(half_width));
     }
 
-    void run(std::int32_t triangle, std::vector<Near>& found) const { go(lowest_, highest_, triangle, found); }
+    void run(std::int32_t triangle, std::vector<Near>& found) const { descend(lowest_, highest_, triangle, found); }
 
 private:
-    void go(const Place& low, const Place& high, std::int32_t triangle, std::vector<Near>& found) const
+    void descend(const BlockCoord& low, const BlockCoord& high, std::int32_t triangle, std::vector<Near>& found) const
     {
         constexpr int block = MeshBand::block;
         const Vec3d first = block * low.cast<double>();
@@ -69,16 +69,16 @@ private:
             found.push_back({low, triangle});
             return;
         }
-        Place middle = high, beyond = low;
+        BlockCoord middle = high, beyond = low;
         middle[axis] = low[axis] + (high[axis] - low[axis]) / 2;
         beyond[axis] = middle[axis] + 1;
-        go(low, middle, triangle, found);
-        go(beyond, high, triangle, found);
+        descend(low, middle, triangle, found);
+        descend(beyond, high, triangle, found);
     }
 
     Prism prism_;
     double half_width_;
-    Place lowest_, highest_;
+    BlockCoord lowest_, highest_;
 };
 
 // A triangle in single precision, for distances from a row of voxels along z.
@@ -98,7 +98,7 @@ public:
             outward_[k] = edge.cross(n).stableNormalized().cast<float>();
         }
         up_ = n.stableNormalized().cast<float>();
-        if (up_.isZero(0)) beside_ = std::numeric_limits<float>::infinity();
+        if (up_.isZero(0)) lateral_ = std::numeric_limits<float>::infinity();
     }
 
     // Returns the squared distances of the voxels (x, y, 0) to (x, y, 7).
@@ -121,14 +121,14 @@ public:
             outside |= (o.x() * px + o.y() * py) + o.z() * pz > 0;
             if (k == 0) height = (up_.x() * px + up_.y() * py) + up_.z() * pz;
         }
-        const Floats to_plane = height * height + beside_;
+        const Floats to_plane = height * height + lateral_;
         return (outside | (to_edges < to_plane)) ? to_edges : to_plane;
     }
 
 private:
     Vec3f corner_[3], edge_[3], outward_[3], up_;
     float per_length2_[3];
-    float beside_ = 0;  // infinite if the triangle has no plane
+    float lateral_ = 0;  // infinite if the triangle has no plane
 };
 
 float largest(const Floats& x)
@@ -181,7 +181,7 @@ struct Rows {
 
 double distance_to(const Corners& corners, const Vec3d& P)
 {
-    return (nearest_place(P, corners[0], corners[1], corners[2]) - P).norm();
+    return (nearest_point(P, corners[0], corners[1], corners[2]) - P).norm();
 }
 
 }  // namespace
@@ -208,7 +208,7 @@ MeshBand::MeshBand(const Mesh& mesh, double half_width) : mesh_(mesh), half_widt
     tbb::parallel_sort(all.begin(), all.end());
     triangles_.reserve(all.size());
     for (const Near& near : all) {
-        if (blocks_.empty() || blocks_.back().place != near.block)
+        if (blocks_.empty() || blocks_.back().coord != near.block)
             blocks_.push_back({near.block, triangles_.size(), triangles_.size()});
         triangles_.push_back(near.triangle);
         ++blocks_.back().end;

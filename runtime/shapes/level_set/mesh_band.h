@@ -24,14 +24,14 @@ public:
 
     std::size_t size() const { return blocks_.size(); }
     // Returns the lowest voxel of a block.
-    Eigen::Vector3i origin(std::size_t b) const { return block * blocks_[b].place; }
+    Eigen::Vector3i origin(std::size_t b) const { return block * blocks_[b].coord; }
     // Computes, for each voxel of a block, the nearest triangle (the first one in a tie) and its distance in voxels. A
     // voxel beyond the band gets -1 and half_width.
     void measure(std::size_t b, std::span<float, voxels> distance, std::span<std::int32_t, voxels> nearest) const;
 
 private:
     struct Block {
-        Eigen::Vector3i place;       // in blocks
+        Eigen::Vector3i coord;       // in blocks
         std::size_t first = 0, end;  // of triangles_
     };
 

@@ -58,7 +58,7 @@ MeshBlocks measure(const Mesh& mesh, const VoxelFrame& frame, double half_width)
         [&](std::size_t begin, std::size_t end) {
             for (std::size_t b = begin; b < end; ++b) {
                 const std::span<float, voxels> values = blocks.of(b);
-                blocks.places[b] = band.origin(b) / VoxelBlocks::edge;
+                blocks.coords[b] = band.origin(b) / VoxelBlocks::edge;
                 band.measure(b, values, nearest(b));
                 for (std::size_t v = 0; v < voxels; ++v) {
                     const bool is_near = nearest(b)[v] >= 0;
@@ -79,7 +79,7 @@ MeshBlocks measure(const Mesh& mesh, const VoxelFrame& frame, double half_width)
         [&](std::size_t begin, std::size_t end) {
             std::vector<RayCrossings::Crossing> crossings;
             for (std::size_t b = begin; b < end; ++b)
-                if (sign_by_windings(faces, VoxelBlocks::edge * blocks.places[b], blocks.of(b), crossings))
+                if (sign_by_windings(faces, VoxelBlocks::edge * blocks.coords[b], blocks.of(b), crossings))
                     overlap = true;
         },
         part);

@@ -47,7 +47,7 @@ struct InVoxels {
     }
     Vec3d nearest_on(std::int32_t triangle, const Coord& voxel) const
     {
-        return nearest_place(center(voxel), corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
+        return nearest_point(center(voxel), corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
     }
     Vec3d normal(std::int32_t triangle) const
     {
@@ -99,7 +99,7 @@ Band measured_band(const MeshBlocks& measured)
     const VoxelBlocks& blocks = measured.blocks;
     const auto nearest = Int32Grid::create(no_triangle);
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-        const VoxelBlocks::Place lowest = VoxelBlocks::edge * blocks.places[b];
+        const VoxelBlocks::BlockCoord lowest = VoxelBlocks::edge * blocks.coords[b];
         auto leaf = std::make_unique<NearestLeaf>(Coord(lowest.x(), lowest.y(), lowest.z()), no_triangle, true);
         std::copy_n(measured.nearest.data() + b * VoxelBlocks::voxels, VoxelBlocks::voxels, leaf->buffer().data());
         nearest->tree().addLeaf(leaf.release());
@@ -136,37 +136,37 @@ void improve_until_done(Band& band, const Improve& improve)
     constexpr std::size_t part = 512;
     FloatGrid::Accessor distance = band.distance->getAccessor();
     Int32Grid::Accessor nearest = band.nearest->getAccessor();
-    std::vector<Coord> asked;
+    std::vector<Coord> pending;
     for (const Leaf* leaf : band.leaves)
-        for (auto it = leaf->cbeginValueOn(); it; ++it) asked.push_back(it.getCoord());
+        for (auto it = leaf->cbeginValueOn(); it; ++it) pending.push_back(it.getCoord());
     std::vector<std::vector<Update>> updates;
-    while (!asked.empty()) {
-        updates.resize((asked.size() + part - 1) / part);
+    while (!pending.empty()) {
+        updates.resize((pending.size() + part - 1) / part);
         for_each_chunk(
-            asked.size(),
+            pending.size(),
             [&](std::size_t begin, std::size_t end) {
                 std::vector<Update>& found = updates[begin / part];
                 found.clear();
                 const Accessor now(band.distance->constTree());
                 const NearestAccessor nearest_now(band.nearest->constTree());
                 for (std::size_t i = begin; i < end; ++i)
-                    improve(asked[i], now.getValue(asked[i]), now, nearest_now, found);
+                    improve(pending[i], now.getValue(pending[i]), now, nearest_now, found);
             },
             part);
 
-        asked.clear();
+        pending.clear();
         for (const auto& of_part : updates)
             for (const Update& update : of_part) {
                 if (std::abs(update.distance) >= std::abs(distance.getValue(update.voxel))) continue;
                 distance.setValue(update.voxel, update.distance);
                 nearest.setValue(update.voxel, update.nearest);
-                asked.push_back(update.voxel);
+                pending.push_back(update.voxel);
                 for_each_neighbour(update.voxel, /*across_faces=*/false,
-                                   [&](const Coord& other, double) { asked.push_back(other); });
+                                   [&](const Coord& other, double) { pending.push_back(other); });
             }
-        std::erase_if(asked, [&](const Coord& voxel) { return !distance.isValueOn(voxel); });
-        std::sort(asked.begin(), asked.end());
-        asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
+        std::erase_if(pending, [&](const Coord& voxel) { return !distance.isValueOn(voxel); });
+        std::sort(pending.begin(), pending.end());
+        pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
     }
     band.find_leaves();
 }
@@ -246,11 +246,11 @@ void ignore_faces_inside(Band& band, const InVoxels& mesh, const RayCrossings& f
     // Seen from inside, the nearest point of a face is on the surface if the position just past it is outside. For a
     // voxel on the face itself, either side may be outside.
     const auto is_surface = [&](std::int32_t triangle, const Coord& voxel) {
-        constexpr double behind = 1e-3;  // voxels; positions have an error of about 1e-4
+        constexpr double offset = 1e-3;  // voxels; positions have an error of about 1e-4
         const auto outside = [&](const Vec3d& P) { return faces.from(P).windings == 0; };
         const Vec3d there = mesh.nearest_on(triangle, voxel), to_face = there - center(voxel);
-        if (to_face.norm() > behind) return outside(there + to_face * (behind / to_face.norm()));
-        const Vec3d step = mesh.normal(triangle) * behind;
+        if (to_face.norm() > offset) return outside(there + to_face * (offset / to_face.norm()));
+        const Vec3d step = mesh.normal(triangle) * offset;
         return outside(there + step) || outside(there - step);
     };
     const auto half_width = band.distance->background();

@@ -25,9 +25,9 @@ public:
     double square_at_least(const Vec3d& P) const
     {
         const double h = up_.dot(P) - height_;
-        double beside = 0;
-        for (int k = 0; k < 3; ++k) beside = std::max(beside, outward_[k].dot(P) - edge_[k]);
-        return h * h + beside * beside;
+        double lateral = 0;
+        for (int k = 0; k < 3; ++k) lateral = std::max(lateral, outward_[k].dot(P) - edge_[k]);
+        return h * h + lateral * lateral;
     }
 
 private:

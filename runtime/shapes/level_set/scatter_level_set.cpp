@@ -22,14 +22,14 @@ public:
     {
         // Newton's method along the gradient. The field is nearly affine there: one or two steps suffice, except at
         // creases.
-        constexpr int most_steps = 8;
+        constexpr int max_steps = 8;
         const double near = 1e-6 * grid_->voxel;  // m
         on_mesh_->place(key, first, out);
         const BakedSampler sampler(*grid_);
         for (Birthplace& birth : out) {
             Vec3d P = birth.P.cast<double>(), gradient;
             double phi = sampler.distance(P, gradient);
-            for (int i = 0; i < most_steps && std::abs(phi) > near && gradient.squaredNorm() > 0; ++i) {
+            for (int i = 0; i < max_steps && std::abs(phi) > near && gradient.squaredNorm() > 0; ++i) {
                 const Vec3d step = phi / gradient.squaredNorm() * gradient;
                 P -= step * std::min(1.0, grid_->voxel / step.norm());  // at most one voxel
                 phi = sampler.distance(P, gradient);

@@ -47,15 +47,15 @@ Vec3SGrid::Ptr read_vectors(const std::filesystem::path& file_path, const std::s
     }
 }
 
-const ApartReader<Vec3SGrid::Ptr> vectors_reader("vector grid", read_vectors, send_grid<Vec3SGrid>,
-                                                 receive_grid<Vec3SGrid>);
+const SandboxedReader<Vec3SGrid::Ptr> vectors_reader("vector grid", read_vectors, send_grid<Vec3SGrid>,
+                                                     receive_grid<Vec3SGrid>);
 
 VectorGridPtr vectors_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    return std::make_shared<OpenVectorGrid>(read_grid_apart<Vec3SGrid>(vectors_reader, path, name));
+    return std::make_shared<OpenVectorGrid>(read_grid_sandboxed<Vec3SGrid>(vectors_reader, path, name));
 }
 
 VectorGridPtr make(const Vec3d& origin, double voxel, const Eigen::Vector3i& nodes, std::span<const Vec3f> values)

@@ -27,11 +27,11 @@ class Around {
 public:
     explicit Around(const VoxelBlocks& blocks)
     {
-        for (const VoxelBlocks::Place& place : blocks.places) box_.extend(place);
+        for (const VoxelBlocks::BlockCoord& coord : blocks.coords) box_.extend(coord);
         if (box_.isEmpty()) return;
-        size_ = box_.max() - box_.min() + VoxelBlocks::Place::Ones();
+        size_ = box_.max() - box_.min() + VoxelBlocks::BlockCoord::Ones();
         index_.assign(std::size_t(size_.x()) * size_.y() * size_.z(), BakedGrid::outside);
-        for (std::size_t b = 0; b < blocks.size(); ++b) index_[at(blocks.places[b])] = static_cast<std::int32_t>(b);
+        for (std::size_t b = 0; b < blocks.size(); ++b) index_[at(blocks.coords[b])] = static_cast<std::int32_t>(b);
         tbb::parallel_for(std::size_t{0}, index_.size() / size_.z(), [&](std::size_t row) {
             std::int32_t side = BakedGrid::outside;
             for (std::size_t i = row * size_.z(); i < (row + 1) * size_.z(); ++i)
@@ -44,20 +44,20 @@ public:
 
     const Eigen::AlignedBox3i& box() const { return box_; }
     // Returns a block's index, or BakedGrid::outside or inside.
-    std::int32_t operator[](const VoxelBlocks::Place& place) const
+    std::int32_t operator[](const VoxelBlocks::BlockCoord& coord) const
     {
-        return box_.contains(place) ? index_[at(place)] : BakedGrid::outside;
+        return box_.contains(coord) ? index_[at(coord)] : BakedGrid::outside;
     }
 
 private:
-    std::size_t at(const VoxelBlocks::Place& place) const
+    std::size_t at(const VoxelBlocks::BlockCoord& coord) const
     {
-        const VoxelBlocks::Place from = place - box_.min();
+        const VoxelBlocks::BlockCoord from = coord - box_.min();
         return (std::size_t(from.x()) * size_.y() + from.y()) * size_.z() + from.z();
     }
 
     Eigen::AlignedBox3i box_;
-    VoxelBlocks::Place size_;
+    VoxelBlocks::BlockCoord size_;
     std::vector<std::int32_t> index_;
 };
 
@@ -73,14 +73,14 @@ std::uint64_t VoxelBlocks::voxels_in_band() const
 
 void VoxelBlocks::resize(std::size_t blocks)
 {
-    places.resize(blocks);
+    coords.resize(blocks);
     values.resize(blocks * voxels);
     in_band.resize(blocks);
 }
 
 void VoxelBlocks::move_block(std::size_t from, std::size_t to)
 {
-    places[to] = places[from];
+    coords[to] = coords[from];
     in_band[to] = in_band[from];
     std::ranges::copy(of(from), of(to).begin());
 }
@@ -89,8 +89,8 @@ BakedGrid bake(const VoxelBlocks& blocks)
 {
     const Around around(blocks);
     const float beyond = blocks.background();
-    const auto at = [&](const VoxelBlocks::Place& place) {
-        const std::int32_t b = around[place];
+    const auto at = [&](const VoxelBlocks::BlockCoord& coord) {
+        const std::int32_t b = around[coord];
         return b >= 0 ? BlockValues{blocks.of(b).data(), 0}
                       : BlockValues{nullptr, b == BakedGrid::inside ? -beyond : beyond};
     };

@@ -32,16 +32,16 @@ VoxelFrame frame_around(const Box3d& bounds, double voxel);
 struct VoxelBlocks {
     static constexpr int edge = BakedGrid::block;
     static constexpr std::size_t voxels = edge * edge * edge;  // per block
-    using Place = Eigen::Vector3i;                             // in blocks
+    using BlockCoord = Eigen::Vector3i;                        // in blocks
     using Flags = std::array<std::uint64_t, voxels / 64>;      // one bit per voxel
 
     VoxelFrame frame;
-    double half_width;           // m
-    std::vector<Place> places;   // distinct
-    std::vector<float> values;   // m; beyond the band, the background with the right sign
-    std::vector<Flags> in_band;  // voxels in the band
+    double half_width;               // m
+    std::vector<BlockCoord> coords;  // distinct
+    std::vector<float> values;       // m; beyond the band, the background with the right sign
+    std::vector<Flags> in_band;      // voxels in the band
 
-    std::size_t size() const { return places.size(); }
+    std::size_t size() const { return coords.size(); }
     float background() const { return static_cast<float>(half_width); }
     std::span<float, voxels> of(std::size_t b) { return std::span<float, voxels>(values.data() + b * voxels, voxels); }
     std::span<const float, voxels> of(std::size_t b) const

@@ -14,7 +14,7 @@ public:
     Values corner_values;
     Values face_values;                                            // shape [triangles]
     std::map<std::string, std::vector<std::uint8_t>> face_groups;  // 0 or 1, shape [triangles]
-    std::vector<std::string> left_out;  // ignored contents of the file, for a warning: "the list "flags" of its faces"
+    std::vector<std::string> skipped;  // ignored contents of the file, for a warning: "the list "flags" of its faces"
 };
 
 using DetailedMeshPtr = std::shared_ptr<const DetailedMesh>;

@@ -9,8 +9,8 @@
 #include "runtime/base/error.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/scalars.h"
+#include "runtime/files/skipped_contents.h"
 
 namespace rapid {
 namespace {
@@ -63,7 +63,7 @@ public:
                     if (values)
                         one.values.emplace(name.substr(1), std::move(*values));
                     else
-                        add_left_out(all.left_out, fmt::format("the attribute \"{}\"", name));
+                        add_skipped(all.skipped, fmt::format("the attribute \"{}\"", name));
                 }
             }
         return all;

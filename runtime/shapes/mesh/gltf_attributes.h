@@ -17,7 +17,7 @@ struct GltfAttributes {
         std::map<std::string, Mesh::VertexValues> values;  // by NAME, without the _; each of shape [vertices]
     };
     std::vector<Primitive> primitives;  // of all meshes, in file order
-    std::vector<std::string> left_out;  // attributes that are neither numbers nor vectors of three
+    std::vector<std::string> skipped;   // attributes that are neither numbers nor vectors of three
 };
 
 // Reads a .gltf with its buffers, or a .glb. Throws Error if an index or offset points outside the file.

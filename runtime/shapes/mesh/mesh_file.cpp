@@ -24,7 +24,7 @@
 
 #include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/mesh/gltf_attributes.h"
 
 namespace rapid {
@@ -92,7 +92,7 @@ void append_list(const std::string& name, const std::vector<T>& list, std::size_
     Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<T>()).first->second;
     auto* known = std::get_if<std::vector<T>>(&values);
     if (!known)
-        return add_left_out(corners.left_out, fmt::format("\"{}\" of a part, which has another type in others", name));
+        return add_skipped(corners.skipped, fmt::format("\"{}\" of a part, which has another type in others", name));
     known->resize(first, zero<T>());
     known->insert(known->end(), list.begin(), list.end());
 }
@@ -173,8 +173,8 @@ void append(const aiScene& scene, unsigned number, const std::string& node, cons
         if (material != AI_DEFAULT_MATERIAL_NAME) groups.insert(material);
     }
     for (const std::string& name : groups) join_group(name, first_face, corners);
-    if (part.HasBones()) add_left_out(corners.left_out, "its skin");
-    if (part.mNumAnimMeshes > 0) add_left_out(corners.left_out, "its morph targets");
+    if (part.HasBones()) add_skipped(corners.skipped, "its skin");
+    if (part.mNumAnimMeshes > 0) add_skipped(corners.skipped, "its morph targets");
 }
 
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_parent, bool with_normals,
@@ -218,17 +218,17 @@ PartValues further_values(const std::filesystem::path& path, const aiScene& scen
     const std::string extension = path.extension().string();
     if (extension.size() < 2 || std::string_view("gG").find(extension[1]) == std::string_view::npos) return values;
     GltfAttributes attributes = read_gltf_attributes(path);
-    for (const std::string& what : attributes.left_out) add_left_out(corners.left_out, what);
+    for (const std::string& what : attributes.skipped) add_skipped(corners.skipped, what);
     for (std::size_t k = 0; k < attributes.primitives.size(); ++k) {
         GltfAttributes::Primitive& primitive = attributes.primitives[k];
         const bool is_part =
             attributes.primitives.size() == scene.mNumMeshes && primitive.vertices == scene.mMeshes[k]->mNumVertices;
         for (const char* taken : {"P", "v", "id", "N", "Cd", "Alpha", "uv"})
             if (primitive.values.erase(taken) > 0)
-                add_left_out(corners.left_out, fmt::format("the attribute \"_{}\"", taken));
+                add_skipped(corners.skipped, fmt::format("the attribute \"_{}\"", taken));
         if (!is_part)
             for (const auto& [name, list] : primitive.values)
-                add_left_out(corners.left_out, fmt::format("the attribute \"_{}\"", name));
+                add_skipped(corners.skipped, fmt::format("the attribute \"_{}\"", name));
         values.push_back(is_part ? std::move(primitive.values) : std::map<std::string, Mesh::VertexValues>());
     }
     return values;
@@ -257,9 +257,9 @@ MeshFile import(const std::filesystem::path& path)
     const PartValues values = further_values(path, *scene, corners);
     if (scene->mRootNode) append(*scene, *scene->mRootNode, aiMatrix4x4(), with_normals, values, corners);
     complete(corners);
-    if (scene->mNumAnimations > 0) add_left_out(corners.left_out, "its animations");
-    if (scene->mNumLights > 0) add_left_out(corners.left_out, "its lights");
-    if (scene->mNumCameras > 0) add_left_out(corners.left_out, "its cameras");
+    if (scene->mNumAnimations > 0) add_skipped(corners.skipped, "its animations");
+    if (scene->mNumLights > 0) add_skipped(corners.skipped, "its lights");
+    if (scene->mNumCameras > 0) add_skipped(corners.skipped, "its cameras");
     return corners;
 }
 

@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 // The spline of a frame and the jumps around it need six meshes. Two more serve the next frame.
-constexpr std::size_t most_kept_meshes = 8;
+constexpr std::size_t max_recent_meshes = 8;
 
 // Corners of one vertex may differ by this fraction of the mesh's size, because of an exporter's rounding.
 constexpr double same_corner = 1e-6;
@@ -31,9 +31,9 @@ MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::stri
     const MeshFile file = read_mesh_file(files_.begin()->second);
     corners_ = file.positions.size();
     faces_ = file.triangles.size();
-    vertex_of_ = join_by_place(file.positions);
+    vertex_of_ = join_by_position(file.positions);
     rest_ = joined(file, vertex_of_, files_.begin()->second.string());
-    kept_.emplace_front(first(), rest_);
+    recent_.emplace_front(first(), rest_);
 }
 
 MeshPtr MeshSequence::at(std::int64_t frame) const
@@ -41,16 +41,17 @@ MeshPtr MeshSequence::at(std::int64_t frame) const
     const std::int64_t nearest = std::clamp<std::int64_t>(frame - order_.offset, first(), last());
     const int held = static_cast<int>(order_.file_of(frame).value_or(nearest));
     const std::lock_guard lock(mutex_);
-    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& kept) { return kept.first == held; });
+    const auto found =
+        std::find_if(recent_.begin(), recent_.end(), [&](const auto& kept) { return kept.first == held; });
     MeshPtr mesh;
-    if (found != kept_.end()) {
+    if (found != recent_.end()) {
         mesh = found->second;
-        kept_.erase(found);
+        recent_.erase(found);
     } else {
         mesh = read(held);
     }
-    kept_.emplace_front(held, mesh);
-    if (kept_.size() > most_kept_meshes) kept_.pop_back();
+    recent_.emplace_front(held, mesh);
+    if (recent_.size() > max_recent_meshes) recent_.pop_back();
     return mesh;
 }
 

@@ -48,7 +48,7 @@ private:
     MeshPtr rest_;
 
     mutable std::mutex mutex_;
-    mutable std::deque<std::pair<int, MeshPtr>> kept_;  // most recent first
+    mutable std::deque<std::pair<int, MeshPtr>> recent_;  // most recent first
 };
 
 using MeshSequencePtr = std::shared_ptr<const MeshSequence>;

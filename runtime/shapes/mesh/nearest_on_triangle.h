@@ -29,7 +29,7 @@ inline std::array<double, 2> nearest_weights(const Vec3d& P, const Vec3d& a, con
     return {vb / (va + vb + vc), vc / (va + vb + vc)};
 }
 
-inline Vec3d nearest_place(const Vec3d& P, const Vec3d& a, const Vec3d& b, const Vec3d& c)
+inline Vec3d nearest_point(const Vec3d& P, const Vec3d& a, const Vec3d& b, const Vec3d& c)
 {
     const auto [of_b, of_c] = nearest_weights(P, a, b, c);
     return a + of_b * (b - a) + of_c * (c - a);

@@ -4,7 +4,7 @@
 namespace rapid {
 
 // Part of error messages.
-inline constexpr char how_to_close_a_mesh[] =
+inline constexpr char open_mesh_remedy[] =
     "close it: a ground, by a copy of its outer edge lower down, faces between the two, and a bottom";
 
 }  // namespace rapid

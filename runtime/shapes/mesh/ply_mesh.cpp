@@ -10,8 +10,8 @@
 
 #include "runtime/base/error.h"
 #include "runtime/files/input_file.h"
-#include "runtime/files/left_out.h"
 #include "runtime/files/ply_file.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 #include "runtime/shapes/mesh/polygon.h"
 
@@ -59,18 +59,18 @@ public:
         }
     }
 
-    Property operator[](std::size_t place) const { return at(place, false); }
+    Property operator[](std::size_t index) const { return at(index, false); }
     Property find(std::string_view name, bool colour = false) const
     {
-        for (std::size_t place = 0; place < offsets_.size(); ++place)
-            if (element_.properties[place].name == name) return at(place, colour);
+        for (std::size_t index = 0; index < offsets_.size(); ++index)
+            if (element_.properties[index].name == name) return at(index, colour);
         return {};
     }
 
 private:
-    Property at(std::size_t place, bool colour) const
+    Property at(std::size_t index, bool colour) const
     {
-        return {element_.properties[place], offsets_[place], records_, colour};
+        return {element_.properties[index], offsets_[index], records_, colour};
     }
 
     const PlyElement& element_;
@@ -151,29 +151,30 @@ public:
     FaceValues(const PlyElement& face, std::size_t indices, MeshFile& mesh) : mesh_(mesh)
     {
         std::vector<PlyProperty> numbers;  // without lists, so that vectors are consecutive
-        std::vector<std::size_t> places;
+        std::vector<std::size_t> property_indices;
         for (std::size_t p = 0; p < face.properties.size(); ++p) {
             const PlyProperty& property = face.properties[p];
             if (p != indices && property.list)
-                add_left_out(mesh.left_out, fmt::format("the list \"{}\" of its faces", property.name));
+                add_skipped(mesh.skipped, fmt::format("the list \"{}\" of its faces", property.name));
             if (property.list) continue;
             numbers.push_back(property);
-            places.push_back(p);
+            property_indices.push_back(p);
         }
         for (std::size_t k = 0; k < numbers.size(); ++k) {
             const PlyProperty& property = numbers[k];
             if (property.name == "red" && k + 2 < numbers.size() && numbers[k + 1].name == "green" &&
                 numbers[k + 2].name == "blue") {
                 const bool whole = !is_floating(property.type);
-                add("Cd", {places[k], places[k + 1], places[k + 2]}, whole ? 1.0 / 255 : 1);
+                add("Cd", {property_indices[k], property_indices[k + 1], property_indices[k + 2]},
+                    whole ? 1.0 / 255 : 1);
                 k += 2;
             } else if (property.type == ScalarType::UInt8 && property.name.starts_with(group_prefix)) {
-                groups_.push_back({&mesh.face_groups[property.name.substr(group_prefix.size())], places[k]});
+                groups_.push_back({&mesh.face_groups[property.name.substr(group_prefix.size())], property_indices[k]});
             } else if (const std::string name = vec3_name(numbers, k); !name.empty()) {
-                add(name, {places[k], places[k + 1], places[k + 2]}, 1);
+                add(name, {property_indices[k], property_indices[k + 1], property_indices[k + 2]}, 1);
                 k += 2;
             } else {
-                add(property.name, {places[k]}, 1);
+                add(property.name, {property_indices[k]}, 1);
             }
         }
     }
@@ -183,7 +184,7 @@ public:
     {
         for (const Part& part : parts_) {
             const auto number = [&](std::size_t c) {
-                return static_cast<float>(part.scale * file.number_of_row(part.places[c]));
+                return static_cast<float>(part.scale * file.number_of_row(part.property_indices[c]));
             };
             if (auto* floats = std::get_if<std::vector<float>>(part.values))
                 floats->insert(floats->end(), triangles, number(0));
@@ -192,21 +193,21 @@ public:
                     .insert(std::get<std::vector<Vec3f>>(*part.values).end(), triangles,
                             Vec3f(number(0), number(1), number(2)));
         }
-        for (const auto& [members, place] : groups_)
-            members->insert(members->end(), triangles, file.number_of_row(place) != 0);
+        for (const auto& [members, index] : groups_)
+            members->insert(members->end(), triangles, file.number_of_row(index) != 0);
     }
 
 private:
     struct Part {
         Mesh::VertexValues* values;
-        std::vector<std::size_t> places;  // property indices
+        std::vector<std::size_t> property_indices;  // property indices
         double scale;
     };
-    void add(const std::string& name, std::vector<std::size_t> places, double scale)
+    void add(const std::string& name, std::vector<std::size_t> property_indices, double scale)
     {
         Mesh::VertexValues& values = mesh_.face_values[name];
-        if (places.size() == 3) values = std::vector<Vec3f>();
-        parts_.push_back({&values, std::move(places), scale});
+        if (property_indices.size() == 3) values = std::vector<Vec3f>();
+        parts_.push_back({&values, std::move(property_indices), scale});
     }
 
     MeshFile& mesh_;
@@ -223,10 +224,10 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
     const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
     std::size_t row = 0;
     std::vector<std::int32_t> corners;
-    const auto place = static_cast<std::size_t>(indices - face.properties.begin());
-    FaceValues values(face, place, mesh);
+    const auto index = static_cast<std::size_t>(indices - face.properties.begin());
+    FaceValues values(face, index, mesh);
     PolygonCutter cutter;
-    file.read_lists(face, place, [&](std::span<const std::int64_t> list) {
+    file.read_lists(face, index, [&](std::span<const std::int64_t> list) {
         corners.clear();
         for (const std::int64_t corner : list) {
             if (corner < 0 || corner >= vertices)
@@ -245,11 +246,11 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
     });
 }
 
-void leave_out_others(const std::vector<PlyElement>& elements, MeshFile& mesh)
+void skip_others(const std::vector<PlyElement>& elements, MeshFile& mesh)
 {
     for (const PlyElement& element : elements)
         if (element.name != "vertex" && element.name != "face" && element.count > 0)
-            add_left_out(mesh.left_out, fmt::format("the {} elements \"{}\"", element.count, element.name));
+            add_skipped(mesh.skipped, fmt::format("the {} elements \"{}\"", element.count, element.name));
 }
 
 }  // namespace
@@ -272,7 +273,7 @@ MeshFile read_ply_mesh(const std::filesystem::path& path)
             file.pass_over(element);
         }
     }
-    if (has_faces) leave_out_others(file.elements(), mesh);
+    if (has_faces) skip_others(file.elements(), mesh);
     return mesh;
 }
 

@@ -78,11 +78,11 @@ void PolygonCutter::fill_boxes()
     std::iota(order_.begin(), order_.end(), 0);
     split(0, first_leaf_ * leaf);
     boxes_.assign(2 * static_cast<std::size_t>(first_leaf_), Box());
-    for (std::int32_t place = 0; place < n; ++place) {
-        Box& box = boxes_[first_leaf_ + place / leaf];
-        box.box.extend(corners_[order_[place]].P);
+    for (std::int32_t index = 0; index < n; ++index) {
+        Box& box = boxes_[first_leaf_ + index / leaf];
+        box.box.extend(corners_[order_[index]].P);
         ++box.left;
-        corners_[order_[place]].place = place;
+        corners_[order_[index]].index = index;
     }
     for (std::int32_t k = first_leaf_ - 1; k > 0; --k)
         boxes_[k] = {boxes_[2 * k].box.merged(boxes_[2 * k + 1].box), boxes_[2 * k].left + boxes_[2 * k + 1].left};
@@ -129,9 +129,9 @@ std::int32_t PolygonCutter::first_in(const Ear& ear, std::int32_t from, std::int
         return found != none ? found : first_in(ear, from, 2 * node + 1, middle, end);
     }
     const std::int32_t last = std::min(end, static_cast<std::int32_t>(corners_.size()));
-    for (std::int32_t place = std::max(begin, from); place < last; ++place) {
+    for (std::int32_t index = std::max(begin, from); index < last; ++index) {
         ++looks_;
-        if (is_in(order_[place], ear)) return place;
+        if (is_in(order_[index], ear)) return index;
     }
     return none;
 }
@@ -193,7 +193,7 @@ void PolygonCutter::cut_off(std::int32_t corner)
 {
     Corner& at = corners_[corner];
     at.left = false;
-    for (std::int32_t k = first_leaf_ + at.place / leaf; k > 0; k /= 2) --boxes_[k].left;
+    for (std::int32_t k = first_leaf_ + at.index / leaf; k > 0; k /= 2) --boxes_[k].left;
     corners_[at.before].after = at.after;
     corners_[at.after].before = at.before;
     while (at.first_waiting != none) make_ready(at.first_waiting);
@@ -207,7 +207,7 @@ bool PolygonCutter::append(std::span<const Vec3f> positions, std::span<const std
                            std::vector<Mesh::Triangle>& triangles)
 {
     std::size_t left = corners.size();
-    if (left > most_corners) return false;
+    if (left > max_corners) return false;
     if (left == 3 || is_convex_quad(positions, corners) || !flatten(positions, corners)) {
         for (std::size_t i = 1; i + 1 < left; ++i) triangles.emplace_back(corners[0], corners[i], corners[i + 1]);
         return true;
@@ -224,7 +224,7 @@ bool PolygonCutter::append(std::span<const Vec3f> positions, std::span<const std
             cut_off(i);
             --left;
         }
-        if (looks_ > most_looks * corners.size()) return false;
+        if (looks_ > max_looks * corners.size()) return false;
     }
     // The rest is a triangle, crosses itself, or has no area.
     for (std::int32_t i = corners_[0].after; corners_[i].after != 0; i = corners_[i].after)

@@ -16,15 +16,15 @@ namespace rapid {
 // If a corner's triangle contains another corner, it waits until that corner is cut off; only cutting a neighbour can
 // make it an ear earlier. Each of at most 3 n triangles therefore tests each corner once, and a tree of boxes around
 // nearby corners skips most of the tests. This takes n log n for typical polygons and n^2 at worst, limited to
-// `most_looks` n.
+// `max_looks` n.
 class PolygonCutter {
 public:
-    static constexpr std::size_t most_corners = 1 << 20, most_looks = 1024;
+    static constexpr std::size_t max_corners = 1 << 20, max_looks = 1024;
 
     // Appends the triangles of a polygon with three or more corners, starting at its second corner, so that a convex
     // polygon becomes a fan about its first. It need not be convex or exactly flat. The rest of a self-intersecting
-    // polygon becomes a fan. The corners index `positions`. Returns false if the polygon exceeds most_corners or takes
-    // more than most_looks per corner.
+    // polygon becomes a fan. The corners index `positions`. Returns false if the polygon exceeds max_corners or takes
+    // more than max_looks per corner.
     bool append(std::span<const Vec3f> positions, std::span<const std::int32_t> corners,
                 std::vector<Mesh::Triangle>& triangles);
 
@@ -35,7 +35,7 @@ private:
     struct Corner {
         Eigen::Vector2d P;  // in the plane of the polygon
         std::int32_t before, after;
-        std::int32_t place = 0;      // index in order_
+        std::int32_t index = 0;      // index in order_
         std::int32_t look_from = 0;  // corners before this index in order_ are not in the triangle
         bool left = true, ready = true;
         std::int32_t first_waiting = none;  // head of the list of corners that wait for this one to be cut off

@@ -38,9 +38,9 @@ RayCrossings::RayCrossings(MeshPtr mesh) : mesh_(std::move(mesh)), bounds_(mesh_
     for_each_bin([&](std::size_t bin, std::int32_t triangle) { triangles_[next[bin]++] = triangle; });
 }
 
-int RayCrossings::bin_at(double place, int axis) const
+int RayCrossings::bin_at(double coordinate, int axis) const
 {
-    return static_cast<int>(std::clamp((place - bounds_.min()[axis]) * per_metre_[axis], 0.0, bins_ - 1.0));
+    return static_cast<int>(std::clamp((coordinate - bounds_.min()[axis]) * per_metre_[axis], 0.0, bins_ - 1.0));
 }
 
 template <class F>

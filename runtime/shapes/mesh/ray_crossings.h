@@ -34,7 +34,7 @@ private:
     {
         return mesh_->positions[mesh_->triangles[triangle][k]].cast<double>();
     }
-    int bin_at(double place, int axis) const;
+    int bin_at(double coordinate, int axis) const;
     template <class F>
     void for_each_bin(const F& f) const;
 

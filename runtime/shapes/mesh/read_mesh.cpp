@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "runtime/base/error.h"
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
@@ -61,8 +61,8 @@ void send_mesh(const MeshFile& mesh, MessageWriter& message)
         message.put_text(name);
         message.put_array(std::span(members));
     }
-    message.put(mesh.left_out.size());
-    for (const std::string& what : mesh.left_out) message.put_text(what);
+    message.put(mesh.skipped.size());
+    for (const std::string& what : mesh.skipped) message.put_text(what);
 }
 
 MeshFile receive_mesh(MessageReader& message)
@@ -81,11 +81,11 @@ MeshFile receive_mesh(MessageReader& message)
         const std::string name = message.take_text();
         mesh.face_groups[name] = message.take_vector<std::uint8_t>(triangles);
     }
-    for (auto left = message.take<std::size_t>(); left > 0; --left) mesh.left_out.push_back(message.take_text());
+    for (auto left = message.take<std::size_t>(); left > 0; --left) mesh.skipped.push_back(message.take_text());
     return mesh;
 }
 
-const ApartReader<MeshFile> importer(
+const SandboxedReader<MeshFile> importer(
     "mesh", [](const std::filesystem::path& path, const std::string&) { return import_mesh(path); }, send_mesh,
     receive_mesh);
 
@@ -116,11 +116,11 @@ bool differ_at_vertices(const std::vector<T>& of_corners, const std::vector<std:
 }
 
 template <class T>
-std::vector<T> those_of(const std::vector<T>& values, const std::vector<std::size_t>& places)
+std::vector<T> selected(const std::vector<T>& values, const std::vector<std::size_t>& indices)
 {
     std::vector<T> result;
-    result.reserve(places.size());
-    for (const std::size_t place : places) result.push_back(values[place]);
+    result.reserve(indices.size());
+    for (const std::size_t index : indices) result.push_back(values[index]);
     return result;
 }
 
@@ -151,7 +151,7 @@ MeshFile read_mesh_file(const std::filesystem::path& path)
     return file;
 }
 
-std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
+std::vector<std::int32_t> join_by_position(const std::vector<Vec3f>& positions)
 {
     struct Hash {
         std::size_t operator()(const std::array<std::uint32_t, 3>& bits) const
@@ -165,10 +165,10 @@ std::vector<std::int32_t> join_by_place(const std::vector<Vec3f>& positions)
     vertices.reserve(positions.size());
     std::vector<std::int32_t> vertex_of(positions.size());
     for (std::size_t i = 0; i < positions.size(); ++i) {
-        std::array<std::uint32_t, 3> place;
+        std::array<std::uint32_t, 3> key;
         for (int axis = 0; axis < 3; ++axis)
-            place[axis] = std::bit_cast<std::uint32_t>(positions[i][axis] + 0.0f);  // -0 is 0
-        vertex_of[i] = vertices.try_emplace(place, static_cast<std::int32_t>(vertices.size())).first->second;
+            key[axis] = std::bit_cast<std::uint32_t>(positions[i][axis] + 0.0f);  // -0 is 0
+        vertex_of[i] = vertices.try_emplace(key, static_cast<std::int32_t>(vertices.size())).first->second;
     }
     return vertex_of;
 }
@@ -223,17 +223,17 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
             values);
     for (const auto& [key, values] : file.face_values)
         std::visit(
-            [&, &name_of = key](const auto& of_all) { mesh->face_values.emplace(name_of, those_of(of_all, kept)); },
+            [&, &name_of = key](const auto& of_all) { mesh->face_values.emplace(name_of, selected(of_all, kept)); },
             values);
-    for (const auto& [key, members] : file.face_groups) mesh->face_groups.emplace(key, those_of(members, kept));
-    mesh->left_out = file.left_out;
+    for (const auto& [key, members] : file.face_groups) mesh->face_groups.emplace(key, selected(members, kept));
+    mesh->skipped = file.skipped;
     return mesh;
 }
 
 MeshPtr read_mesh(const std::filesystem::path& path)
 {
     const MeshFile file = read_mesh_file(path);
-    return joined(file, join_by_place(file.positions), path.string());
+    return joined(file, join_by_position(file.positions), path.string());
 }
 
 }  // namespace rapid

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr double least_slope2 = 0.25;  // near 0 the two gradients cancel, and the surface velocity would be unbounded
+constexpr double min_slope2 = 0.25;  // near 0 the two gradients cancel, and the surface velocity would be unbounded
 
 class BlendedDistance {
 public:
@@ -36,7 +36,7 @@ public:
         const double a = a_->sampler().distance(P, slope_a), b = b_->sampler().distance(P, slope_b);
         const double part = part_of(time);
         Sample sample{a + part * (b - a), slope_a + part * (slope_b - slope_a), Vec3d::Zero()};
-        sample.vc = -rate_ * (b - a) / std::max(sample.gradient.squaredNorm(), least_slope2) * sample.gradient;
+        sample.vc = -rate_ * (b - a) / std::max(sample.gradient.squaredNorm(), min_slope2) * sample.gradient;
         return sample;
     }
     double distance(const Vec3d& P, double time) const
@@ -60,7 +60,7 @@ public:
         }
         const Sample there = at(P, to);
         const double slope2 = there.gradient.squaredNorm();
-        return slope2 > least_slope2 ? Vec3d(P - (there.phi - level) / slope2 * there.gradient) : P;
+        return slope2 > min_slope2 ? Vec3d(P - (there.phi - level) / slope2 * there.gradient) : P;
     }
 
     // Returns the rate of change of the surface velocity along a point that moves from P with v, m/s².
@@ -70,13 +70,13 @@ public:
         const double h = duration_ / 32, from = std::max(0.0, time - h), to = std::min(duration_, time + h);
         return (at(P + (to - time) * v, to).vc - at(P + (from - time) * v, from).vc) / (to - from);
     }
-    // Returns the part of it due to motion `way` along the surface at a fixed time.
-    Vec3d change_along(const Vec3d& P, const Vec3d& way, double time) const
+    // Returns the part of it due to motion `direction` along the surface at a fixed time.
+    Vec3d change_along(const Vec3d& P, const Vec3d& direction, double time) const
     {
-        const double speed = way.norm();
+        const double speed = direction.norm();
         if (!(speed > 0)) return Vec3d::Zero();
         const double h = 0.5 * voxel() / speed;
-        return (at(P + h * way, time).vc - at(P - h * way, time).vc) / (2 * h);
+        return (at(P + h * direction, time).vc - at(P - h * direction, time).vc) / (2 * h);
     }
 
     double duration() const { return duration_; }
@@ -85,8 +85,8 @@ public:
     double slope_bound() const { return std::max(a_->slope_bound(), b_->slope_bound()); }
     double voxel() const { return std::max(a_->voxel(), b_->voxel()); }
     double rounding() const { return 0x1p-21 * std::max(a_->band(), b_->band()); }  // m
-    double most_change() const { return travel_ * std::abs(rate_); }                // bound on |dphi/dt|, m/s
-    double fastest() const { return most_change() / std::sqrt(least_slope2); }      // bound on the surface's speed, m/s
+    double max_change() const { return travel_ * std::abs(rate_); }                 // bound on |dphi/dt|, m/s
+    double fastest() const { return max_change() / std::sqrt(min_slope2); }         // bound on the surface's speed, m/s
     double most_curved(double speed) const { return 2 * slope_bound() * std::abs(rate_) * speed; }  // m/s²
     std::uint64_t active_voxels() const { return a_->active_voxels() + b_->active_voxels(); }
     Box3d bounds() const { return a_->bounds().merged(b_->bounds()); }
@@ -147,7 +147,7 @@ struct BlendedField {
     // Returns a step that is free of the surface, or a quarter of a voxel of relative travel if that is longer.
     double step(double, const Sample& here) const
     {
-        const double closing = body.slope_bound() * top_speed() + body.most_change();
+        const double closing = body.slope_bound() * top_speed() + body.max_change();
         if (!(closing > 0)) return path.duration;
         return std::max(here.height / closing, body.voxel() / 4 / (top_speed() + body.fastest()));
     }

@@ -53,10 +53,10 @@ private:
 // Carries births along the curves of all vertices of a mesh.
 class DeformingPath final : public BodyPath {
 public:
-    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> curves, PlacesOn on)
+    DeformingPath(MeshPtr mesh, std::vector<Cubic<Vec3d>> curves, BirthDomain on)
         : mesh_(std::move(mesh)), on_(on), curves_(std::move(curves))
     {
-        if (on == PlacesOn::Volume) crossings_.emplace(mesh_);
+        if (on == BirthDomain::Volume) crossings_.emplace(mesh_);
     }
 
     void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
@@ -65,11 +65,11 @@ public:
         std::vector<RayCrossings::Crossing> crossings;
         for (std::size_t i = 0; i < births.size(); ++i) {
             Birthplace& birth = births[i];
-            if (on_ == PlacesOn::Volume) {
+            if (on_ == BirthDomain::Volume) {
                 const Cubic<Vec3d> curve = curve_inside(birth.P, crossings);
                 birth.P = curve.at(t[i]).cast<float>();
                 velocity[i] = curve.derivative(t[i]);
-            } else if (on_ == PlacesOn::Vertices) {
+            } else if (on_ == BirthDomain::Vertices) {
                 const Cubic<Vec3d>& curve = curves_[static_cast<std::size_t>(birth.element)];
                 birth.P = curve.at(t[i]).cast<float>();
                 velocity[i] = curve.derivative(t[i]);
@@ -145,7 +145,7 @@ private:
     }
 
     MeshPtr mesh_;  // at the frame
-    PlacesOn on_;
+    BirthDomain on_;
     std::vector<Cubic<Vec3d>> curves_;  // per vertex
     std::optional<RayCrossings> crossings_;
 };
@@ -242,7 +242,7 @@ BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64
 }
 
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
-                           PlacesOn on)
+                           BirthDomain on)
 {
     return std::make_shared<DeformingPath>(mesh.at(clock, frame), vertex_curves(mesh, clock, frame, path), on);
 }

@@ -115,13 +115,13 @@ using BodyPathPtr = std::shared_ptr<const BodyPath>;
 BodyPathPtr rigid_path(const Motion& motion, const FrameClock& clock, std::int64_t frame, const FramePath& path);
 
 // Returns the path of a deforming mesh. Births are given on the mesh at the frame.
-enum class PlacesOn {
+enum class BirthDomain {
     Faces,     // element: a triangle, with barycentric weights
     Vertices,  // element: a vertex
     Volume,    // only P; keeps its ratio between the adjacent faces along x
 };
 BodyPathPtr deforming_path(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame, const FramePath& path,
-                           PlacesOn on);
+                           BirthDomain on);
 
 // Returns the curves of the vertices of a deforming mesh.
 std::vector<Cubic<Vec3d>> vertex_curves(const AnimatedMesh& mesh, const FrameClock& clock, std::int64_t frame,

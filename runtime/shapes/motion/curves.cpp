@@ -39,9 +39,9 @@ public:
                 birth.b1 = static_cast<float>(numbers[i][2]);
                 birth.b2 = 0;
                 const Mesh::Triangle& line = mesh_->triangles[static_cast<std::size_t>(birth.element)];
-                const Vec3d a = at(line, 0), way = at(line, 1) - a;
-                birth.P = (a + double(birth.b1) * way).cast<float>();
-                birth.N = way.normalized().cast<float>();
+                const Vec3d a = at(line, 0), segment = at(line, 1) - a;
+                birth.P = (a + double(birth.b1) * segment).cast<float>();
+                birth.N = segment.normalized().cast<float>();
             }
         }
     }
@@ -67,11 +67,11 @@ public:
             const Mesh::Triangle& line = mesh_->triangles[static_cast<std::size_t>(births[i].element)];
             const Cubic<Vec3d>&a = curves_[static_cast<std::size_t>(line[0])],
                   &b = curves_[static_cast<std::size_t>(line[1])];
-            const Vec3d A = a.at(t[i]), way = b.at(t[i]) - A, v = a.derivative(t[i]);
+            const Vec3d A = a.at(t[i]), segment = b.at(t[i]) - A, v = a.derivative(t[i]);
             const double u = births[i].b1;
-            births[i].P = (A + u * way).cast<float>();
+            births[i].P = (A + u * segment).cast<float>();
             velocity[i] = v + u * (b.derivative(t[i]) - v);
-            if (normals) births[i].N = way.normalized().cast<float>();
+            if (normals) births[i].N = segment.normalized().cast<float>();
         }
     }
 

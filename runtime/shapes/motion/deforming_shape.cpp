@@ -54,12 +54,12 @@ public:
         if (begin_) least = std::max(least, begin_->sampler().distance(P) - fastest_ * time);
         if (least > exact) return {least, Vec3d::Zero()};
 
-        const MovingTriangles::Place place = faces_.nearest(P, t, hint);
-        Sample sample{0, Vec3d::Zero(), place.triangle, faces_.velocity(place, t) / duration_};
-        const Eigen::Matrix3d now = faces_.frame(place.triangle, t);
-        const EndSample at_end = sample_end(*end_, place, P, now, t, 1);
+        const MovingTriangles::SurfacePoint surface_point = faces_.nearest(P, t, hint);
+        Sample sample{0, Vec3d::Zero(), surface_point.triangle, faces_.velocity(surface_point, t) / duration_};
+        const Eigen::Matrix3d now = faces_.frame(surface_point.triangle, t);
+        const EndSample at_end = sample_end(*end_, surface_point, P, now, t, 1);
         EndSample at_begin;
-        if (begin_) at_begin = sample_end(*begin_, place, P, now, t, 0);
+        if (begin_) at_begin = sample_end(*begin_, surface_point, P, now, t, 0);
 
         double weight = 0;
         const auto add = [&](const EndSample& end, double w) {
@@ -75,12 +75,13 @@ public:
             sample.gradient /= weight;
         } else {
             // At both ends other parts of the body are nearer, so only the face decides the side.
-            const double side = (P - place.P).dot(now.col(2)) < 0 ? -1 : 1;
-            sample.phi = side * place.distance;
+            const double side = (P - surface_point.P).dot(now.col(2)) < 0 ? -1 : 1;
+            sample.phi = side * surface_point.distance;
         }
         if (sample.gradient.isZero(0))
-            sample.gradient = place.distance > 0 ? Vec3d(std::copysign(1 / place.distance, sample.phi) * (P - place.P))
-                                                 : Vec3d(now.col(2));
+            sample.gradient = surface_point.distance > 0
+                                  ? Vec3d(std::copysign(1 / surface_point.distance, sample.phi) * (P - surface_point.P))
+                                  : Vec3d(now.col(2));
         return sample;
     }
 
@@ -146,23 +147,23 @@ private:
         Vec3d gradient = Vec3d::Zero();  // rotated to the current orientation
         bool agrees = false;             // no other part of the body is nearer
     };
-    EndSample sample_end(const BakedLevelSet& level_set, const MovingTriangles::Place& place, const Vec3d& P,
-                         const Eigen::Matrix3d& now, double t, double then) const
+    EndSample sample_end(const BakedLevelSet& level_set, const MovingTriangles::SurfacePoint& surface_point,
+                         const Vec3d& P, const Eigen::Matrix3d& now, double t, double then) const
     {
         Vec3d X = P;
         Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
         if (t != then) {
-            turn = faces_.frame(place.triangle, then) * now.transpose();
+            turn = faces_.frame(surface_point.triangle, then) * now.transpose();
             if (turn.isZero(0)) turn.setIdentity();
-            X = faces_.at(place, then) + turn * (P - place.P);
+            X = faces_.at(surface_point, then) + turn * (P - surface_point.P);
         }
         EndSample sample;
         sample.phi = level_set.sampler().distance(X, sample.gradient);
         sample.gradient = turn.transpose() * sample.gradient;
         const double band = level_set.band();
-        sample.agrees = std::abs(sample.phi) >= std::min(place.distance, band) - level_set.voxel();
+        sample.agrees = std::abs(sample.phi) >= std::min(surface_point.distance, band) - level_set.voxel();
         // Beyond the band the distance to the face is more accurate.
-        if (sample.gradient.isZero(0)) sample.phi = std::copysign(std::max(band, place.distance), sample.phi);
+        if (sample.gradient.isZero(0)) sample.phi = std::copysign(std::max(band, surface_point.distance), sample.phi);
         return sample;
     }
 
@@ -362,13 +363,13 @@ private:
                 std::span<Vec3d> gradient) const
     {
         const double t = part_of(time);
-        const MovingTriangles::Place place = faces_.nearest(P[i], t);
-        phi[i] = place.distance;
+        const MovingTriangles::SurfacePoint surface_point = faces_.nearest(P[i], t);
+        phi[i] = surface_point.distance;
         if (gradient.empty()) return;
-        if (place.distance > 0)
-            gradient[i] = (P[i] - place.P) / place.distance;
+        if (surface_point.distance > 0)
+            gradient[i] = (P[i] - surface_point.P) / surface_point.distance;
         else
-            gradient[i] = faces_.frame(place.triangle, t).col(2);
+            gradient[i] = faces_.frame(surface_point.triangle, t).col(2);
     }
     Vec3d acceleration(const MaterialPoint& point, double t) const
     {

@@ -11,8 +11,8 @@ namespace rapid {
 namespace {
 
 // Two files as read and two widened versions of both: for the first query, and for the radius of points.
-constexpr std::size_t most_kept_level_sets = 8;
-constexpr double most_voxels = 0x1p27;  // in a widened level set
+constexpr std::size_t max_recent_level_sets = 8;
+constexpr double max_voxels = 0x1p27;  // in a widened level set
 
 // Returns the largest distance of one surface's vertices from the other level set, limited by its band.
 double farthest(const LevelSet& from, const LevelSet& other)
@@ -39,10 +39,10 @@ LevelSetPtr LevelSetSequence::read(int file) const { return widened(file, 0); }
 
 LevelSetPtr LevelSetSequence::widened(int file, double band) const
 {
-    const auto find = [&](double wanted) -> LevelSetPtr {
+    const auto find = [&](double target) -> LevelSetPtr {
         const std::lock_guard lock(mutex_);
-        for (const Kept& kept : kept_)
-            if (kept.file == file && kept.band == wanted) return kept.level_set;
+        for (const Recent& recent : recent_)
+            if (recent.file == file && recent.band == target) return recent.level_set;
         return nullptr;
     };
     LevelSetPtr found = find(band);
@@ -55,8 +55,8 @@ LevelSetPtr LevelSetSequence::widened(int file, double band) const
         found = as_read->with_band(band);
     }
     const std::lock_guard lock(mutex_);
-    kept_.push_front({file, band, found});
-    if (kept_.size() > most_kept_level_sets) kept_.pop_back();
+    recent_.push_front({file, band, found});
+    if (recent_.size() > max_recent_level_sets) recent_.pop_back();
     return found;
 }
 
@@ -67,7 +67,7 @@ LevelSetSequence::Pair LevelSetSequence::pair(int a, int b, double band) const
     bool known = false;
     {
         const std::lock_guard lock(mutex_);
-        if (const auto kept = pairs_.find({a, b}); kept != pairs_.end()) found = kept->second, known = true;
+        if (const auto recent = pairs_.find({a, b}); recent != pairs_.end()) found = recent->second, known = true;
     }
     const LevelSetPtr first = read(a), second = read(b);
     const double voxel = std::max(first->voxel(), second->voxel());
@@ -75,7 +75,7 @@ LevelSetSequence::Pair LevelSetSequence::pair(int a, int b, double band) const
     const Box3d both = first->bounds().merged(second->bounds());
     const auto fits = [&](double metres) {
         const double smaller = std::min(first->voxel(), second->voxel());
-        return ((both.sizes().array() + 2 * metres) / smaller).prod() < most_voxels;
+        return ((both.sizes().array() + 2 * metres) / smaller).prod() < max_voxels;
     };
     if (!known) {
         const double half = 0.5 * std::max(first->bounds().diagonal().norm(), second->bounds().diagonal().norm());

@@ -69,13 +69,13 @@ private:
     Read read_;
 
     // Recently used level sets, most recent first.
-    struct Kept {
+    struct Recent {
         int file;
         double band;  // m, as requested; 0 as read
         LevelSetPtr level_set;
     };
     mutable std::mutex mutex_;
-    mutable std::deque<Kept> kept_;
+    mutable std::deque<Recent> recent_;
     mutable std::map<std::pair<int, int>, Pair> pairs_;  // without the level sets
 };
 

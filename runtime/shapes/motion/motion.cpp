@@ -14,7 +14,7 @@ namespace {
 
 // Maximum error, relative to the distance that the body travels in the interval, and in rad.
 constexpr double track_error = 1e-5;
-constexpr double least_piece = 1.0 / 64;  // fraction of the interval
+constexpr double min_piece = 1.0 / 64;  // fraction of the interval
 
 class ConstantMotion final : public Motion {
 public:
@@ -214,8 +214,8 @@ private:
         const MotionTrack::Piece piece = through(begin * seconds, end * seconds, first, middle, last);
         // Compares at two times, so that no number of whole turns can go unnoticed.
         const double off = begin + 0.381966 * (end - begin);
-        if (end - begin <= least_piece || (near(piece.at(half * seconds), middle, last.scale) &&
-                                           near(piece.at(off * seconds), at(off), last.scale))) {
+        if (end - begin <= min_piece || (near(piece.at(half * seconds), middle, last.scale) &&
+                                         near(piece.at(off * seconds), at(off), last.scale))) {
             pieces_.push_back(piece);
             return;
         }
@@ -267,9 +267,9 @@ MotionPtr product(const MotionPtr& first, const MotionPtr& second)
     return std::make_shared<ProductMotion>(first, second);
 }
 
-MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on)
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool continues)
 {
-    if (!goes_on) return constant_motion(motion->at(clock.at(frame)));
+    if (!continues) return constant_motion(motion->at(clock.at(frame)));
     return std::make_shared<BackwardMotion>(motion, clock, frame);
 }
 

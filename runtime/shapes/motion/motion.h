@@ -47,8 +47,8 @@ MotionPtr constant_motion(const Pose& pose);
 // Returns the composition: `second` is applied first, then `first`.
 MotionPtr product(const MotionPtr& first, const MotionPtr& second);
 // Returns the motion up to a frame that a body reached by a jump: it mirrors in time the motion after that frame. It is
-// at rest if `goes_on` is false.
-MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool goes_on);
+// at rest if `continues` is false.
+MotionPtr going_back(const MotionPtr& motion, const FrameClock& clock, double frame, bool continues);
 // Interpolates between the given frames; at rest outside them. Throws Error if there are no keys.
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys);
 

@@ -23,9 +23,9 @@ public:
 
     std::string_view kind() const override { return rest_.shape->kind(); }
     Box3d bounds() const override { return bounds_; }
-    double band() const override { return least_scale() * rest_.shape->band(); }
+    double band() const override { return min_scale() * rest_.shape->band(); }
     double slope_bound() const override { return rest_.shape->slope_bound(); }
-    double smallest_feature() const override { return least_scale() * rest_.shape->smallest_feature(); }
+    double smallest_feature() const override { return min_scale() * rest_.shape->smallest_feature(); }
 
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
     {
@@ -114,7 +114,7 @@ private:
         return rate.cross(arm) + spin.cross(spin.cross(arm)) - piece.spin.cross(piece.spin.cross(arm));
     }
 
-    double least_scale() const
+    double min_scale() const
     {
         double least = track_.at(track_.duration()).scale;
         for (const Piece& piece : track_.pieces()) least = std::min(least, piece.pose.scale);

@@ -10,7 +10,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::int32_t most_in_leaf = 4;
+constexpr std::int32_t max_in_leaf = 4;
 
 struct Ordering {
     TriangleTree& tree;
@@ -20,7 +20,7 @@ struct Ordering {
     {
         const auto own = tree.nodes.size();
         tree.nodes.push_back({first, last - first, 0});
-        if (last - first <= most_in_leaf) return;
+        if (last - first <= max_in_leaf) return;
         Box3f box;
         for (std::int32_t i = first; i < last; ++i) box.extend(middles[static_cast<std::size_t>(tree.order[i])]);
         int axis;
@@ -103,7 +103,8 @@ std::array<Vec3d, 3> MovingTriangles::corners(std::int32_t triangle, double t) c
     return {curves_[face[0]].at(t), curves_[face[1]].at(t), curves_[face[2]].at(t)};
 }
 
-void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const
+void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, double& best,
+                           SurfacePoint& surface_point) const
 {
     const auto [a, b, c] = corners(triangle, t);
     const auto [of_b, of_c] = nearest_weights(P, a, b, c);
@@ -111,15 +112,15 @@ void MovingTriangles::test(std::int32_t triangle, const Vec3d& P, double t, doub
     const double squared = (there - P).squaredNorm();
     if (!(squared < best)) return;
     best = squared;
-    place = {triangle, of_b, of_c, there, 0};
+    surface_point = {triangle, of_b, of_c, there, 0};
 }
 
-MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const
+MovingTriangles::SurfacePoint MovingTriangles::nearest(const Vec3d& P, double t, std::int32_t hint) const
 {
-    Place place;
-    place.triangle = tree_->order.front();  // also for a P that is NaN, which is near nothing
+    SurfacePoint surface_point;
+    surface_point.triangle = tree_->order.front();  // also for a P that is NaN, which is near nothing
     double best = std::numeric_limits<double>::infinity();
-    if (hint >= 0) test(hint, P, t, best, place);
+    if (hint >= 0) test(hint, P, t, best, surface_point);
 
     struct Open {
         std::int32_t node;
@@ -134,7 +135,7 @@ MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::i
         const TriangleTree::Node& node = tree_->nodes[static_cast<std::size_t>(now.node)];
         if (node.count > 0) {
             for (std::int32_t i = node.first; i < node.first + node.count; ++i)
-                test(tree_->order[static_cast<std::size_t>(i)], P, t, best, place);
+                test(tree_->order[static_cast<std::size_t>(i)], P, t, best, surface_point);
             continue;
         }
         Open near{now.node + 1, boxes_[static_cast<std::size_t>(now.node) + 1].squared_distance(P, t)};
@@ -143,21 +144,22 @@ MovingTriangles::Place MovingTriangles::nearest(const Vec3d& P, double t, std::i
         open[depth++] = far;
         open[depth++] = near;
     }
-    place.distance = std::sqrt(best);
-    return place;
+    surface_point.distance = std::sqrt(best);
+    return surface_point;
 }
 
-Vec3d MovingTriangles::at(const Place& place, double t) const
+Vec3d MovingTriangles::at(const SurfacePoint& surface_point, double t) const
 {
-    const std::array<Vec3d, 3> corner = corners(place.triangle, t);
-    return corner[0] + place.b1 * (corner[1] - corner[0]) + place.b2 * (corner[2] - corner[0]);
+    const std::array<Vec3d, 3> corner = corners(surface_point.triangle, t);
+    return corner[0] + surface_point.b1 * (corner[1] - corner[0]) + surface_point.b2 * (corner[2] - corner[0]);
 }
 
-Vec3d MovingTriangles::velocity(const Place& place, double t) const
+Vec3d MovingTriangles::velocity(const SurfacePoint& surface_point, double t) const
 {
-    const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(place.triangle)];
+    const Mesh::Triangle& face = tree_->triangles[static_cast<std::size_t>(surface_point.triangle)];
     const Vec3d a = curves_[face[0]].derivative(t);
-    return a + place.b1 * (curves_[face[1]].derivative(t) - a) + place.b2 * (curves_[face[2]].derivative(t) - a);
+    return a + surface_point.b1 * (curves_[face[1]].derivative(t) - a) +
+           surface_point.b2 * (curves_[face[2]].derivative(t) - a);
 }
 
 std::array<Vec3d, 3> MovingTriangles::rates(std::int32_t triangle, double t) const

@@ -36,17 +36,17 @@ public:
     // curves: of the vertices, with t from 0 to 1.
     MovingTriangles(std::shared_ptr<const TriangleTree> tree, std::vector<Cubic<Vec3d>> curves);
 
-    struct Place {
+    struct SurfacePoint {
         std::int32_t triangle = -1;
         double b1 = 0, b2 = 0;    // barycentric weights of the second and third corner
         Vec3d P = Vec3d::Zero();  // m
         double distance = 0;      // m, from the query position
     };
     // hint: a nearby triangle, if known; it shortens the search.
-    Place nearest(const Vec3d& P, double t, std::int32_t hint = -1) const;
+    SurfacePoint nearest(const Vec3d& P, double t, std::int32_t hint = -1) const;
 
-    Vec3d at(const Place& place, double t) const;
-    Vec3d velocity(const Place& place, double t) const;  // m per interval
+    Vec3d at(const SurfacePoint& surface_point, double t) const;
+    Vec3d velocity(const SurfacePoint& surface_point, double t) const;  // m per interval
 
     // Positions fixed to a triangle: (x, y, z) means p0 + x (p1 - p0) + y (p2 - p0) + z n.
     Vec3d coordinates(std::int32_t triangle, const Vec3d& P, double t) const;
@@ -72,7 +72,7 @@ private:
     };
     std::array<Vec3d, 3> corners(std::int32_t triangle, double t) const;
     std::array<Vec3d, 3> rates(std::int32_t triangle, double t) const;
-    void test(std::int32_t triangle, const Vec3d& P, double t, double& best, Place& place) const;
+    void test(std::int32_t triangle, const Vec3d& P, double t, double& best, SurfacePoint& surface_point) const;
 
     std::shared_ptr<const TriangleTree> tree_;
     std::vector<Cubic<Vec3d>> curves_;

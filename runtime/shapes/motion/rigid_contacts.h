@@ -30,7 +30,7 @@ public:
     // Bounds over the whole time. For a path that touches at a level above 0 (m), they apply to its distance from that
     // level.
     double acceleration(double level) const { return acceleration_ + std::abs(level) * level_acceleration_; }
-    double speed_beside(double level) const { return std::abs(level) * level_speed_; }
+    double level_speed(double level) const { return std::abs(level) * level_speed_; }
 
     const MotionTrack::Piece& piece() const { return *piece_; }
     const Path& path() const { return *path_; }
@@ -116,7 +116,7 @@ public:
     double step(double, const Sample& here) const
     {
         if (rest_->is_convex()) return convex_step(here.height, here.slope, acceleration());
-        const double speed = here.velocity.norm() + path_.speed_beside(level_) / rest_->slope_bound;
+        const double speed = here.velocity.norm() + path_.level_speed(level_) / rest_->slope_bound;
         return general_step(here.height, rest_->slope_bound, rest_->feature, speed, acceleration());
     }
     // Returns the shortest step. Along a face of a convex shape and flush with it, the acceleration bound would shrink

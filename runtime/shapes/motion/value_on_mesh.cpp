@@ -40,12 +40,12 @@ Eigen::Matrix3d frame_of(const Corners& corners)
     return frame;
 }
 
-// Interpolates values linearly on a face. places: indices of its corners in the list.
+// Interpolates values linearly on a face. indices: indices of its corners in the list.
 template <class T>
-T linear(const std::vector<T>& list, const std::array<std::size_t, 3>& places, const std::array<double, 2>& weights)
+T linear(const std::vector<T>& list, const std::array<std::size_t, 3>& indices, const std::array<double, 2>& weights)
 {
     const auto b1 = static_cast<float>(weights[0]), b2 = static_cast<float>(weights[1]);
-    return list[places[0]] * (1 - b1 - b2) + list[places[1]] * b1 + list[places[2]] * b2;
+    return list[indices[0]] * (1 - b1 - b2) + list[indices[1]] * b1 + list[indices[2]] * b2;
 }
 
 const Mesh::VertexValues* find(const std::map<std::string, Mesh::VertexValues>& values, const std::string& name)
@@ -71,15 +71,15 @@ int value_on_mesh(const Mesh& mesh, const MeshSurfaces& surfaces, std::string_vi
     const std::int32_t face = surfaces.at_rest ? surfaces.at_rest->material_at(here.at, 0).face : here.face;
     const auto f = static_cast<std::size_t>(face);
     const Corners rest = corners_at_rest(mesh, f), now = corners_now(rest, surfaces, face, time);
-    std::array<std::size_t, 3> places = {f, f, f};
-    for (std::size_t k = 0; k < places.size() && !of_faces; ++k)
-        places[k] = of_corners ? 3 * f + k : static_cast<std::size_t>(mesh.triangles[f][static_cast<int>(k)]);
+    std::array<std::size_t, 3> indices = {f, f, f};
+    for (std::size_t k = 0; k < indices.size() && !of_faces; ++k)
+        indices[k] = of_corners ? 3 * f + k : static_cast<std::size_t>(mesh.triangles[f][static_cast<int>(k)]);
     const std::array<double, 2> weights = of_faces ? std::array{0.0, 0.0} : nearest_weights(P, now[0], now[1], now[2]);
     if (const auto* numbers = std::get_if<std::vector<float>>(values)) {
-        value[0] = linear(*numbers, places, weights);
+        value[0] = linear(*numbers, indices, weights);
         return 1;
     }
-    Vec3d vector = linear(std::get<std::vector<Vec3f>>(*values), places, weights).cast<double>();
+    Vec3d vector = linear(std::get<std::vector<Vec3f>>(*values), indices, weights).cast<double>();
     if (name == "N") vector = frame_of(now) * (frame_of(rest).transpose() * vector);
     Eigen::Map<Vec3d>(value.data(), 3) = vector;
     return 3;

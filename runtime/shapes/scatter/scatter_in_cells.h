@@ -41,11 +41,11 @@ public:
     ScatterInCells(ScatterCells cells, Inside inside, double volume, const std::string& what)
         : cells_(std::move(cells)), inside_(std::move(inside))
     {
-        if (!(volume > least_part * cells_.volume()))
+        if (!(volume > min_part * cells_.volume()))
             throw Error(
                 fmt::format("the volume of {}, {:.3g} m³, is too thin to be born in: it is less than {:g} of the "
                             "cells around it; use its surface",
-                            what, volume, least_part));
+                            what, volume, min_part));
     }
 
     void place(RandomKey key, std::uint64_t first, std::span<Birthplace> out) const override
@@ -60,16 +60,16 @@ public:
     }
 
 private:
-    static constexpr double least_part = 1e-5;
+    static constexpr double min_part = 1e-5;
     // At the least fraction the probability of needing more is exp(-100).
-    static constexpr std::uint64_t most_trials = 10'000'000;
+    static constexpr std::uint64_t max_trials = 10'000'000;
 
     using Numbers = std::array<double, 4>;
 
     // u: random numbers of the first trial.
     Vec3f draw(RandomKey key, std::uint64_t birth, Numbers u) const
     {
-        for (std::uint64_t trial = 0; trial < most_trials; u = uniform4(key, birth, ++trial << 32)) {
+        for (std::uint64_t trial = 0; trial < max_trials; u = uniform4(key, birth, ++trial << 32)) {
             const auto n = static_cast<std::size_t>(u[0] * double(cells_.cells.size()));
             const Vec3d in_cell = Vec3d(u[1], u[2], u[3]).cwiseProduct(cells_.edge);
             const Vec3f P = (cells_.low(cells_.cells[n]) + in_cell).template cast<float>();

@@ -20,7 +20,7 @@ struct ForceWork {
 
     void begin(const Vec3d& P, const Vec3d& v) { *this = {0.5 * v.squaredNorm(), 0, P}; }
     void advance(const Vec3d& P, const Vec3d& a) { work += a.dot(P - from), from = P; }
-    double of_contacts(const Vec3d& v) const
+    double contact_work(const Vec3d& v) const
     {
         constexpr double rounding = 1e-12;
         const double now = 0.5 * v.squaredNorm(), by_contacts = now - kinetic - work;

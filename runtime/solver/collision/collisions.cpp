@@ -25,7 +25,7 @@ void DiscreteMethods::correct()
 void DiscreteMethods::correct(int o)
 {
     const Obstacle& obstacle = block_.obstacles[o];
-    ask_about(obstacle);
+    query_obstacle(obstacle);
     if (query_.empty()) return;
     query_.find_gradients_at_times(*obstacle.shape);
     std::size_t backtracked = 0;
@@ -35,7 +35,7 @@ void DiscreteMethods::correct(int o)
     if (!query_.empty()) lift(obstacle);
 }
 
-void DiscreteMethods::ask_about(const Obstacle& obstacle)
+void DiscreteMethods::query_obstacle(const Obstacle& obstacle)
 {
     query_.clear();
     for (std::size_t i = 0; i < block_.size(); ++i) {
@@ -162,14 +162,15 @@ void Collisions::limit_energy(std::size_t displaced)
         for (const Ejection::Displacement& one : moved)
             if (one.i == i) by += one.by;
         // The frame is that of the shape that a spring attaches the point to, which moves with V.
-        const Vec3d from = motion_.initial_P(i) + by, V = motion_.frame_velocity(i, from), way = block_.dt[i] * V;
+        const Vec3d from = motion_.initial_P(i) + by, V = motion_.frame_velocity(i, from),
+                    displacement = block_.dt[i] * V;
         const Vec3d v0 = motion_.initial_v(i) - V;
         const double energy = 0.5 * v0.squaredNorm() + motion_.potential(i, from);
         const double speed = speed_of_shapes(i, from, V);
         const double most = speed > 0 ? driven_energy(i, from, energy, speed) : energy;
-        double potential = motion_.potential(i, P - way);
+        double potential = motion_.potential(i, P - displacement);
         if (most - potential < -rounding * (0.5 * v0.squaredNorm() + std::abs(potential))) {
-            P = from + way;
+            P = from + displacement;
             potential = motion_.potential(i, from);
             if (!(speed > 0)) v = v0 + V;
         }
@@ -275,7 +276,7 @@ void Collisions::find_first_contacts(std::size_t o)
         }
     }
     planes_.finish(o);
-    contacts_.ask(o);
+    contacts_.query(o);
 }
 
 double Collisions::round(std::span<Vec3d> P, std::span<Vec3f> rounded)

@@ -58,7 +58,7 @@ public:
     double position_error(std::size_t i) const { return position_error_[i]; }
 
 private:
-    void ask_about(const Obstacle& obstacle);
+    void query_obstacle(const Obstacle& obstacle);
     void correct(int obstacle);
     bool move_out(std::size_t j, int obstacle);
     void backtrack(std::size_t i, const Obstacle& obstacle, const Vec3d& vc, double time, const Vec3d& n, double depth);
@@ -97,7 +97,7 @@ public:
     // round().
     bool has_met(std::size_t i) const { return touched_.has(i); }
     double position_error(std::size_t i) const { return discrete_.position_error(i); }
-    bool is_carried(std::size_t i) const { return stuck_.holds_for_good(i); }
+    bool is_carried(std::size_t i) const { return stuck_.is_held_for_good(i); }
     std::span<const Ejection::Displacement> displacements() const { return ejection_.displacements(); }
     std::span<const Ejection::Displacement> corrections() const { return correction_.displacements(); }
 

@@ -30,10 +30,10 @@ bool PathPlanner::plan(CollidingPoint& point)
         point.kind = CollidingPoint::Free;
         point.stops = false;
         if (point.supports == 0) return true;
-        if (chatters(point)) return ride(point), false;
+        if (chatters(point)) return move_with_surface(point), false;
         const Slide next = slide(point);
         if (next.kind == Slide::Leaves) continue;
-        if (next.kind == Slide::Sticks) return ride(point), false;
+        if (next.kind == Slide::Sticks) return move_with_surface(point), false;
         return slide_along_surface(point, next);
     }
     return false;
@@ -112,7 +112,7 @@ bool PathPlanner::chatters(CollidingPoint& point) const
 }
 
 // Moves the point with the surface for the rest of the substep.
-void PathPlanner::ride(CollidingPoint& point)
+void PathPlanner::move_with_surface(CollidingPoint& point)
 {
     const Support& on = point.on[0];
     Vec3d &P = block_.P[point.i], &v = block_.v[point.i];
@@ -178,10 +178,10 @@ Vec3d tangential_acceleration(const Slide& slide, const Vec3d& pull, const Vec3d
 
 }  // namespace
 
-void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going)
+void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> active)
 {
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
-        begin_pieces(points, going, static_cast<int>(o));
+        begin_pieces(points, active, static_cast<int>(o));
         if (query_.empty()) continue;
         const Obstacle& obstacle = block_.obstacles[o];
         query_.find_gradients_at_times(*obstacle.shape);
@@ -197,11 +197,11 @@ void CurvedMotion::find_ends(std::span<CollidingPoint> points, std::span<const s
 }
 
 // Begins the tangential pieces along one shape, and adds the query for the surface at their ends.
-void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> going, int o)
+void CurvedMotion::begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> active, int o)
 {
     const double feature = block_.obstacles[o].feature;
     query_.clear();
-    for (const std::uint32_t slot : going) {
+    for (const std::uint32_t slot : active) {
         CollidingPoint& point = points[slot];
         const Support& on = point.on[0];
         if (point.kind != CollidingPoint::Curved || on.collider != o) continue;
@@ -421,7 +421,7 @@ void ContactRounds::start(std::uint32_t i)
     const ContactResolver::Arrival arrival{path.at(s), motion_.velocity_after(i, s), motion_.acceleration(i), path.v};
     point.by_forces.begin(arrival.P, arrival.v);
     resolver_.resolve(point, arrival, contacts_.contact(i), contacts_.obstacle(i));
-    if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
+    if (plan_next_path(point)) active_.push_back(static_cast<std::uint32_t>(slot));
 }
 
 void ContactRounds::resume(std::uint32_t i, double left, const std::optional<Support>& on)
@@ -433,16 +433,16 @@ void ContactRounds::resume(std::uint32_t i, double left, const std::optional<Sup
     point.left = left;
     if (on) point.on[0] = *on, point.supports = 1;
     point.by_forces.begin(block_.P[i], block_.v[i]);
-    if (goes_on(point)) going_.push_back(static_cast<std::uint32_t>(slot));
+    if (plan_next_path(point)) active_.push_back(static_cast<std::uint32_t>(slot));
 }
 
 void ContactRounds::run()
 {
-    while (!going_.empty()) {
-        curved_.find_ends(points_, going_);
+    while (!active_.empty()) {
+        curved_.find_ends(points_, active_);
         find_contacts();
-        going_on_.clear();
-        for (const std::uint32_t slot : going_) {
+        next_active_.clear();
+        for (const std::uint32_t slot : active_) {
             CollidingPoint& point = points_[slot];
             if (point.kind != CollidingPoint::Waits) {
                 if (contacts_.has(point.i))
@@ -450,15 +450,15 @@ void ContactRounds::run()
                 else
                     planner_.finish_path(point);
             }
-            if (goes_on(point)) going_on_.push_back(slot);
+            if (plan_next_path(point)) next_active_.push_back(slot);
         }
-        going_.swap(going_on_);
+        active_.swap(next_active_);
     }
     started_ = 0;
 }
 
 // Plans the next path of a point, and follows it if no shape has to be queried. Returns false if its substep is over.
-bool ContactRounds::goes_on(CollidingPoint& point)
+bool ContactRounds::plan_next_path(CollidingPoint& point)
 {
     while (planner_.plan(point)) {
         if (point.kind == CollidingPoint::Curved || may_meet_shape(point)) return true;
@@ -471,7 +471,7 @@ bool ContactRounds::goes_on(CollidingPoint& point)
     touched_.set_surfaces(point.i, {surface(0), surface(1)});
     if (motion_.is_damped()) {
         point.by_forces.advance(block_.P[point.i], motion_.acceleration(point.i));
-        audit_.add_work(point.i, point.by_forces.of_contacts(block_.v[point.i]));
+        audit_.add_work(point.i, point.by_forces.contact_work(block_.v[point.i]));
     }
     return false;
 }
@@ -492,9 +492,9 @@ bool ContactRounds::may_meet(const CollidingPoint& point, std::size_t obstacle) 
 // Searches all shapes, because a bounce may lead to any of them.
 void ContactRounds::find_contacts()
 {
-    for (const std::uint32_t slot : going_) contacts_.clear(points_[slot].i);
+    for (const std::uint32_t slot : active_) contacts_.clear(points_[slot].i);
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
-        for (const std::uint32_t slot : going_) {
+        for (const std::uint32_t slot : active_) {
             const CollidingPoint& point = points_[slot];
             if (point.kind == CollidingPoint::Waits || !may_meet(point, o)) continue;
             Path path = point.path;
@@ -502,7 +502,7 @@ void ContactRounds::find_contacts()
             path.begin = block_.frame_time(point.i, point.left);
             contacts_.add(point.i, path);
         }
-        contacts_.ask(o);
+        contacts_.query(o);
     }
 }
 

@@ -37,7 +37,7 @@ private:
     bool slide_along_surface(CollidingPoint& point, const Slide& slide);
     void slow_down(CollidingPoint& point) const;
     bool chatters(CollidingPoint& point) const;
-    void ride(CollidingPoint& point);
+    void move_with_surface(CollidingPoint& point);
 
     const CollisionBlock& block_;
     FreeMotion& motion_;
@@ -57,13 +57,13 @@ public:
     {
     }
 
-    // Finds the ends of curved paths among the points with the indices `going`. Each path is then the chord to its
+    // Finds the ends of curved paths among the points with the indices `active`. Each path is then the chord to its
     // end, in the world frame. A point waits if the surface is too uneven for the piece, and leaves if the surface
     // falls away.
-    void find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> going);
+    void find_ends(std::span<CollidingPoint> points, std::span<const std::uint32_t> active);
 
 private:
-    void begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> going, int obstacle);
+    void begin_pieces(std::span<CollidingPoint> points, std::span<const std::uint32_t> active, int obstacle);
     bool follow_arc(CollidingPoint& point, std::size_t j);
     void wait_for(CollidingPoint& point, double shortest) const;
     void leave_surface(CollidingPoint& point) const;
@@ -105,7 +105,7 @@ public:
     void run();
 
 private:
-    bool goes_on(CollidingPoint& point);
+    bool plan_next_path(CollidingPoint& point);
     bool may_meet_shape(const CollidingPoint& point) const;
     bool may_meet(const CollidingPoint& point, std::size_t obstacle) const;
     void find_contacts();
@@ -121,7 +121,7 @@ private:
 
     std::vector<CollidingPoint> points_;  // the first started_ belong to this substep
     std::size_t started_ = 0;
-    std::vector<std::uint32_t> going_, going_on_;  // unfinished points_: now and in the next round
+    std::vector<std::uint32_t> active_, next_active_;  // unfinished points_: now and in the next round
 };
 
 }  // namespace rapid

@@ -2,13 +2,13 @@
 
 namespace rapid {
 
-void FirstContacts::ask(std::size_t obstacle)
+void FirstContacts::query(std::size_t obstacle)
 {
-    if (asked_.empty()) return;
-    answers_.resize(asked_.size());
+    if (queried_.empty()) return;
+    answers_.resize(queried_.size());
     block_.obstacles[obstacle].shape->first_contact(paths_, answers_);
-    for (std::size_t j = 0; j < asked_.size(); ++j) {
-        const std::uint32_t i = asked_[j];
+    for (std::size_t j = 0; j < queried_.size(); ++j) {
+        const std::uint32_t i = queried_[j];
         if (answers_[j].time == Contact::none) continue;
         if (!has(i))
             found_.push_back(i);
@@ -17,7 +17,7 @@ void FirstContacts::ask(std::size_t obstacle)
         obstacle_[i] = static_cast<int>(obstacle);
         contact_[i] = answers_[j];
     }
-    asked_.clear();
+    queried_.clear();
     paths_.clear();
 }
 

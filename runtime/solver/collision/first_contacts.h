@@ -31,11 +31,11 @@ public:
     // Adds a path to the query of the next obstacle, up to the earliest known contact on it.
     void add(std::uint32_t i, const Path& path)
     {
-        asked_.push_back(i);
+        queried_.push_back(i);
         paths_.push_back(path);
         if (has(i)) paths_.back().duration = contact_[i].time;
     }
-    void ask(std::size_t obstacle);
+    void query(std::size_t obstacle);
 
     bool has(std::size_t i) const { return obstacle_[i] >= 0; }
     int obstacle(std::size_t i) const { return obstacle_[i]; }
@@ -50,7 +50,7 @@ private:
     std::vector<Contact> contact_;  // by point
     std::vector<std::uint32_t> found_;
 
-    std::vector<std::uint32_t> asked_;
+    std::vector<std::uint32_t> queried_;
     std::vector<Path> paths_;
     std::vector<Contact> answers_;
 };

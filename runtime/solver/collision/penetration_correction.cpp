@@ -9,20 +9,20 @@ namespace {
 
 // Returns a position outside a shape, at most a little farther away than the nearest in any of 26 directions; P if
 // there is none.
-Vec3d free_place(const Obstacle& obstacle, const Vec3d& P, double radius)
+Vec3d free_position(const Obstacle& obstacle, const Vec3d& P, double radius)
 {
     const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
     if (!std::isfinite(size)) return P;
-    std::array<Vec3d, 26> places;
+    std::array<Vec3d, 26> offsets;
     std::array<double, 26> phi;
     for (double reach = std::max(obstacle.feature, 0x1p-10 * size); reach < 2 * size; reach *= 1.25) {
         for (int k = 0, direction = 0; k < 27; ++k) {
             const Vec3d d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
-            if (!d.isZero()) places[direction++] = P + reach * d.normalized();
+            if (!d.isZero()) offsets[direction++] = P + reach * d.normalized();
         }
-        obstacle.shape->distance(places, phi, {});
+        obstacle.shape->distance(offsets, phi, {});
         const auto highest = std::max_element(phi.begin(), phi.end());
-        if (*highest >= radius) return places[highest - phi.begin()];
+        if (*highest >= radius) return offsets[highest - phi.begin()];
     }
     return P;
 }
@@ -53,7 +53,7 @@ void PenetrationCorrection::run(std::span<Vec3d> P, const std::vector<std::uint3
 }
 
 // Moves the points of inside_ that are in this obstacle out of it.
-void PenetrationCorrection::move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_place)
+void PenetrationCorrection::move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_position)
 {
     query_.clear();
     for (const std::uint32_t i : inside_)
@@ -67,10 +67,10 @@ void PenetrationCorrection::move_out(const Obstacle& obstacle, std::span<Vec3d> 
         const double f = query_.phi[j] - radius, slope2 = query_.gradient[j].squaredNorm();
         if (f >= -obstacle.contact_tolerance(P[i], radius)) continue;
         const Vec3d before = P[i];
-        if (slope2 > 0 && !to_free_place)
+        if (slope2 > 0 && !to_free_position)
             P[i] -= f / slope2 * query_.gradient[j];
         else
-            P[i] = free_place(obstacle, P[i], radius);
+            P[i] = free_position(obstacle, P[i], radius);
         displacements_.push_back({i, P[i] - before});
         still_inside_.push_back(i);
     }

@@ -33,7 +33,7 @@ public:
     double deepest(std::span<const Vec3f> P);
 
 private:
-    void move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_place);
+    void move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_position);
 
     const CollisionBlock& block_;
     const TouchedPoints& touched_;

@@ -108,7 +108,7 @@ void PlaneBatch::solve(const HalfSpace& plane)
 }
 
 // Applies may_reach() to all paths.
-void PlaneBatch::leave_out_near(const Box3d& box, double radius)
+void PlaneBatch::mark_undecided_near(const Box3d& box, double radius)
 {
     const Box3d wide = widened(box, radius);
     std::int64_t far[capacity] = {};
@@ -128,7 +128,7 @@ void PlaneContacts::finish(std::size_t o)
     batch_.solve(*block_.obstacles[o].plane);
     for (std::size_t other = 0; other < block_.obstacles.size(); ++other)
         if (other != o && block_.obstacles[other].is_continuous())
-            batch_.leave_out_near(block_.obstacles[other].bounds, broad_phase_.largest_radius(other));
+            batch_.mark_undecided_near(block_.obstacles[other].bounds, broad_phase_.largest_radius(other));
     for (std::size_t j = 0; j < batch_.size(); ++j) take(j, o);
     batch_.clear();
 }

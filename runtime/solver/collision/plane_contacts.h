@@ -54,7 +54,7 @@ public:
     void solve(const HalfSpace& plane);
 
     // Makes sliding and bouncing points undecided if they may come near this box; radius: their largest, m.
-    void leave_out_near(const Box3d& box, double radius);
+    void mark_undecided_near(const Box3d& box, double radius);
 
     std::uint32_t point(std::size_t j) const { return point_[j]; }
     Outcome outcome(std::size_t j) const { return static_cast<Outcome>(outcome_[j]); }

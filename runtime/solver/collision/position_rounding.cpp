@@ -11,10 +11,10 @@ Vec3f lifted(Vec3f P, const Vec3d& n, double height)
 {
     int k;
     n.cwiseAbs().maxCoeff(&k);
-    const double wanted = P[k] + height / n[k];
+    const double target = P[k] + height / n[k];
     const float outward = std::copysign(std::numeric_limits<float>::infinity(), static_cast<float>(n[k]));
-    P[k] = static_cast<float>(wanted);
-    if (n[k] > 0 ? P[k] < wanted : P[k] > wanted) P[k] = std::nextafter(P[k], outward);
+    P[k] = static_cast<float>(target);
+    if (n[k] > 0 ? P[k] < target : P[k] > target) P[k] = std::nextafter(P[k], outward);
     return P;
 }
 
@@ -41,7 +41,7 @@ void PositionRounding::find_moved(std::span<const Vec3d> P, std::span<const Vec3
 // Calls use(i, surface, f, tolerance) for points that have moved on a surface, with f = distance - radius at
 // position(i). The two surfaces of an edge are processed one after the other.
 template <class Position, class Use>
-void PositionRounding::ask_surfaces(const Position& position, const Use& use)
+void PositionRounding::query_surfaces(const Position& position, const Use& use)
 {
     for (int side = 0; side < 2; ++side) {
         for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
@@ -69,16 +69,16 @@ double PositionRounding::tolerance(std::size_t i, const Vec3d& P, const Obstacle
 void PositionRounding::snap(std::span<Vec3d> P, std::span<const Vec3f> initial)
 {
     find_moved(P, initial);
-    ask_surfaces([&](std::size_t i) { return P[i]; },
-                 [&](std::size_t i, const TouchedPoints::Surface& surface, double f, double tolerance) {
-                     // The path of a point on a moving shape ignores the turning and acceleration of the shape within
-                     // a step.
-                     const Obstacle& obstacle = block_.obstacles[surface.obstacle];
-                     const double h = block_.context.h;
-                     const auto speed = [&](double time) { return obstacle.shape->velocity_at(P[i], time).norm(); };
-                     const double carried = obstacle.moves ? h * (speed(0) + speed(h)) : 0;
-                     if (std::abs(f) <= tolerance + carried) P[i] -= f * surface.n;
-                 });
+    query_surfaces([&](std::size_t i) { return P[i]; },
+                   [&](std::size_t i, const TouchedPoints::Surface& surface, double f, double tolerance) {
+                       // The path of a point on a moving shape ignores the turning and acceleration of the shape within
+                       // a step.
+                       const Obstacle& obstacle = block_.obstacles[surface.obstacle];
+                       const double h = block_.context.h;
+                       const auto speed = [&](double time) { return obstacle.shape->velocity_at(P[i], time).norm(); };
+                       const double carried = obstacle.moves ? h * (speed(0) + speed(h)) : 0;
+                       if (std::abs(f) <= tolerance + carried) P[i] -= f * surface.n;
+                   });
     for (const std::uint32_t i : moved_on_plane_) {
         const Obstacle& obstacle = block_.obstacles[touched_.only_plane(i)];
         const double f = block_.height_over_plane(i, obstacle, P[i]);
@@ -88,10 +88,10 @@ void PositionRounding::snap(std::span<Vec3d> P, std::span<const Vec3f> initial)
 
 void PositionRounding::lift(std::span<Vec3f> rounded)
 {
-    ask_surfaces([&](std::size_t i) { return Vec3d(rounded[i].cast<double>()); },
-                 [&](std::size_t i, const TouchedPoints::Surface& surface, double f, double tolerance) {
-                     if (f < 0 && f >= -tolerance) rounded[i] = lifted(rounded[i], surface.n, -f);
-                 });
+    query_surfaces([&](std::size_t i) { return Vec3d(rounded[i].cast<double>()); },
+                   [&](std::size_t i, const TouchedPoints::Surface& surface, double f, double tolerance) {
+                       if (f < 0 && f >= -tolerance) rounded[i] = lifted(rounded[i], surface.n, -f);
+                   });
     for (const std::uint32_t i : moved_on_plane_) {
         const Obstacle& obstacle = block_.obstacles[touched_.only_plane(i)];
         const Vec3d P = rounded[i].cast<double>();

@@ -36,7 +36,7 @@ public:
 private:
     void find_moved(std::span<const Vec3d> P, std::span<const Vec3f> initial);
     template <class Position, class Use>
-    void ask_surfaces(const Position& position, const Use& use);
+    void query_surfaces(const Position& position, const Use& use);
     double tolerance(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const;
 
     const CollisionBlock& block_;

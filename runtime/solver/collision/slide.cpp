@@ -13,7 +13,7 @@ constexpr double never = std::numeric_limits<double>::infinity();
 
 // The largest turn of the friction's direction within a piece, in radians. The error of a piece is of third order in
 // it. A point that slides straight down a slope, or on a level floor, is exact at any length.
-constexpr double most_turn = 0.05;
+constexpr double max_turn = 0.05;
 
 // Two surfaces within 0.06 degrees of each other count as one, because the forces along their edge would be
 // ill-conditioned.
@@ -67,8 +67,8 @@ Slide slide_on(const Support& support, const Vec3d& v, const Vec3d& pull, double
     const double along = straight ? -holds : slide.a.dot(direction);
     if (!straight) {
         const double aside2 = (slide.a - along * direction).squaredNorm();
-        if (slide.duration * slide.duration * aside2 > most_turn * most_turn * speed2)
-            slide.duration = std::min(left, std::max(most_turn * speed / std::sqrt(aside2), least));
+        if (slide.duration * slide.duration * aside2 > max_turn * max_turn * speed2)
+            slide.duration = std::min(left, std::max(max_turn * speed / std::sqrt(aside2), least));
     }
     if (const double stop = along < 0 ? time_to_stop(speed, along, support.viscosity) : never; stop <= slide.duration) {
         slide.duration = stop;

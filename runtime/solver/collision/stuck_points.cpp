@@ -10,7 +10,7 @@ namespace {
 constexpr double velocity_tolerance = 1e-6;
 
 // The smallest slope of a distance. A flatter field, as in the middle of a shape, does not lead to the surface.
-constexpr double least_slope = 0.5;
+constexpr double min_slope = 0.5;
 
 // Parts of a substep that are searched for the time at which a point is torn off, and the bisections within one part.
 constexpr int parts_of_step = 8, bisections = 40;
@@ -40,7 +40,7 @@ void StuckPoints::advance()
     carried_.clear();
     find_held();
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o) {
-        ask(o, held_[o]);
+        query(o, held_[o]);
         for (std::size_t j = 0; j < query_.size(); ++j) {
             const std::uint32_t i = query_.point[j];
             const Gap gap{query_.phi[j] - block_.radius(block_.obstacles[o], i), query_.gradient[j]};
@@ -66,7 +66,7 @@ void StuckPoints::find_held()
         while (o < block_.obstacles.size() && block_.obstacles[o].key != std::abs(to)) ++o;
         if (o == block_.obstacles.size() || !block_.has_member(block_.obstacles[o], i) ||
             !block_.obstacles[o].holds()) {
-            let_go(i);
+            release(i);
         } else if (to < 0) {
             torn_.push_back(i);
         } else {
@@ -75,7 +75,7 @@ void StuckPoints::find_held()
     }
 }
 
-void StuckPoints::ask(std::size_t o, const std::vector<std::uint32_t>& points)
+void StuckPoints::query(std::size_t o, const std::vector<std::uint32_t>& points)
 {
     query_.clear();
     for (const std::uint32_t i : points) {
@@ -129,8 +129,8 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
         // The point's size or the surface has changed. The point stays if the surface is within its reach.
         const double tolerance = obstacle.contact_tolerance(block_.P[i], radius), slope2 = gap.gradient.squaredNorm();
         const bool off = std::abs(gap.f) > tolerance;
-        if (std::abs(gap.f) > std::max({tolerance, radius, 2 * obstacle.feature})) return let_go(i);
-        if (off && slope2 < least_slope * least_slope) return let_go(i);
+        if (std::abs(gap.f) > std::max({tolerance, radius, 2 * obstacle.feature})) return release(i);
+        if (off && slope2 < min_slope * min_slope) return release(i);
         if (!moved) block_.P[i] = state(i, o, now).P;
         if (off) block_.P[i] -= gap.f / slope2 * gap.gradient;
         if (moved || off) glue(i, o, now);
@@ -147,7 +147,7 @@ void StuckPoints::advance_glued(std::uint32_t i, int o, const Gap& gap)
         taken_[i] = Glued;
         list_.push_back(i);
         block_.P[i] = here.P, block_.v[i] = here.v;
-        go(i, o, now, block_.dt[i]);
+        move_with_surface(i, o, now, block_.dt[i]);
         return carried_.push_back({i, P, v, block_.P[i], block_.v[i]});
     }
     columns_->to[index] = -obstacle.key;
@@ -168,7 +168,7 @@ void StuckPoints::advance_sliding(std::uint32_t i, int o, const Gap& gap)
     const double now = block_.frame_time(i, block_.dt[i]), radius = block_.radius(obstacle, i);
     const double reach = std::max(obstacle.contact_tolerance(block_.P[i], radius), 0.25 * obstacle.feature);
     const double slope = gap.gradient.norm(), adhesion = obstacle.adhesion[index];
-    if (std::abs(gap.f) > reach || !(slope > 0)) return let_go(i);
+    if (std::abs(gap.f) > reach || !(slope > 0)) return release(i);
     const Vec3d n = gap.gradient / slope, P = block_.P[i] - gap.f / slope * n;
     const Vec3d vc = obstacle.shape->velocity_at(P, now);
     Support on{o, n, vc, 0, obstacle.friction[index], obstacle.plane.has_value(), obstacle.feature};
@@ -178,7 +178,7 @@ void StuckPoints::advance_sliding(std::uint32_t i, int o, const Gap& gap)
     on.ac = obstacle.acceleration_at(P, v, now);
     // Without a kick, the slide decides if the point leaves, because it accounts for the turning of the surface.
     const bool is_kicked = (given - vc).dot(n) > velocity_tolerance * (1 + given.norm());
-    if (is_kicked && (kick_on(i, vc) + motion_.acceleration(i) - on.ac).dot(n) > adhesion) return let_go(i);
+    if (is_kicked && (kick_on(i, vc) + motion_.acceleration(i) - on.ac).dot(n) > adhesion) return release(i);
     carried_.push_back({i, block_.P[i], block_.v[i], P, v});
     block_.P[i] = P;
     block_.v[i] = v;
@@ -194,7 +194,7 @@ void StuckPoints::hold(std::size_t i, int o, double left)
     const double now = block_.frame_time(i, left);
     if (!columns_) return;
     glue(point, o, now);
-    go(point, o, now, left);
+    move_with_surface(point, o, now, left);
 }
 
 // Glues the point to its current position on the surface.
@@ -211,7 +211,7 @@ void StuckPoints::glue(std::uint32_t i, int o, double now)
 }
 
 // Moves the point with the surface from `now` on for the given duration.
-void StuckPoints::go(std::uint32_t i, int o, double now, double duration)
+void StuckPoints::move_with_surface(std::uint32_t i, int o, double now, double duration)
 {
     const Obstacle& obstacle = obstacle_at(o);
     if (obstacle.body) {
@@ -258,7 +258,7 @@ bool StuckPoints::is_elsewhere(std::uint32_t i, int o, double now) const
     return (state(i, o, now).P - block_.P[i]).norm() > tolerance;
 }
 
-bool StuckPoints::holds_for_good(std::size_t i) const
+bool StuckPoints::is_held_for_good(std::size_t i) const
 {
     if (!has(i)) return false;
     for (std::size_t o = 0; o < block_.obstacles.size(); ++o)

@@ -52,10 +52,10 @@ public:
     };
     const std::vector<Carried>& carried() const { return carried_; }  // in this substep
 
-    // has() returns true if a point is glued, holds_for_good() if in addition nothing can tear it off, and takes() if
+    // has() returns true if a point is glued, is_held_for_good() if in addition nothing can tear it off, and takes() if
     // it is glued or released.
     bool has(std::size_t i) const { return taken_[i] == Glued; }
-    bool holds_for_good(std::size_t i) const;
+    bool is_held_for_good(std::size_t i) const;
     bool takes(std::size_t i) const { return taken_[i] != Free; }
     const std::vector<std::uint32_t>& list() const { return list_; }  // the glued points
     const std::vector<Loose>& loose() const { return loose_; }
@@ -78,14 +78,14 @@ private:
 
     void find_held();
     void find_resting();
-    void ask(std::size_t obstacle, const std::vector<std::uint32_t>& points);
+    void query(std::size_t obstacle, const std::vector<std::uint32_t>& points);
     void advance_glued(std::uint32_t i, int obstacle, const Gap& gap);
     void advance_sliding(std::uint32_t i, int obstacle, const Gap& gap);
     void glue(std::uint32_t i, int obstacle, double now);
-    void go(std::uint32_t i, int obstacle, double now, double duration);
+    void move_with_surface(std::uint32_t i, int obstacle, double now, double duration);
     double time_of_tearing(std::uint32_t i, int obstacle, const Vec3d& kick, double now) const;
     double tension(std::uint32_t i, int obstacle, const Vec3d& pull, double time) const;
-    void let_go(std::uint32_t i) { columns_->to[block_.indices[i]] = 0; }
+    void release(std::uint32_t i) { columns_->to[block_.indices[i]] = 0; }
     MaterialPoint material(std::uint32_t i, int obstacle) const;
     MovingBody::State state(std::uint32_t i, int obstacle, double time) const;
     bool begins_frame(std::uint32_t i) const;

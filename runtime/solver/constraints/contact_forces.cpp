@@ -50,12 +50,12 @@ void ContactForces::store(PointSet& points) const
 
 Vec3d split_impulse(const Vec3d& impulse, std::span<const Vec3d> normals, std::span<double> parts)
 {
-    constexpr int most_sweeps = 32;
+    constexpr int max_sweeps = 32;
     constexpr double found = 1e-9;
     std::fill(parts.begin(), parts.end(), 0.0);
     Vec3d left = impulse;
     double change = impulse.norm();
-    for (int sweep = 0; sweep < most_sweeps && change > found * impulse.norm(); ++sweep) {
+    for (int sweep = 0; sweep < max_sweeps && change > found * impulse.norm(); ++sweep) {
         change = 0;
         for (std::size_t k = 0; k < normals.size(); ++k) {
             const double by = std::max(-parts[k], left.dot(normals[k]));

@@ -87,10 +87,10 @@ namespace {
 
 // Spheres whose neighbours are searched in one task: a fraction of a millisecond of work, so a few thousand already
 // use several threads.
-constexpr std::size_t spheres_a_task = 2048;
+constexpr std::size_t spheres_per_task = 2048;
 
 // Pairs are numbered with 32 bits.
-constexpr double most_numbers = std::numeric_limits<std::uint32_t>::max();
+constexpr double max_numbers = std::numeric_limits<std::uint32_t>::max();
 
 // Decides pairs that single precision cannot decide.
 bool spheres_touch(const SpheresView& spheres, std::uint32_t a, std::uint32_t b)
@@ -121,14 +121,14 @@ void ContactSearch::find(std::span<const Vec3d> P, Strided<float> reach, const R
 
 void ContactSearch::require_room(const PairUse& use) const
 {
-    const auto fit = [&](double pairs) { return pairs <= most_numbers && fits_in_memory(pairs * use.bytes_a_pair); };
+    const auto fit = [&](double pairs) { return pairs <= max_numbers && fits_in_memory(pairs * use.bytes_per_pair); };
     const double points = static_cast<double>(spheres_.P.size());
-    if (fit(0.5 * points * points) || fit(most_pairs(grids_))) return;
+    if (fit(0.5 * points * points) || fit(max_pairs(grids_))) return;
     const double found = estimate_pairs(grids_, spheres_);
     if (fit(found)) return;
     const std::string what = fmt::format("{}: about {:.2g} pairs of {} points", use.what, found, spheres_.P.size());
-    if (found > most_numbers) throw Error(fmt::format("{}; there can be {:.2g}; {}", what, most_numbers, use.remedy));
-    throw beyond_memory(what, found * use.bytes_a_pair, use.remedy);
+    if (found > max_numbers) throw Error(fmt::format("{}; there can be {:.2g}; {}", what, max_numbers, use.remedy));
+    throw memory_exceeded(what, found * use.bytes_per_pair, use.remedy);
 }
 
 void ContactSearch::measure(std::span<const Vec3d> P, Strided<float> reach)
@@ -173,7 +173,7 @@ std::vector<ContactSearch::Found>& ContactSearch::room_for(std::size_t spheres)
 {
     if (used_ == found_.size()) found_.emplace_back();
     std::vector<Found>& found = found_[used_++];
-    found.resize((spheres + spheres_a_task - 1) / spheres_a_task);
+    found.resize((spheres + spheres_per_task - 1) / spheres_per_task);
     return found;
 }
 
@@ -182,22 +182,22 @@ void ContactSearch::find_within(const CellGrid& grid)
 {
     std::vector<Found>& found = room_for(grid.size());
     const auto look = [&](std::size_t first, std::size_t last) {
-        Found& pairs = found[first / spheres_a_task];
+        Found& pairs = found[first / spheres_per_task];
         pairs.clear();
         NearSpheres spheres;
         grid.for_each_stretch(first, last, [&](std::size_t m, std::size_t end, std::size_t from, std::size_t to) {
-            spheres.gather(grid, grid.behind(grid.key(from), grid.key(to)));
+            spheres.gather(grid, grid.after(grid.key(from), grid.key(to)));
             for (; m < end; ++m) {
-                const std::uint32_t a = grid.place[m], skipped = static_cast<std::uint32_t>(m + 1) - grid.begin(from);
+                const std::uint32_t a = grid.index[m], skipped = static_cast<std::uint32_t>(m + 1) - grid.begin(from);
                 spheres.for_each(grid, m, blur_, skipped, [&](std::uint32_t o, bool certain) {
-                    const std::uint32_t b = grid.place[o];
+                    const std::uint32_t b = grid.index[o];
                     if (!certain && !spheres_touch(spheres_, a, b)) return;
                     pairs.emplace_back(std::min(a, b), std::max(a, b));
                 });
             }
         });
     };
-    for_each_chunk(grid.size(), look, spheres_a_task);
+    for_each_chunk(grid.size(), look, spheres_per_task);
 }
 
 // Searches the whole neighbourhood, in the coarser grid, of each sphere of the finer grid. Consecutive spheres often
@@ -206,22 +206,22 @@ void ContactSearch::find_between(const CellGrid& fine, const CellGrid& coarse)
 {
     std::vector<Found>& found = room_for(fine.size());
     const auto look = [&](std::size_t first, std::size_t last) {
-        Found& pairs = found[first / spheres_a_task];
+        Found& pairs = found[first / spheres_per_task];
         pairs.clear();
         CellGrid::Cell cell{}, last_cell{};
         NearSpheres spheres;
         for (std::size_t m = first; m < last; ++m) {
-            const std::uint32_t a = fine.place[m];
+            const std::uint32_t a = fine.index[m];
             cell = coarse.cell_at(spheres_.in_grid(spheres_.P[a]));
             if (m == first || cell != last_cell) spheres.gather(coarse, coarse.around(cell));
             last_cell = cell;
             spheres.for_each(fine, m, blur_, 0, [&](std::uint32_t o, bool certain) {
-                const std::uint32_t b = coarse.place[o];
+                const std::uint32_t b = coarse.index[o];
                 if (certain || spheres_touch(spheres_, a, b)) pairs.emplace_back(std::min(a, b), std::max(a, b));
             });
         }
     };
-    for_each_chunk(fine.size(), look, spheres_a_task);
+    for_each_chunk(fine.size(), look, spheres_per_task);
 }
 
 // Sorts into buckets of points first, then sorts each bucket by point.
@@ -232,9 +232,9 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
         for (const Found& found : part) sources.push_back(&found);
     std::size_t all = 0;
     for (const Found* found : sources) all += found->size();
-    if (static_cast<double>(all) > most_numbers)
+    if (static_cast<double>(all) > max_numbers)
         throw Error(
-            fmt::format("{} pairs of points touch; there can be {:.2g}; give a smaller radius", all, most_numbers));
+            fmt::format("{} pairs of points touch; there can be {:.2g}; give a smaller radius", all, max_numbers));
     const std::size_t each_size = bucket_size(points), buckets = points / each_size + 1, chunks = sources.size();
     starts_.assign(buckets * chunks + 1, 0);
     const auto each = [&](const auto& f) {
@@ -264,7 +264,7 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
         std::fill(end + first, end + last, 0);
         for (const auto& pair : here) ++end[pair.first];
         std::exclusive_scan(end + first, end + last, end + first, start);
-        PageArray<std::uint32_t> others(here.size() + most_sorted_by_rank);
+        PageArray<std::uint32_t> others(here.size() + max_sorted_by_rank);
         for (const auto& pair : here) others[end[pair.first]++ - start] = pair.second;
         std::uint32_t begin = start;
         for (std::size_t i = first; i < last; begin = end[i++])

@@ -60,7 +60,7 @@ struct Pairs {
 struct PairUse {
     std::string what = "the search for contacts";  // "radius = 3 m"
     std::string remedy = "give a smaller radius";
-    double bytes_a_pair = 32;  // in total; the default is what the search itself takes
+    double bytes_per_pair = 32;  // in total; the default is what the search itself takes
 };
 
 // Search for pairs with |P_i - P_j| < reach_i + reach_j.

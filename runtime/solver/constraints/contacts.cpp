@@ -7,8 +7,8 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/base/stopwatch.h"
 #include "runtime/points/id_index.h"
 #include "runtime/points/state_checks.h"
@@ -37,7 +37,7 @@ constexpr double over_relaxation = 1.2;
 
 // The largest distance by which carried impulses may separate points of one island of rods, relative to their
 // distance.
-constexpr double most_parted = 0.25;
+constexpr double max_separation = 0.25;
 
 // Separates coincident points along a pseudo-random direction that differs between pairs.
 Vec3d arbitrary_direction(std::uint32_t i, std::uint32_t j)
@@ -262,7 +262,7 @@ void Contacts::find_contacts(const Substep& step)
 {
     packs_.begin(step.size());
     blocks_.for_each_coloured(backwards_, [&](std::size_t b) {
-        thread_local OfThread<std::vector<std::uint32_t>> kept;
+        thread_local PerThread<std::vector<std::uint32_t>> kept;
         std::vector<std::uint32_t>& near = *kept;
         const auto found = static_cast<std::ptrdiff_t>(find_near(b, step, near));  // first: it resizes `near`
         const auto last = near.begin() + found;
@@ -368,7 +368,7 @@ void Contacts::limit_carried(ContactPack& pack, const Substep& step) const
         const std::uint32_t i = pack.i[l], j = pack.j[l];
         if (!(pack.normal_impulse[l] > 0) || rods_[i] != rods_[j]) continue;
         const double distance = (step.points[i].P - step.points[j].P).norm();
-        const double most = most_parted * distance * per_dt_ * pack.effective_mass[l];
+        const double most = max_separation * distance * per_dt_ * pack.effective_mass[l];
         if (!(pack.normal_impulse[l] > most)) continue;
         const auto part = static_cast<float>(most / pack.normal_impulse[l]);
         pack.normal_impulse[l] *= part;

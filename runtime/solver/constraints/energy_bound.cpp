@@ -75,18 +75,18 @@ void EnergyIslands::close()
     for (Driver& driver : drivers_) {
         if (driver.point < kinematic_.size() && kinematic_[driver.point]) driver.by = *kinematic_[driver.point];
         Driven& island = driven_[root(driver.i)];
-        island.mean.v += driver.by.v, island.mean.way += driver.by.way;
-        island.moves |= !driver.by.v.isZero(0) || !driver.by.way.isZero(0) || driver.rolling > 0;
+        island.mean.v += driver.by.v, island.mean.displacement += driver.by.displacement;
+        island.moves |= !driver.by.v.isZero(0) || !driver.by.displacement.isZero(0) || driver.rolling > 0;
         any_moves_ |= island.moves;
         ++island.drivers;
     }
     for (Driven& island : driven_)
-        if (island.drivers > 1) island.mean.v /= island.drivers, island.mean.way /= island.drivers;
+        if (island.drivers > 1) island.mean.v /= island.drivers, island.mean.displacement /= island.drivers;
     for (const Driver& driver : drivers_) {
         Driven& island = driven_[root(driver.i)];
         if (!island.moves) continue;
         island.spread = std::max({island.spread, (driver.by.v - island.mean.v).norm() + driver.rolling,
-                                  (driver.by.way - island.mean.way).norm() / step_.dt});
+                                  (driver.by.displacement - island.mean.displacement).norm() / step_.dt});
     }
 }
 

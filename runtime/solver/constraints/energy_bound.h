@@ -49,11 +49,11 @@ inline double potential_energy(const Substep& step, std::size_t i, const Vec3d& 
 
 // Motion of a driver: its velocity at the end of the substep, m/s, and its path in it, m, without jumps.
 struct Drive {
-    Vec3d v = Vec3d::Zero(), way = Vec3d::Zero();
+    Vec3d v = Vec3d::Zero(), displacement = Vec3d::Zero();
 
     static Drive of(const Vec3d& v_before, const Vec3d& v, double dt) { return {v, 0.5 * dt * (v_before + v)}; }
 
-    Vec3d acceleration(double dt) const { return 2 / (dt * dt) * (dt * v - way); }
+    Vec3d acceleration(double dt) const { return 2 / (dt * dt) * (dt * v - displacement); }
 };
 
 // Islands of points linked by rows in a substep, with the moving or resting drivers that they are linked to.

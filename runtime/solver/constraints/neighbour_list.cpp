@@ -14,13 +14,13 @@ namespace {
 
 // A point's slack is the distance that it moves in slack_substeps substeps, within these bounds relative to its radius.
 // More slack means more pairs to check, but fewer searches.
-constexpr double least_slack = 0.25, most_slack = 0.5, slack_substeps = 3;
+constexpr double min_slack = 0.25, max_slack = 0.5, slack_substeps = 3;
 
 // The largest fraction of strays: their pairs take longer to find, one by one, and are solved on one thread.
-constexpr double most_strays = 0.02;
+constexpr double max_strays = 0.02;
 
 // Memory per pair: the search, the blocks, two sets of impulses, and full packs.
-constexpr double bytes_a_pair = 160;
+constexpr double bytes_per_pair = 160;
 
 }  // namespace
 
@@ -34,7 +34,7 @@ void NeighbourList::build(const Substep& step, std::span<const float> radius, co
     strays_.clear();
     const double largest = grids.grids.empty() ? 0 : grids.grids.front().radius;
     search_.find(at_, {reach_.data(), 1}, grids, pairs_,
-                 {fmt::format("radius = {:g} m", largest), "give a smaller radius", bytes_a_pair});
+                 {fmt::format("radius = {:g} m", largest), "give a smaller radius", bytes_per_pair});
 }
 
 bool NeighbourList::is_of(std::size_t points) const
@@ -53,7 +53,7 @@ void NeighbourList::store_positions(const Substep& step, std::span<const float> 
         if (r > 0) least = std::min(least, r);
     }
     const std::size_t n = step.size();
-    const double widest = 2.001 * (1 + most_slack) * largest;
+    const double widest = 2.001 * (1 + max_slack) * largest;
     // A block of some hundred pairs if all radii are equal.
     edge_ = std::max(widest + largest, 8.0 * least);
     far_ = edge_ - widest;
@@ -122,11 +122,11 @@ void NeighbourList::move_frames(const F& displacement)
                 frames_[b].shift /= static_cast<double>(points_of(b).size());
             }
         },
-        blocks_a_task);
+        blocks_per_task);
     for (const auto& [a, b] : neighbouring_) {
         const double apart = 0.5 * (frames_[a].shift - frames_[b].shift).norm();
-        frames_[a].parting = std::max(frames_[a].parting, apart);
-        frames_[b].parting = std::max(frames_[b].parting, apart);
+        frames_[a].separation = std::max(frames_[a].separation, apart);
+        frames_[b].separation = std::max(frames_[b].separation, apart);
     }
 }
 
@@ -136,7 +136,7 @@ void NeighbourList::choose_slack(const Substep& step, std::span<const float> rad
     // Returns the distance, m, by which a point leaves its frame, or its neighbours' frames leave it, in a substep.
     const auto leaves = [&](std::size_t i) {
         const Frame& frame = frames_[block_of_[i]];
-        return (step.dt * step.v[i] - frame.shift).norm() + frame.parting;
+        return (step.dt * step.v[i] - frame.shift).norm() + frame.separation;
     };
     reach_.assign(n, 0);
     slack_.resize(n);
@@ -144,8 +144,8 @@ void NeighbourList::choose_slack(const Substep& step, std::span<const float> rad
         for (std::size_t i = begin; i < end; ++i) {
             if (!(radius[i] > 0)) continue;
             slack_[i] =
-                std::clamp(static_cast<float>(slack_substeps * leaves(i)), static_cast<float>(least_slack) * radius[i],
-                           static_cast<float>(most_slack) * radius[i]);
+                std::clamp(static_cast<float>(slack_substeps * leaves(i)), static_cast<float>(min_slack) * radius[i],
+                           static_cast<float>(max_slack) * radius[i]);
             reach_[i] = radius[i] + slack_[i];
             slack_[i] = reach_[i] - radius[i];
         }
@@ -155,12 +155,12 @@ void NeighbourList::choose_slack(const Substep& step, std::span<const float> rad
 bool NeighbourList::expired(const Substep& step)
 {
     move_frames([&](std::uint32_t i) -> Vec3d { return step.points[i].P - at_[i]; });
-    if (!blocks_stay_apart()) return true;
+    if (!blocks_are_separate()) return true;
     find_strays(step);
-    return static_cast<double>(strays_.size()) > most_strays * static_cast<double>(step.size());
+    return static_cast<double>(strays_.size()) > max_strays * static_cast<double>(step.size());
 }
 
-bool NeighbourList::blocks_stay_apart() const
+bool NeighbourList::blocks_are_separate() const
 {
     Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (const Frame& frame : frames_) {
@@ -178,12 +178,12 @@ void NeighbourList::find_strays(const Substep& step)
         [&](std::size_t first, std::size_t last) {
             for (std::size_t b = first; b < last; ++b)
                 for (const std::uint32_t i : points_of(b)) {
-                    const double left = slack_[i] - frames_[b].parting;
+                    const double left = slack_[i] - frames_[b].separation;
                     const Vec3d x = step.points[i].P - at_[i] - frames_[b].shift;
                     is_stray_[i] = !(left >= 0 && x.squaredNorm() <= left * left);
                 }
         },
-        blocks_a_task);
+        blocks_per_task);
     strays_.clear();
     for (std::uint32_t i = 0; i < is_stray_.size(); ++i)
         if (is_stray_[i]) strays_.push_back(i);

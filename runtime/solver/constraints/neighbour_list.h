@@ -50,7 +50,7 @@ public:
     }
 
     // Blocks processed by a thread in one task.
-    static constexpr std::size_t blocks_a_task = 16;
+    static constexpr std::size_t blocks_per_task = 16;
 
     template <class Archive>
     void serialize(Archive& keep)
@@ -67,7 +67,7 @@ private:
     template <class F>
     void move_frames(const F& displacement);
     void choose_slack(const Substep& step, std::span<const float> radius);
-    bool blocks_stay_apart() const;
+    bool blocks_are_separate() const;
     void find_strays(const Substep& step);
 
     Pairs pairs_;
@@ -85,12 +85,12 @@ private:
     std::vector<std::array<std::uint32_t, 2>> neighbouring_;  // pairs of blocks
     struct Frame {
         Vec3d shift = Vec3d::Zero();  // m, the mean displacement of its points
-        double parting = 0;           // m, half of the largest difference from a neighbour's shift
+        double separation = 0;        // m, half of the largest difference from a neighbour's shift
 
         template <class Archive>
         void serialize(Archive& keep)
         {
-            keep(shift, parting);
+            keep(shift, separation);
         }
     };
     std::vector<Frame> frames_;  // by block

@@ -3,17 +3,17 @@
 #include <array>
 #include <numeric>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/points/state_checks.h"
 
 namespace rapid {
 namespace {
 
 // Blocks that are 32 apart along an axis count as the same block, so each colour has 16 along each axis.
-constexpr std::size_t blocks_a_colour = 16 * 16 * 16, blocks = 8 * blocks_a_colour;
+constexpr std::size_t blocks_per_colour = 16 * 16 * 16, blocks = 8 * blocks_per_colour;
 
-constexpr std::size_t points_a_task = 2048;  // with their pairs: tens of microseconds
+constexpr std::size_t points_per_task = 2048;  // with their pairs: tens of microseconds
 
 }  // namespace
 
@@ -76,7 +76,7 @@ void PairBlocks::find_owners(const NeighbourList& list)
                 owner_[k] = static_cast<std::uint16_t>(colour << 12 | place);
             }
     };
-    for_each_chunk(pairs.begin.size() - 1, find, points_a_task);
+    for_each_chunk(pairs.begin.size() - 1, find, points_per_task);
 }
 
 void PairBlocks::begin_blocks()
@@ -88,7 +88,7 @@ void PairBlocks::begin_blocks()
     colours_.clear();
     some_unlisted_ = false;
     for (std::size_t b = 0; b < blocks; ++b) {
-        if (b % blocks_a_colour == 0) colours_.push_back(static_cast<std::uint32_t>(begin_.size()));
+        if (b % blocks_per_colour == 0) colours_.push_back(static_cast<std::uint32_t>(begin_.size()));
         if (next_[b] < next_[b + 1]) begin_.push_back(next_[b]);
     }
     colours_.push_back(static_cast<std::uint32_t>(begin_.size()));
@@ -99,25 +99,25 @@ void PairBlocks::begin_blocks()
 // share a point, so the processor can overlap them.
 void PairBlocks::take_turns(std::size_t block, const Pairs& pairs, std::span<ContactPair> ordered)
 {
-    thread_local OfThread<std::vector<std::array<std::uint32_t, 2>>> kept;
-    std::vector<std::array<std::uint32_t, 2>>& going = *kept;  // the remaining pairs of each point
+    thread_local PerThread<std::vector<std::array<std::uint32_t, 2>>> kept;
+    std::vector<std::array<std::uint32_t, 2>>& remaining = *kept;  // the remaining pairs of each point
     const std::uint32_t first = begin_[block], last = begin_[block + 1];
-    going.clear();
+    remaining.clear();
     for (std::uint32_t t = first; t < last; ++t) {
-        if (t == first || by_block_[t].point != by_block_[t - 1].point) going.push_back({t, t});
-        going.back()[1] = t + 1;
+        if (t == first || by_block_[t].point != by_block_[t - 1].point) remaining.push_back({t, t});
+        remaining.back()[1] = t + 1;
     }
     std::uint32_t slot = first;
-    while (!going.empty()) {
+    while (!remaining.empty()) {
         std::size_t left = 0;
-        for (auto [t, end] : going) {
+        for (auto [t, end] : remaining) {
             const auto [i, k] = by_block_[t];
             slot_[k] = slot;
             ordered[slot++] = {i, pairs.other[k]};
-            going[left] = {t + 1, end};
+            remaining[left] = {t + 1, end};
             left += t + 1 < end;
         }
-        going.resize(left);
+        remaining.resize(left);
     }
 }
 

@@ -47,17 +47,17 @@ double estimate_within(const CellGrid& grid, const SpheresView& spheres)
     double mean = 0, before = 0;  // before: Σ n_c² of the preceding stretches
     std::size_t stretch = 0;
     for (std::size_t s = 0; s < samples; ++s) {
-        const double wanted = (static_cast<double>(s) + 0.5) / samples * all;
-        while (before + sums[stretch] < wanted) before += sums[stretch++];
+        const double target = (static_cast<double>(s) + 0.5) / samples * all;
+        while (before + sums[stretch] < target) before += sums[stretch++];
         std::size_t cell = stretch * chunk_size;
         for (double reached = before;; ++cell) {
             const double n = grid.end(cell) - grid.begin(cell);
             reached += n * n;
-            if (reached >= wanted) break;
+            if (reached >= target) break;
         }
         const std::size_t n = grid.end(cell) - grid.begin(cell);
         const std::size_t sphere = grid.begin(cell) + s * n / samples;
-        mean += (neighbours(grid, spheres, grid.place[sphere]) - 1) / static_cast<double>(n) / samples;
+        mean += (neighbours(grid, spheres, grid.index[sphere]) - 1) / static_cast<double>(n) / samples;
     }
     return 0.5 * all * mean;
 }
@@ -66,13 +66,13 @@ double estimate_between(const CellGrid& fine, const CellGrid& coarse, const Sphe
 {
     double mean = 0;
     for (std::size_t s = 0; s < samples; ++s)
-        mean += neighbours(coarse, spheres, fine.place[s * fine.size() / samples]) / samples;
+        mean += neighbours(coarse, spheres, fine.index[s * fine.size() / samples]) / samples;
     return static_cast<double>(fine.size()) * mean;
 }
 
 }  // namespace
 
-double most_pairs(std::span<const CellGrid> grids)
+double max_pairs(std::span<const CellGrid> grids)
 {
     double pairs = 0, coarser = 0;
     for (const CellGrid& grid : grids) {

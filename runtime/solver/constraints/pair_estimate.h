@@ -13,7 +13,7 @@
 namespace rapid {
 
 // grids: from coarse to fine, none empty. Results do not depend on the number of threads.
-double most_pairs(std::span<const CellGrid> grids);
+double max_pairs(std::span<const CellGrid> grids);
 double estimate_pairs(std::span<const CellGrid> grids, const SpheresView& spheres);
 
 }  // namespace rapid

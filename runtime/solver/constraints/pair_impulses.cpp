@@ -30,7 +30,7 @@ void PairImpulses::scale(float factor)
     for (Vec3f& impulse : rolling) impulse *= factor;
 }
 
-void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& bereft)
+void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& orphans)
 {
     struct Kept {
         ContactPair pair;
@@ -41,8 +41,8 @@ void PairImpulses::renumber(std::span<const std::uint32_t> index, std::vector<st
     for (std::size_t k = 0; k < pairs.size(); ++k) {
         if (!(normal[k] > 0)) continue;
         const std::uint32_t i = index[pairs[k][0]], j = index[pairs[k][1]];
-        if (i == IdIndex::none && j != IdIndex::none) bereft.push_back(j);
-        if (j == IdIndex::none && i != IdIndex::none) bereft.push_back(i);
+        if (i == IdIndex::none && j != IdIndex::none) orphans.push_back(j);
+        if (j == IdIndex::none && i != IdIndex::none) orphans.push_back(i);
         if (i == IdIndex::none || j == IdIndex::none) continue;
         const float sign = i > j ? -1.0f : 1.0f;
         const Vec3f rested = resting.empty() ? Vec3f(Vec3f::Zero()) : resting[k];
@@ -93,16 +93,16 @@ void PairImpulses::take_over(const PairImpulses& before, const Pairs& list, std:
 bool PairImpulses::set_unlisted(std::size_t listed, std::span<const ContactPair> found)
 {
     const std::vector<ContactPair> before(pairs.begin() + static_cast<std::ptrdiff_t>(listed), pairs.end());
-    std::vector<ContactPair> pressing, wanted;
+    std::vector<ContactPair> pressing, merged;
     for (std::size_t k = 0; k < before.size(); ++k)
         if (normal[listed + k] > 0) pressing.push_back(before[k]);
-    std::set_union(found.begin(), found.end(), pressing.begin(), pressing.end(), std::back_inserter(wanted));
-    if (wanted == before) return false;
+    std::set_union(found.begin(), found.end(), pressing.begin(), pressing.end(), std::back_inserter(merged));
+    if (merged == before) return false;
     const auto follow = [&](auto& values, const auto& none) {
         const std::vector old(values.begin() + static_cast<std::ptrdiff_t>(listed), values.end());
         values.resize(listed);
         auto known = before.begin();
-        for (const ContactPair& pair : wanted) {
+        for (const ContactPair& pair : merged) {
             known = std::lower_bound(known, before.end(), pair);
             values.push_back(
                 known != before.end() && *known == pair ? old[static_cast<std::size_t>(known - before.begin())] : none);
@@ -113,7 +113,7 @@ bool PairImpulses::set_unlisted(std::size_t listed, std::span<const ContactPair>
     if (!resting.empty()) follow(resting, Vec3f(Vec3f::Zero()));
     if (!rolling.empty()) follow(rolling, Vec3f(Vec3f::Zero()));
     pairs.resize(listed);
-    pairs.insert(pairs.end(), wanted.begin(), wanted.end());
+    pairs.insert(pairs.end(), merged.begin(), merged.end());
     return true;
 }
 

@@ -39,8 +39,8 @@ struct PairImpulses {
     void scale(float factor);
 
     // Updates point indices to index[old]; IdIndex::none marks removed points. Pairs that lost a point are dropped;
-    // their other point is added to `bereft` if it was pressed. The remaining pairs ascend.
-    void renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& bereft);
+    // their other point is added to `orphans` if it was pressed. The remaining pairs ascend.
+    void renumber(std::span<const std::uint32_t> index, std::vector<std::uint32_t>& orphans);
 
     // Copies the impulses of pairs from before a search that are still listed; pairs[slot[k]] is the k-th of the list.
     // Pairs missing from the list were moved apart by a node: sleepers among them wake.

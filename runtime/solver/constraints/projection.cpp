@@ -11,7 +11,7 @@ namespace rapid {
 namespace {
 
 // An impact in a cradle takes one sweep, in a gas two or three.
-constexpr std::uint32_t most_impact_sweeps = 32;
+constexpr std::uint32_t max_impact_sweeps = 32;
 
 // Returns true if some point moves that no row moves.
 bool has_kinematic(const Substep& step)
@@ -236,7 +236,7 @@ void Projection::store_in_frame(const Substep& step)
     std::vector<Vec3d> at(begun_);
     for (std::uint32_t i = 0; i < at.size(); ++i)
         if (step.points[i].w > 0)
-            at[i] += islands.driven(islands.root(i)).mean.way;
+            at[i] += islands.driven(islands.root(i)).mean.displacement;
         else
             at[i] = step.points[i].P;
     add_stored(step, at, 1, bound_.stored_in_frame());
@@ -270,9 +270,9 @@ ContactEnergy Projection::close_bound(Substep& step, bool of_rods)
     ContactEnergy change = bound_.close(
         step, stored, [&](EnergyIslands& islands) { link(islands, step, of_rods); }, of_rods ? &fallback_ : nullptr);
     if (bound_.stalled().empty()) return change;
-    const double before = energy_of_places(step);
+    const double before = energy_of_positions(step);
     each([&](Coupling& coupling) { coupling.yield(step, bound_.stalled()); });
-    change.take(energy_of_places(step) - before);
+    change.take(energy_of_positions(step) - before);
     return change;
 }
 
@@ -284,7 +284,7 @@ void Projection::link(EnergyIslands& islands, const Substep& step, bool of_rods)
 }
 
 // Returns the energy stored in rows plus the potential energy of points that have yielded, J.
-double Projection::energy_of_places(const Substep& step) const
+double Projection::energy_of_positions(const Substep& step) const
 {
     double sum = elastic_energy(step);
     for (std::size_t i = 0; i < step.size(); ++i)
@@ -313,7 +313,7 @@ void Projection::solve_impacts(Substep& step)
     });
     bool hit = true;
     std::size_t woken = sleep_ ? sleep_->woken_now() : 0;
-    for (std::uint32_t sweep = 1; hit && sweep <= most_impact_sweeps; ++sweep) {
+    for (std::uint32_t sweep = 1; hit && sweep <= max_impact_sweeps; ++sweep) {
         hit = false;
         each([&](Coupling& coupling) { hit |= coupling.solve_impacts(step, sweep); });
         if (!shapes_) continue;

@@ -58,7 +58,7 @@ private:
     void store_in_frame(const Substep& step);
     ContactEnergy close_bound(Substep& step, bool of_rods);
     void link(EnergyIslands& islands, const Substep& step, bool of_rods) const;
-    double energy_of_places(const Substep& step) const;
+    double energy_of_positions(const Substep& step) const;
     void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
     void follow_rods(const Substep& step);

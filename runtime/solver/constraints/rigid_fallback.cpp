@@ -36,7 +36,7 @@ void RigidFallback::begin(const Substep& step)
 
 void RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const
 {
-    const std::optional<Drive> rest = resting_place(step, points);
+    const std::optional<Drive> rest = resting_position(step, points);
     if (driver || rest)
         carry(step, points, driver ? *driver : *rest);
     else
@@ -45,7 +45,7 @@ void RigidFallback::apply(Substep& step, std::span<const std::uint32_t> points, 
 
 // Returns the mean motion of the surfaces that points are attached to, at rest if springs attach to positions only;
 // nothing if there are no springs.
-std::optional<Drive> RigidFallback::resting_place(const Substep& step, std::span<const std::uint32_t> points) const
+std::optional<Drive> RigidFallback::resting_position(const Substep& step, std::span<const std::uint32_t> points) const
 {
     if (step.mobility.empty()) return {};
     Drive mean;
@@ -59,16 +59,16 @@ std::optional<Drive> RigidFallback::resting_place(const Substep& step, std::span
         const Vec3d v_before = velocity_of_surface(spring, start_[i], step.dt);
         const Vec3d v = velocity_of_surface(spring, start_[i] + step.dt * v_before, 0);
         const Drive surface = Drive::of(v_before, v, step.dt);
-        mean.v += of_surface * surface.v, mean.way += of_surface * surface.way;
+        mean.v += of_surface * surface.v, mean.displacement += of_surface * surface.displacement;
     }
     if (!(stiffness > 0)) return {};
-    mean.v /= stiffness, mean.way /= stiffness;
+    mean.v /= stiffness, mean.displacement /= stiffness;
     return mean;
 }
 
 void RigidFallback::carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const
 {
-    for (const std::uint32_t i : points) place(step, i, start_[i] + driver.way, driver.v);
+    for (const std::uint32_t i : points) place(step, i, start_[i] + driver.displacement, driver.v);
 }
 
 void RigidFallback::move(Substep& step, std::span<const std::uint32_t> points) const

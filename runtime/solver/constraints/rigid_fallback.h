@@ -31,7 +31,7 @@ public:
     void apply(Substep& step, std::span<const std::uint32_t> points, const Drive* driver) const;
 
 private:
-    std::optional<Drive> resting_place(const Substep& step, std::span<const std::uint32_t> points) const;
+    std::optional<Drive> resting_position(const Substep& step, std::span<const std::uint32_t> points) const;
     void carry(Substep& step, std::span<const std::uint32_t> points, const Drive& driver) const;
     void move(Substep& step, std::span<const std::uint32_t> points) const;
     void place(Substep& step, std::uint32_t i, const Vec3d& P, const Vec3d& v) const;

@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/base/of_thread.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/points/members.h"
 #include "runtime/points/point_set.h"
 #include "runtime/points/state_archive.h"
@@ -107,11 +107,11 @@ public:
 private:
     static bool has_moved(Row& row, const PointSet& points)
     {
-        const Strided<Vec3f> places = points.P().read(), v = points.v().read();
+        const Strided<Vec3f> positions = points.P().read(), v = points.v().read();
         typename Row::Vectors P, gradient;
         for (int k = 0; k < Row::arity; ++k) {
             if (!v[row.points[k]].isZero(0)) return row.resting_residual_exact = false;
-            P[k] = places[row.points[k]].template cast<double>();
+            P[k] = positions[row.points[k]].template cast<double>();
         }
         const double C = row.function.residual(P, gradient);
         double rounding = 0;
@@ -275,7 +275,7 @@ public:
     void advance(Substep& step) override
     {
         if (Traits::one_sided) return;
-        leave_out_dead(step);
+        exclude_dead(step);
         schedule(step);
         if constexpr (in_trees)
             schedule_.for_each_tree([&](std::span<Forest::Link> tree, std::size_t first) {
@@ -288,7 +288,7 @@ public:
 
     void warm_start(Substep& step) override
     {
-        leave_out_dead(step);
+        exclude_dead(step);
         // A shock may have woken points in the meantime.
         for (Row& row : rows_) row.asleep = row.asleep && sleep_.is_asleep(row, step);
         schedule(step);
@@ -377,7 +377,7 @@ private:
 
     static TreeMotion<Function>& motion_of_thread()
     {
-        thread_local OfThread<TreeMotion<Function>> kept;
+        thread_local PerThread<TreeMotion<Function>> kept;
         return *kept;
     }
 
@@ -389,7 +389,7 @@ private:
         dt_ = dt;
     }
 
-    void leave_out_dead(const Substep& step)
+    void exclude_dead(const Substep& step)
     {
         if (step.dead.empty()) return;
         for (Row& row : rows_)

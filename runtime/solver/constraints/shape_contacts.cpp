@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/base/of_thread.h"
 #include "runtime/base/parallel.h"
+#include "runtime/base/per_thread.h"
 #include "runtime/points/id_index.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/impact.h"
@@ -35,12 +35,12 @@ std::vector<ShapeGrip> shape_grips(std::span<const std::uint32_t> points, std::s
 {
     std::vector<ShapeGrip> result(points.size());
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
-        std::vector<std::uint32_t> asked;
+        std::vector<std::uint32_t> queried;
         std::vector<Vec3d> at, gradient;
         std::vector<double> phi, times, reach;
         for (std::size_t o = 0; o < obstacles.size(); ++o) {
             const Obstacle& obstacle = obstacles[o];
-            asked.clear();
+            queried.clear();
             at.clear();
             reach.clear();
             for (std::size_t k = begin; k < end; ++k) {
@@ -48,20 +48,20 @@ std::vector<ShapeGrip> shape_grips(std::span<const std::uint32_t> points, std::s
                 const double radius = obstacle.radius[i];
                 const double near = radius + std::max(touch * radius, obstacle.contact_tolerance(P[i], radius));
                 if (!obstacle.members[i] || obstacle.bounds.squaredExteriorDistance(P[i]) > near * near) continue;
-                asked.push_back(static_cast<std::uint32_t>(k));
+                queried.push_back(static_cast<std::uint32_t>(k));
                 at.push_back(P[i]);
                 reach.push_back(near);
             }
-            if (asked.empty()) continue;
+            if (queried.empty()) continue;
             phi.resize(at.size());
             gradient.resize(at.size());
             times.assign(at.size(), time);
             obstacle.shape->distance_at(at, times, phi, gradient);
-            for (std::size_t k = 0; k < asked.size(); ++k) {
+            for (std::size_t k = 0; k < queried.size(); ++k) {
                 if (phi[k] > reach[k]) continue;
-                const std::uint32_t i = points[asked[k]];
+                const std::uint32_t i = points[queried[k]];
                 const bool sunk = phi[k] < 2 * obstacle.radius[i] - reach[k];
-                ShapeGrip& grip = result[asked[k]];
+                ShapeGrip& grip = result[queried[k]];
                 grip.normal += gradient[k].normalized().cast<float>();
                 for (const std::uint64_t value :
                      {std::uint64_t(o + 1), std::uint64_t(std::bit_cast<std::uint32_t>(obstacle.friction[i])),
@@ -98,7 +98,7 @@ ShapeClearance::ShapeClearance(std::span<const Obstacle> obstacles, std::size_t 
 
 void ShapeClearance::begin(std::span<const Vec3d> free)
 {
-    if (asked_at_.empty()) asked_at_.assign(free.begin(), free.end());
+    if (query_positions_.empty()) query_positions_.assign(free.begin(), free.end());
 }
 
 // Branchless, because most points are known to be far from all shapes, or close to one for a long time.
@@ -110,33 +110,35 @@ void ShapeClearance::open(ShapeQuery& query, const Substep& step, std::size_t en
     std::size_t count = 0;
     for (std::size_t i = query.begin; i < end; ++i) {
         // An upper bound of (|moved| + |moved since the last query|)².
-        const double moved2 = 2 * ((free[i] - step.start[i]).squaredNorm() + (free[i] - asked_at_[i]).squaredNorm());
+        const double moved2 =
+            2 * ((free[i] - step.start[i]).squaredNorm() + (free[i] - query_positions_[i]).squaredNorm());
         open[count] = static_cast<std::uint32_t>(i);
         count += any_moves_ | !(room_[i] > 0 && double(room_[i]) * double(room_[i]) > moved2);
     }
     open.resize(count);
     query.moved.resize(end - query.begin);
-    query.since_asked.resize(end - query.begin);
+    query.since_query.resize(end - query.begin);
     for (const std::uint32_t i : open) {
         query.moved[i - query.begin] = (free[i] - step.start[i]).norm();
-        query.since_asked[i - query.begin] = (free[i] - asked_at_[i]).norm();
+        query.since_query[i - query.begin] = (free[i] - query_positions_[i]).norm();
         room_[i] = std::numeric_limits<float>::infinity();
     }
 }
 
-void ShapeClearance::ask(ShapeQuery& query, std::size_t obstacle, const Substep& step)
+void ShapeClearance::query(ShapeQuery& query, std::size_t obstacle, const Substep& step)
 {
     list(query, obstacle, step);
     query.phi.resize(query.P.size());
     query.gradient.resize(query.P.size());
     query.time.assign(query.P.size(), query.since);
-    if (query.asked.empty()) return;
+    if (query.queried.empty()) return;
     obstacles_[obstacle].shape->distance_at(query.P, query.time, query.phi, query.gradient);
-    // Subtracts the point's displacement from asked_at_, because the distance was measured at its current position.
-    for (std::size_t k = 0; k < query.asked.size(); ++k) {
-        const std::uint32_t i = query.asked[k];
+    // Subtracts the point's displacement from query_positions_, because the distance was measured at its current
+    // position.
+    for (std::size_t k = 0; k < query.queried.size(); ++k) {
+        const std::uint32_t i = query.queried[k];
         const double gap = query.phi[k] - obstacles_[obstacle].radius[i];
-        clearance_[obstacle * size_ + i] = static_cast<float>(gap - query.since_asked[i - query.begin]);
+        clearance_[obstacle * size_ + i] = static_cast<float>(gap - query.since_query[i - query.begin]);
     }
 }
 
@@ -145,22 +147,22 @@ void ShapeClearance::list(ShapeQuery& query, std::size_t o, const Substep& step)
 {
     const Obstacle& obstacle = obstacles_[o];
     float* clearance = clearance_.data() + o * size_;
-    std::vector<std::uint32_t>& asked = query.asked;
-    asked.resize(query.open.size() + 1);
+    std::vector<std::uint32_t>& queried = query.queried;
+    queried.resize(query.open.size() + 1);
     std::size_t near = 0;
     for (const std::uint32_t i : query.open) {
-        asked[near] = i;
-        near += obstacle.moves | (clearance[i] < query.since_asked[i - query.begin] + query.reach(obstacle, i));
+        queried[near] = i;
+        near += obstacle.moves | (clearance[i] < query.since_query[i - query.begin] + query.reach(obstacle, i));
     }
-    asked.resize(near);
+    queried.resize(near);
     query.P.clear();
-    std::erase_if(asked, [&](std::uint32_t i) {
+    std::erase_if(queried, [&](std::uint32_t i) {
         if (!(step.points[i].w > 0) || !obstacle.members[i] || !step.lives(i)) return true;
         const Vec3d& P = query.free[i];
         const double off =
             (P - obstacle.bounds.max()).cwiseMax(obstacle.bounds.min() - P).maxCoeff() - obstacle.radius[i];
         if (off > query.reach(obstacle, i)) {
-            clearance[i] = static_cast<float>(off - query.since_asked[i - query.begin]);
+            clearance[i] = static_cast<float>(off - query.since_query[i - query.begin]);
             return true;
         }
         query.P.push_back(P);
@@ -183,7 +185,7 @@ namespace {
 constexpr double flush = 0.01;
 
 // Points processed together.
-constexpr std::size_t points_a_chunk = 2048;
+constexpr std::size_t points_per_chunk = 2048;
 
 bool turns(const Substep& step, std::uint32_t i) { return !step.spins.empty() && step.spins[i].k > 0; }
 
@@ -211,7 +213,7 @@ ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t si
       size_(size),
       sleep_(sleep),
       clearance_(obstacles, size),
-      contacts_((size + points_a_chunk - 1) / points_a_chunk),
+      contacts_((size + points_per_chunk - 1) / points_per_chunk),
       before_(contacts_.size())
 {
 }
@@ -228,7 +230,7 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
         contact.normal_impulse = contact.carried_impulse = 0.5 * dt * load.normal;
         contact.tangential_impulse = dt * load.tangent.cast<double>();
         contact.rolling_impulse = dt * load.rolling.cast<double>();
-        contacts_[i / points_a_chunk].push_back(contact);
+        contacts_[i / points_per_chunk].push_back(contact);
     }
     for (Batch& contacts : contacts_) std::sort(contacts.begin(), contacts.end(), is_before);
 }
@@ -252,9 +254,9 @@ void ShapeContacts::detect(const Substep& step, std::span<const Vec3d> free)
     clearance_.begin(free);
     std::swap(contacts_, before_);
     const auto find_in_chunk = [&](std::size_t begin, std::size_t end) {
-        find(contacts_[begin / points_a_chunk], before_[begin / points_a_chunk], step, free, begin, end);
+        find(contacts_[begin / points_per_chunk], before_[begin / points_per_chunk], step, free, begin, end);
     };
-    for_each_chunk(size_, find_in_chunk, points_a_chunk);
+    for_each_chunk(size_, find_in_chunk, points_per_chunk);
 }
 
 void ShapeContacts::solve_impacts(Substep& step, std::uint32_t sweep)
@@ -300,8 +302,8 @@ void ShapeContacts::warm_start(Substep& step)
 {
     if (!step.reaction.empty()) share_reactions(step);
     const auto start_chunk = [&](std::size_t begin, std::size_t) {
-        for (ShapeContact& contact : contacts_[begin / points_a_chunk]) {
-            if (!step.paths.empty()) leave_parting(contact, step);
+        for (ShapeContact& contact : contacts_[begin / points_per_chunk]) {
+            if (!step.paths.empty()) skip_separating(contact, step);
             const double w = step.points[contact.i].w;
             if (!(w > 0)) continue;
             const bool spinning = turns(step, contact.i);
@@ -313,11 +315,11 @@ void ShapeContacts::warm_start(Substep& step)
             step.v[contact.i] += w * half;
         }
     };
-    for_each_chunk(size_, start_chunk, points_a_chunk);
+    for_each_chunk(size_, start_chunk, points_per_chunk);
 }
 
 // No impulse moves out a point that impacts have left inside but separating.
-void ShapeContacts::leave_parting(ShapeContact& contact, const Substep& step)
+void ShapeContacts::skip_separating(ShapeContact& contact, const Substep& step)
 {
     const std::uint32_t i = contact.i;
     if (step.paths[i].sweep > 0 && contact.n.dot(step.v[i] - contact.vc) >= 0)
@@ -327,7 +329,7 @@ void ShapeContacts::leave_parting(ShapeContact& contact, const Substep& step)
 void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free,
                          std::size_t begin, std::size_t end)
 {
-    thread_local OfThread<ShapeQuery> kept;
+    thread_local PerThread<ShapeQuery> kept;
     ShapeQuery& query = *kept;
     query.free = free;
     query.begin = begin;
@@ -338,10 +340,10 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
         const Obstacle& obstacle = obstacles_[o];
         if (obstacle.response == Response::Die) continue;
-        clearance_.ask(query, o, step);
+        clearance_.query(query, o, step);
         const std::size_t first = contacts.size();
-        for (std::size_t k = 0; k < query.asked.size(); ++k) {
-            const std::uint32_t i = query.asked[k];
+        for (std::size_t k = 0; k < query.queried.size(); ++k) {
+            const std::uint32_t i = query.queried[k];
             if (query.phi[k] - obstacle.radius[i] > query.reach(obstacle, i) || !(query.gradient[k].norm() > 0))
                 continue;
             ShapeContact made = contact(query, k, o, step);
@@ -354,7 +356,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
             contacts.push_back(made);
         }
         clearance_.close(query, o);
-        if (sleep_) keep_of_sleepers(contacts, first, before, o);
+        if (sleep_) keep_sleeper_contacts(contacts, first, before, o);
     }
 }
 
@@ -363,7 +365,7 @@ ShapeContacts::ShapeContact ShapeContacts::contact(const ShapeQuery& query, std:
 {
     const Obstacle& obstacle = obstacles_[o];
     ShapeContact contact{};
-    contact.i = query.asked[k];
+    contact.i = query.queried[k];
     contact.obstacle = static_cast<std::uint32_t>(o);
     contact.n = query.gradient[k] / query.gradient[k].norm();
     contact.vc = obstacle.shape->velocity_at(query.P[k], query.since);
@@ -384,8 +386,8 @@ void ShapeContacts::follow_turning(ShapeContact& contact, const Vec3d& P, double
 }
 
 // Keeps the contacts of sleepers with a shape unchanged and inactive.
-void ShapeContacts::keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before,
-                                     std::size_t obstacle) const
+void ShapeContacts::keep_sleeper_contacts(Batch& contacts, std::size_t begin, const Batch& before,
+                                          std::size_t obstacle) const
 {
     const auto middle = static_cast<std::ptrdiff_t>(contacts.size());
     for (const ShapeContact& contact : before)
@@ -454,8 +456,8 @@ void ShapeContacts::share_reactions(const Substep& step)
                          [](const ShapeContact* a, const ShapeContact* b) { return a->i < b->i; });
         Batch missed;
         auto first = by_point.begin();
-        const std::size_t end = std::min(size_, (c + 1) * points_a_chunk);
-        for (std::size_t i = c * points_a_chunk; i < end; ++i) {
+        const std::size_t end = std::min(size_, (c + 1) * points_per_chunk);
+        for (std::size_t i = c * points_per_chunk; i < end; ++i) {
             const auto last = std::find_if(first, by_point.end(), [&](const ShapeContact* at) { return at->i != i; });
             if (step.points[i].w > 0 && !step.reaction[i].isZero(0))
                 share_reaction({first, last}, static_cast<std::uint32_t>(i), step, missed);
@@ -469,8 +471,8 @@ void ShapeContacts::share_reactions(const Substep& step)
 void ShapeContacts::share_reaction(std::span<ShapeContact* const> contacts, std::uint32_t i, const Substep& step,
                                    Batch& missed) const
 {
-    thread_local OfThread<std::vector<Vec3d>> kept_normals;
-    thread_local OfThread<std::vector<double>> kept_parts;
+    thread_local PerThread<std::vector<Vec3d>> kept_normals;
+    thread_local PerThread<std::vector<double>> kept_parts;
     std::vector<Vec3d>& normals = *kept_normals;
     std::vector<double>& parts = *kept_parts;
     const Vec3d impulse = step.reaction[i] / step.inverse_mass[i];
@@ -605,11 +607,11 @@ void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
 // Final penetration correction.
 void ShapeContacts::move_out(const Batch& contacts, Substep& step) const
 {
-    struct Asked {
+    struct Queried {
         std::vector<Vec3d> P, gradient;
         std::vector<double> phi, time;
     };
-    thread_local OfThread<Asked> kept;
+    thread_local PerThread<Queried> kept;
     auto& [P, gradient, phi, time] = *kept;
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
         const Obstacle& obstacle = obstacles_[contacts[begin].obstacle];

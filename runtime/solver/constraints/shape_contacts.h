@@ -49,11 +49,11 @@ struct ShapeQuery {
     std::size_t begin = 0;                   // the chunk's first point
     double since = 0;                        // s, from the beginning of the frame to the end of the substep
     std::vector<std::uint32_t> open;         // points that may be near some shape
-    std::vector<double> moved, since_asked;  // m, in this substep, and since distances were first queried; by chunk
+    std::vector<double> moved, since_query;  // m, in this substep, and since distances were first queried; by chunk
 
-    std::vector<std::uint32_t> asked;  // points queried for one shape
-    std::vector<Vec3d> P, gradient;    // of the queried points
-    std::vector<double> phi, time;     // m, s
+    std::vector<std::uint32_t> queried;  // points queried for one shape
+    std::vector<Vec3d> P, gradient;      // of the queried points
+    std::vector<double> phi, time;       // m, s
 
     // Returns the distance that a point may move in a substep, m. Contacts that are farther away are skipped.
     double reach(const Obstacle& obstacle, std::size_t i) const;
@@ -66,7 +66,7 @@ public:
     // Lists the open points from `begin` to `end`.
     void open(ShapeQuery& query, const Substep& step, std::size_t end);
     // Queries one shape for the points that may be near it, and stores their distances.
-    void ask(ShapeQuery& query, std::size_t obstacle, const Substep& step);
+    void query(ShapeQuery& query, std::size_t obstacle, const Substep& step);
     // Updates the room of open points from one shape. Called after all shapes have been queried.
     void close(const ShapeQuery& query, std::size_t obstacle);
     void begin(std::span<const Vec3d> free);
@@ -77,8 +77,8 @@ private:
     std::span<const Obstacle> obstacles_;
     std::size_t size_;
     bool any_moves_;
-    std::vector<float> clearance_;  // m, [obstacles, size]: lower bound of the distance at asked_at_
-    std::vector<Vec3d> asked_at_;
+    std::vector<float> clearance_;  // m, [obstacles, size]: lower bound of the distance at query_positions_
+    std::vector<Vec3d> query_positions_;
     std::vector<float> room_;  // m: distance that a point may move or be pushed without coming near any of them
 };
 
@@ -140,7 +140,7 @@ private:
               std::size_t end);
     ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle, const Substep& step) const;
     void follow_turning(ShapeContact& contact, const Vec3d& P, double time) const;
-    void keep_of_sleepers(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
+    void keep_sleeper_contacts(Batch& contacts, std::size_t begin, const Batch& before, std::size_t obstacle) const;
     void solve_impact(const ShapeContact& contact, Substep& step, std::uint32_t sweep) const;
     void share_reactions(const Substep& step);
     void share_reaction(std::span<ShapeContact* const> contacts, std::uint32_t i, const Substep& step,
@@ -148,7 +148,7 @@ private:
     std::optional<ShapeContact> missed_contact(std::uint32_t i, const Vec3d& impulse, const Substep& step) const;
     static void start_spinning(ShapeContact& contact, Substep& step);
     static void solve_spinning(ShapeContact& contact, Substep& step);
-    static void leave_parting(ShapeContact& contact, const Substep& step);
+    static void skip_separating(ShapeContact& contact, const Substep& step);
     static void solve_velocity(ShapeContact& contact, Substep& step);
     void move_out(const Batch& contacts, Substep& step) const;
 

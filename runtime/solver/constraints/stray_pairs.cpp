@@ -32,7 +32,7 @@ const std::vector<ContactPair>& StrayPairs::find(const Substep& step, std::span<
     pairs_.clear();
     if (list.strays().empty()) return pairs_;
     sort_strays(step, radius, list);
-    constexpr std::size_t each = NeighbourList::blocks_a_task;
+    constexpr std::size_t each = NeighbourList::blocks_per_task;
     found_.resize((list.blocks() + each - 1) / each);
     for_each_chunk(
         list.blocks(),

@@ -52,7 +52,7 @@ void RowSystem::multiply(const RowSchedule& schedule, std::span<const double> x,
 }
 
 // The first direction is that of the given λ, so an unchanged load is found immediately.
-void RowSystem::solve(const RowSchedule& schedule, double tolerance, int most_iterations)
+void RowSystem::solve(const RowSchedule& schedule, double tolerance, int max_iterations)
 {
     const std::size_t n = size();
     for (std::size_t r = 0; r < n; ++r) {
@@ -85,7 +85,7 @@ void RowSystem::solve(const RowSchedule& schedule, double tolerance, int most_it
         add(-length, first_product_, residual_);
     }
     double size = 0;  // of the last direction
-    for (int k = 0; k < most_iterations && condition() > enough; ++k) {
+    for (int k = 0; k < max_iterations && condition() > enough; ++k) {
         const double along_last = size > 0 ? dot(conditioned_, product_) / size : 0;
         const double along_first = first_size > 0 ? dot(conditioned_, first_product_) / first_size : 0;
         for (std::size_t r = 0; r < n; ++r)

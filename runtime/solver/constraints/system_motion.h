@@ -37,7 +37,7 @@ public:
 
     // Iterates until the residual is `tolerance` times the initial one, or up to the iteration limit. `schedule` has
     // the coloured rows, numbered as here.
-    void solve(const RowSchedule& schedule, double tolerance, int most_iterations);
+    void solve(const RowSchedule& schedule, double tolerance, int max_iterations);
 
     // Returns w Σ g λ of a point.
     Vec3d shift(std::size_t i) const { return w[i] * sum_[i]; }
@@ -84,11 +84,11 @@ private:
     static constexpr std::size_t small = 100;
     static constexpr int rounds = 4;
     // Energy that springs with a wrong length may store, relative to the kinetic energy.
-    static constexpr double enough = 1e-2;
+    static constexpr double spring_energy_tolerance = 1e-2;
     static constexpr double coarse = 0.1;  // accuracy of a Newton step's linear solve
     static constexpr int newton_steps = 20, halvings = 6;
     // Compliance of a rigid row, relative to its points' inverse mass, so that contradicting rows get a finite load.
-    static constexpr double least_compliance = 1e-9;
+    static constexpr double min_compliance = 1e-9;
 
     template <class F>
     void each_row(const F& f)
@@ -109,7 +109,7 @@ private:
         std::copy(gradient.begin(), gradient.end(), system_.gradient.begin() + static_cast<std::ptrdiff_t>(r * arity));
         system_.e[r] = e, system_.s[r] = s;
     }
-    void leave_out(std::size_t r)
+    void exclude(std::size_t r)
     {
         typename Row::Vectors none;
         none.fill(Vec3d::Zero());
@@ -183,7 +183,7 @@ private:
             system_.lambda[r] = row.impulse / step.dt;
             row.added = 0;
             if (!(row.compliance > 0))
-                set(r, row.direction, e, least_compliance * W * step.mobility_of(row.points[0]).x);
+                set(r, row.direction, e, min_compliance * W * step.mobility_of(row.points[0]).x);
             else if (row.is_stiff(W, step.dt))
                 set(r, row.direction, e + C, row.compliance);
             else
@@ -208,9 +208,9 @@ private:
             row.residual(step, gradient);
             const double W = inverse_mass(row, gradient);
             if (row.is_stiff(W, step.dt))
-                set(r, gradient, row.rate(step, gradient), least_compliance * W);
+                set(r, gradient, row.rate(step, gradient), min_compliance * W);
             else
-                leave_out(r);
+                exclude(r);
         });
         solve();
         for (const std::uint32_t i : points_) step.v[i] += system_.shift(i);
@@ -253,7 +253,7 @@ private:
         if (std::none_of(others.begin(), others.end(), gives)) return;
         for (int n = 0; n < newton_steps; ++n) {
             const Off before = read_off();
-            if (!(before.energy > enough * kinetic_energy())) return;
+            if (!(before.energy > spring_energy_tolerance * kinetic_energy())) return;
             system_.solve(*schedule_, coarse, iterations);
             double farthest = 0;
             for (const std::uint32_t i : points_) farthest = std::max(farthest, system_.shift(i).norm());
@@ -286,9 +286,9 @@ private:
             typename Row::Vectors gradient;
             const double C = off(r, row, gradient), W = inverse_mass(row, gradient);
             if (W > 0 && row.is_stiff(W, step_->dt) && !is_drawn(row))
-                set(r, gradient, C, least_compliance * W);
+                set(r, gradient, C, min_compliance * W);
             else
-                leave_out(r);
+                exclude(r);
         });
         Off all;
         for (std::size_t r = 0; r < system_.size(); ++r) {

@@ -46,7 +46,7 @@ Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const Weight& 
 {
     // Compliance of a link that the joined part leaves no freedom, relative to the freedom of its ends alone, so that
     // pins that no tree can reach get a finite load.
-    constexpr double least_compliance = 1e-9;
+    constexpr double min_compliance = 1e-9;
 
     // From the leaves: `mobility` is the shift of a point per impulse, `shift` that due to its subtree.
     Eigen::Matrix3d root_mobility = w(0) * Eigen::Matrix3d::Identity();
@@ -64,7 +64,7 @@ Vec3d solve_tree(std::span<Forest::Link> tree, std::size_t first, const Weight& 
         link.reach = mobility * link.gradient_above;
         link.e += link.gradient.dot(link.shift) + link.gradient_above.dot(shift);
         const double least =
-            least_compliance * (w(k + 1) * link.gradient.squaredNorm() + w_above * link.gradient_above.squaredNorm());
+            min_compliance * (w(k + 1) * link.gradient.squaredNorm() + w_above * link.gradient_above.squaredNorm());
         link.s = std::max(
             link.s + link.gradient.dot(link.mobility * link.gradient) + link.gradient_above.dot(link.reach), least);
         if (!(link.s > 0)) continue;
@@ -102,7 +102,7 @@ public:
     {
         read(step);
         if (is_ballistic_) project_velocities(from_);  // impacts may have left some along the rows
-        const std::int64_t whole = is_ballistic_ ? std::int64_t{1} << most_halvings : 1;
+        const std::int64_t whole = is_ballistic_ ? std::int64_t{1} << max_halvings : 1;
         std::int64_t done = 0;
         for (std::int64_t length = whole; done < whole;) {
             const double part = static_cast<double>(length) / static_cast<double>(whole);
@@ -169,8 +169,8 @@ private:
     static constexpr double absent = std::numeric_limits<double>::infinity();  // compliance of an inactive row
 
     // Limits on halving a substep. A step is halved if it has not found D to `largest_error`, relative to a row's
-    // length, within `most_solutions`, or if its velocities lose more than `largest_loss` of the substep's energy.
-    static constexpr int most_halvings = 8, most_solutions = 4, most_corrections = 3;
+    // length, within `max_solutions`, or if its velocities lose more than `largest_loss` of the substep's energy.
+    static constexpr int max_halvings = 8, max_solutions = 4, max_corrections = 3;
     static constexpr double largest_error = 1e-6, largest_loss = 1e-5;
 
     struct Point {
@@ -250,7 +250,7 @@ private:
             to_[k].P += h_ * (from_[k].v + 0.5 * h_ * from_[k].a);
         }
         converged_ = false;
-        for (int n = 0; n < most_solutions && !converged_; ++n) solve_motion();
+        for (int n = 0; n < max_solutions && !converged_; ++n) solve_motion();
         kinetic_ = 0;
         for (std::size_t k = 0; k < to_.size(); ++k) {
             const Vec3d& shift = k ? tree_[k - 1].shift : root_shift_;
@@ -325,7 +325,7 @@ private:
     // Takes Newton steps until the rigid rows have C = 0.
     void correct_positions()
     {
-        for (int n = 0; n < most_corrections; ++n) {
+        for (int n = 0; n < max_corrections; ++n) {
             double residuals = 0, longest = 0;
             for (std::size_t k = 0; k < tree_.size(); ++k) {
                 Forest::Link& link = tree_[k];

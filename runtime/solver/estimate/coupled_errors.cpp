@@ -29,7 +29,7 @@ bool CoupledErrors::is_due(std::int64_t frame)
 
 void CoupledErrors::begin(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
-    if (unknown_.empty() && points.size() > most_points) {
+    if (unknown_.empty() && points.size() > max_points) {
         unknown_ = "the sum since birth, as more than 1,000 points act on one another";
         stop();
     }

@@ -4,7 +4,7 @@
 // twice the substeps, from the first frame on. Constraints, sleep and the loads on shapes have separate memories for
 // it. The estimate is twice the difference, as for points that move alone.
 //
-// This doubles the time of Solve, and is done for up to `most_points`. For larger sets, the frames 1, 2, 4, 8, ... and
+// This doubles the time of Solve, and is done for up to `max_points`. For larger sets, the frames 1, 2, 4, 8, ... and
 // every `stride`th are solved again from the run's initial points, and the estimate is the error made in this frame. A
 // sum over frames would not include the damping or spreading of the error by later motion.
 #pragma once
@@ -24,7 +24,7 @@ namespace rapid {
 
 class CoupledErrors {
 public:
-    static constexpr std::size_t most_points = 1000;
+    static constexpr std::size_t max_points = 1000;
     static constexpr std::int64_t stride = 40;  // in frames: in long runs a twentieth of the time of Solve
 
     // Returns true if the n-th frame of a set that is too large is solved again.

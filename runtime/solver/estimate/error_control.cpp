@@ -28,7 +28,7 @@ public:
         if (StuckColumns::are_needed(dynamics)) StuckColumns::add_to(points);
     }
 
-    Tolerated run()
+    ToleranceResult run()
     {
         if (limits_.repeats)
             advance_blocks();
@@ -136,8 +136,8 @@ private:
         const SolveResult result = solve(set, dynamics_, options, run);
         SolveResult& all = done_.result;
         all.penetration_max = std::max(all.penetration_max, result.penetration_max);
-        done_.substeps = std::max(done_.substeps, run.most_substeps());
-        done_.beyond += run.beyond();
+        done_.substeps = std::max(done_.substeps, run.largest_substeps());
+        done_.beyond_tolerance += run.beyond_tolerance();
         if (!limits_.is_first(substeps)) return;
         all.collisions += result.collisions;
         all.contact_limit += result.contact_limit;
@@ -150,14 +150,14 @@ private:
     const SolveOptions& options_;
     const StepDoublingLimits limits_;
 
-    Tolerated done_;
+    ToleranceResult done_;
     std::vector<std::uint32_t> dead_;  // indices
 };
 
 }  // namespace
 
-Tolerated solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
-                       int max_substeps)
+ToleranceResult solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                             int max_substeps)
 {
     return ToleranceSolver(points, dynamics, options, tolerance, max_substeps).run();
 }

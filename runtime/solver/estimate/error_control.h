@@ -21,15 +21,15 @@
 
 namespace rapid {
 
-struct Tolerated {
+struct ToleranceResult {
     SolveResult result;
-    int substeps = 1;          // the largest number in a run of any point
-    std::uint64_t beyond = 0;  // points that miss the tolerance at max_substeps
+    int substeps = 1;                    // the largest number in a run of any point
+    std::uint64_t beyond_tolerance = 0;  // points that miss the tolerance at max_substeps
 };
 
 // Solves with the substeps that each point needs for an error of at most `tolerance` (m): options.substeps times a
 // power of 2, up to max_substeps.
-Tolerated solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
-                       int max_substeps);
+ToleranceResult solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                             int max_substeps);
 
 }  // namespace rapid

@@ -9,7 +9,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t most_points = 1000;
+constexpr std::size_t max_points = 1000;
 constexpr double coarse = 1e-3;  // m: a spacing of a millimetre is visible
 constexpr double fine = 1e-5;    // m: losing motion below this spacing is not visible
 
@@ -26,15 +26,15 @@ Resolution resolution_of(const PointSet& points, double h)
     Resolution found;
     found.h = h;
     const Strided<Vec3f> P = points.P().read(), v = points.v().read();
-    for (std::size_t i = 0; i < points.size(); i += points.size() / most_points + 1) {
+    for (std::size_t i = 0; i < points.size(); i += points.size() / max_points + 1) {
         const float largest = P[i].cwiseAbs().maxCoeff();
         if (!std::isfinite(largest)) continue;
         found.coordinate = std::max(found.coordinate, double(largest));
         bool moves = false, is_lost = true;
         for (int axis = 0; axis < 3; ++axis) {
-            const double way = h * std::abs(double(v[i][axis])), spacing = spacing_at(P[i][axis]);
-            moves |= way > 0;
-            is_lost &= way == 0 || (spacing > fine && way < 0.5 * spacing);
+            const double displacement = h * std::abs(double(v[i][axis])), spacing = spacing_at(P[i][axis]);
+            moves |= displacement > 0;
+            is_lost &= displacement == 0 || (spacing > fine && displacement < 0.5 * spacing);
         }
         found.loses_motion |= moves && is_lost;
     }

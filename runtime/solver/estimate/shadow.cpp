@@ -14,8 +14,8 @@
 namespace rapid {
 namespace {
 
-constexpr std::size_t fewest_shadows = 1000, most_shadows = 1250;  // if there are that many points
-constexpr std::uint32_t gone = UINT32_MAX;                         // the index of a point that has died
+constexpr std::size_t fewest_shadows = 1000, max_shadows = 1250;  // if there are that many points
+constexpr std::uint32_t gone = UINT32_MAX;                        // the index of a point that has died
 
 // Returns the rank of an id in the random order (SplitMix64, Steele et al. 2014).
 std::uint64_t rank_of(std::int64_t id)
@@ -137,10 +137,10 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
         next = std::max(next, id[i] + 1);
         if (rank_of(id[i]) >= threshold_) continue;
         born.emplace_back(id[i], static_cast<std::uint32_t>(i));
-        if (ids_.size() + born.size() > 4 * most_shadows) thin();
+        if (ids_.size() + born.size() > 4 * max_shadows) thin();
     }
     next_id_ = next;
-    if (ids_.size() + born.size() > most_shadows) thin();
+    if (ids_.size() + born.size() > max_shadows) thin();
     std::sort(born.begin(), born.end());
     for (const auto& [number, index] : born) {
         ids_.push_back(number);
@@ -183,9 +183,9 @@ void Shadows::add_rounding(const PointSet& solved)
         Rounding& point = rounding_[k];
         const Vec3f &P1 = P[indices_[k]], &v1 = v[indices_[k]];
         for (int axis = 0; axis < 3; ++axis) {
-            const double way = 0.5 * point.dt * (double(point.v[axis]) + double(v1[axis]));
+            const double displacement = 0.5 * point.dt * (double(point.v[axis]) + double(v1[axis]));
             const double moved = double(P1[axis]) - double(point.P[axis]);
-            const double off = way - moved, spacing = spacing_at(P1[axis]);
+            const double off = displacement - moved, spacing = spacing_at(P1[axis]);
             const double lost = off - spacing * std::nearbyint(off / spacing);  // exact: a power of two
             if (std::isfinite(lost)) point.displacement[axis] += lost;
         }

@@ -20,14 +20,14 @@ class StepDoubling::Block final : public BlockRefinement {
 public:
     explicit Block(StepDoubling& all) : all_(all), limits_(all.limits_) {}
 
-    void begin(std::span<const std::uint32_t> places) override
+    void begin(std::span<const std::uint32_t> indices) override
     {
-        const std::size_t size = places.size();
+        const std::size_t size = indices.size();
         substeps_ = all_.substeps_;
         indices_.resize(size);
-        for (std::size_t i = 0; i < size; ++i) indices_[i] = all_.index_in_set(places[i]);
+        for (std::size_t i = 0; i < size; ++i) indices_[i] = all_.index_in_set(indices[i]);
         if (all_.from_)
-            extrapolation_.select(all_.from_->extrapolation, places);
+            extrapolation_.select(all_.from_->extrapolation, indices);
         else
             extrapolation_.reset(size, limits_.h);
         open_.resize(size);
@@ -77,7 +77,7 @@ private:
             extrapolated_[i] =
                 may_be_result && (within || limits_.is_result_of_all(substeps_)) && extrapolation_.has_improved(i);
         }
-        if (!first) keep_outside(end.obstacles, end.places, best_P_, extrapolated_);
+        if (!first) keep_outside(end.obstacles, end.indices, best_P_, extrapolated_);
     }
 
     // Keeps the results that are good enough, or final. Leaves points open that need another run.
@@ -111,9 +111,10 @@ private:
         const std::scoped_lock lock(all_.mutex_);
         for (std::size_t i = 0; i < indices_.size(); ++i)
             if (result_[i] == Result::Dead) all_.dead_.push_back(indices_[i]);
-        all_.most_substeps_ = std::max(all_.most_substeps_, limits_.may_be_result(substeps) ? substeps : substeps / 2);
+        all_.largest_substeps_ =
+            std::max(all_.largest_substeps_, limits_.may_be_result(substeps) ? substeps : substeps / 2);
         if (limits_.is_last(substeps)) {
-            all_.beyond_ += open_.size();
+            all_.beyond_tolerance_ += open_.size();
         } else if (!open_.empty()) {
             UnfinishedPoints rest;
             rest.extrapolation.select(extrapolation_, open_);

@@ -40,7 +40,7 @@ public:
     void select(const Extrapolation& from, std::span<const std::uint32_t> chosen)
     {
         reset(0, from.h_);
-        for (std::size_t column = 0; column < most_columns; ++column) {
+        for (std::size_t column = 0; column < max_columns; ++column) {
             P_[column].clear();
             v_[column].clear();
         }
@@ -59,7 +59,7 @@ public:
         };
         add(length_, from.length_);
         add(died_, from.died_);
-        for (std::size_t column = 0; column < std::min(runs_, most_columns); ++column) {
+        for (std::size_t column = 0; column < std::min(runs_, max_columns); ++column) {
             add(P_[column], from.P_[column]);
             add(v_[column], from.v_[column]);
         }
@@ -67,7 +67,7 @@ public:
 
     void begin_run()
     {
-        const std::size_t column = std::min(runs_++, most_columns - 1);
+        const std::size_t column = std::min(runs_++, max_columns - 1);
         P_[column].resize(length_.size());
         v_[column].resize(length_.size());
     }
@@ -89,10 +89,10 @@ public:
         Difference off{infinity, infinity};
         if (lives && runs_ > 1)
             // Runs that find a contact at the end of the same substep share its error.
-            off.run = off.best = std::max(distance2(P - P_[0][i], v - v_[0][i]), squared(end.put_off[i]));
+            off.run = off.best = std::max(distance2(P - P_[0][i], v - v_[0][i]), squared(end.position_errors[i]));
         else if (dies && died_[i])
             off = {0, 0};
-        const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], most_columns - 1) : 0;
+        const std::size_t known = lives && is_series ? std::min<std::size_t>(length_[i], max_columns - 1) : 0;
         double power = 1;
         for (std::size_t c = 0; c < known; ++c) {
             power *= end.path[i] == PathKind::Acted ? 2 : 4;
@@ -101,7 +101,7 @@ public:
             v_[c][i] = v;
             P += dP / (power - 1);
             v += dv / (power - 1);
-            off.best = distance2(dP, dv) / squared(std::min(power - 1, most_trust));
+            off.best = distance2(dP, dv) / squared(std::min(power - 1, max_trust));
         }
         P_[known][i] = P;
         v_[known][i] = v;
@@ -119,8 +119,8 @@ private:
     // so on. If steps are still too coarse for it, as in a close encounter with an attractor, columns that differ by
     // 0.05 m may have an error of 0.02 m: 3 is safe there, and elsewhere columns converge so fast that it costs
     // nothing.
-    static constexpr double most_trust = 3;
-    static constexpr std::size_t most_columns = 6;  // higher powers of the step add only rounding
+    static constexpr double max_trust = 3;
+    static constexpr std::size_t max_columns = 6;  // higher powers of the step add only rounding
 
     double distance2(const Vec3d& dP, const Vec3d& dv) const
     {
@@ -131,7 +131,7 @@ private:
     std::size_t runs_ = 0;
     std::vector<std::uint8_t> length_;  // columns that the next run can extend
     std::vector<std::uint8_t> died_;    // in the last run
-    std::array<std::vector<Vec3d>, most_columns> P_, v_;
+    std::array<std::vector<Vec3d>, max_columns> P_, v_;
 };
 
 // Decides if a run may be a point's result, and if it is the last one.
@@ -175,8 +175,11 @@ public:
     std::map<int, UnfinishedPoints> unfinished();
     std::span<const std::uint32_t> dead() const { return dead_; }
 
-    int most_substeps() const { return most_substeps_; }
-    std::uint64_t beyond() const { return beyond_; }  // points that miss the tolerance at max_substeps
+    int largest_substeps() const { return largest_substeps_; }
+    std::uint64_t beyond_tolerance() const
+    {
+        return beyond_tolerance_;
+    }  // points that miss the tolerance at max_substeps
 
 private:
     class Block;
@@ -191,8 +194,8 @@ private:
     std::mutex mutex_;
     std::vector<std::pair<int, UnfinishedPoints>> unfinished_;
     std::vector<std::uint32_t> dead_;
-    int most_substeps_ = 0;
-    std::uint64_t beyond_ = 0;
+    int largest_substeps_ = 0;
+    std::uint64_t beyond_tolerance_ = 0;
 };
 
 }  // namespace rapid

@@ -21,15 +21,15 @@ constexpr double reported_if_exact = 1;
 // For others: at half a radian per substep the phase error of the midpoint rule is 1 % of it, (omega dt)² / 24; beyond
 // 2 it is unstable. At a quarter, a motion is well resolved.
 constexpr double reported_otherwise = 0.5, resolved = 0.25;
-constexpr int most_proposed = 256;  // substeps: eight times as many for a few points take about 30 ms with a script
-constexpr int reference = 8;        // factor of substeps for the reference, whose error is 1/64 at order 2
+constexpr int max_proposed = 256;  // substeps: eight times as many for a few points take about 30 ms with a script
+constexpr int reference = 8;       // factor of substeps for the reference, whose error is 1/64 at order 2
 
 // Number of points for Jacobians, and of the stiffest points that are solved.
-constexpr std::size_t most_sampled = 64, most_solved = 16;
+constexpr std::size_t max_sampled = 64, max_solved = 16;
 
-// Finite difference, relative to the norm of a position and a velocity (at least least_size, m and m/s): rounding in
+// Finite difference, relative to the norm of a position and a velocity (at least min_size, m and m/s): rounding in
 // double and in the single precision of fields both stay far below.
-constexpr double difference = 1e-5, least_size = 1e-3;
+constexpr double difference = 1e-5, min_size = 1e-3;
 constexpr double step_rounding = 1e-6;  // relative error of a step from these differences; ties keep the first
 
 // Returns the indices of points evenly spread over those that the step advances.
@@ -38,13 +38,13 @@ std::vector<std::uint32_t> sample_of(const PointSet& points, const std::string& 
     const Strided<std::uint8_t> members = members_of(points, group);
     std::vector<std::uint32_t> indices;
     if (members.stride == 0) {  // all, or none
-        const std::size_t n = members[0] ? std::min(points.size(), most_sampled) : 0;
+        const std::size_t n = members[0] ? std::min(points.size(), max_sampled) : 0;
         for (std::size_t k = 0; k < n; ++k) indices.push_back(static_cast<std::uint32_t>(k * points.size() / n));
         return indices;
     }
     std::size_t count = 0, passed = 0;
     for (std::size_t i = 0; i < points.size(); ++i) count += members[i];
-    const std::size_t n = std::min(count, most_sampled);
+    const std::size_t n = std::min(count, max_sampled);
     for (std::size_t i = 0; i < points.size() && indices.size() < n; ++i)
         if (members[i] && passed++ == indices.size() * count / n) indices.push_back(static_cast<std::uint32_t>(i));
     return indices;
@@ -126,12 +126,12 @@ public:
                 std::vector<Vec3d> at = P, speed = v;
                 std::vector<Vec3d>& moved = by_position ? at : speed;
                 for (std::size_t i = 0; i < size(); ++i)
-                    moved[i][axis] += side * difference * std::max(from[i].norm(), least_size);
+                    moved[i][axis] += side * difference * std::max(from[i].norm(), min_size);
                 return accelerations_at(at, speed);
             };
             const std::vector<Vec3d> more = moved_by(1), less = moved_by(-1);
             for (std::size_t i = 0; i < size(); ++i) {
-                const double width = 2 * difference * std::max(from[i].norm(), least_size);
+                const double width = 2 * difference * std::max(from[i].norm(), min_size);
                 (by_position ? result[i].by_position : result[i].by_velocity).col(axis) = (more[i] - less[i]) / width;
             }
         };
@@ -251,7 +251,7 @@ StiffnessScan scan(const Action& action, const Sample& sample)
 int proposed(const SolveOptions& options, double step)
 {
     int substeps = options.substeps;
-    for (double left = step; left > resolved && 2 * substeps <= most_proposed; left /= 2) substeps *= 2;
+    for (double left = step; left > resolved && 2 * substeps <= max_proposed; left /= 2) substeps *= 2;
     return substeps;
 }
 
@@ -267,7 +267,7 @@ double largest_distance(const PointSet& a, const PointSet& b)
     return worst;
 }
 
-Stiffness::Cure cure_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
+Stiffness::Improvement improvement_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
 {
     options.loads = nullptr;
     options.log = nullptr;
@@ -339,11 +339,12 @@ std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynami
     for (std::size_t i = 0; i < stiffest.size(); ++i) stiffest[i] = static_cast<std::uint32_t>(i);
     std::stable_sort(stiffest.begin(), stiffest.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return inexact[a] > inexact[b]; });
-    stiffest.resize(std::min(stiffest.size(), most_solved));
+    stiffest.resize(std::min(stiffest.size(), max_solved));
     try {
-        const Stiffness::Cure cure = cure_of(sample.set.select(stiffest), pulls, options, proposed(options, worst));
+        const Stiffness::Improvement improvement =
+            improvement_of(sample.set.select(stiffest), pulls, options, proposed(options, worst));
         for (Stiffness& stiffness : all)
-            if (!stiffness.is_exact()) stiffness.cure = cure;
+            if (!stiffness.is_exact()) stiffness.improvement = improvement;
     } catch (const Error&) {  // unstable: the run itself reports it
     }
     return all;
@@ -375,11 +376,11 @@ std::string text_of(const Stiffness& stiffness)
         return what + (stiffness.alone ? "; treated exactly"
                                        : "; solved in closed form, with what else acts held through a sub-step");
     std::string text = fmt::format("{} at {} sub-step{}", what, stiffness.substeps, stiffness.substeps == 1 ? "" : "s");
-    if (const auto& cure = stiffness.cure) {
-        text += fmt::format("; estimated error {:.1g} m; {} sub-steps would give {:.1g} m", cure->error, cure->substeps,
-                            cure->error_then);
+    if (const auto& improvement = stiffness.improvement) {
+        text += fmt::format("; estimated error {:.1g} m; {} sub-steps would give {:.1g} m", improvement->error,
+                            improvement->substeps, improvement->error_after);
         // A converging error falls to a quarter with twice as many substeps.
-        if (cure->error_then > 0.5 * cure->error)
+        if (improvement->error_after > 0.5 * improvement->error)
             text += "; they are no remedy near a place where a force has no bound: attract has core for that";
     }
     return text;

@@ -36,12 +36,12 @@ struct Stiffness {
 
     // The largest position errors of the sample after this frame, m, with the current and with more substeps. Empty
     // for parts that are solved exactly, and for coupled points, because a sample alone moves differently.
-    struct Cure {
+    struct Improvement {
         double error;
         int substeps;
-        double error_then;
+        double error_after;
     };
-    std::optional<Cure> cure;
+    std::optional<Improvement> improvement;
 
     // For a kind that is solved exactly: everything that acts on the points is, so their motion is exact, too.
     bool alone = false;

@@ -18,8 +18,8 @@ class ToleranceCheck {
 public:
     // Returns the number of points in `solved` that are beyond the tolerance. sample: some of the points before Solve.
     // The other arguments are those of solve_within().
-    std::uint64_t beyond(const PointSet& sample, const PointSet& solved, const Dynamics& dynamics,
-                         const SolveOptions& options, double tolerance, int max_substeps);
+    std::uint64_t beyond_tolerance(const PointSet& sample, const PointSet& solved, const Dynamics& dynamics,
+                                   const SolveOptions& options, double tolerance, int max_substeps);
 
     template <class Archive>
     void serialize(Archive& keep)

@@ -71,7 +71,7 @@ double log_ratio(double x) { return std::abs(x) < 1e-16 ? 1 : std::log1p(x) / x;
 //   V_v = E                       V_G = E ∫ 1/E = (H + c v J)/y
 //   X_v = ln(1 + c v h)/(c v)     as without acceleration
 //   X_G = ln(y/(1 + c v h))/(c g) the rest of the distance
-Dragged one_way(double v, double g, double k, double c, double t)
+Dragged without_reversal(double v, double g, double k, double c, double t)
 {
     if (!(t > 0)) return {};
     const double b = c * g;
@@ -112,7 +112,7 @@ double time_to_stop(double v, double g, double k, double c)
 }
 
 // Returns the response over two consecutive times; share: the first time's fraction of both.
-Dragged then(const Dragged& first, double share, const Dragged& second)
+Dragged in_sequence(const Dragged& first, double share, const Dragged& second)
 {
     const Propagator &a = first.by, &b = second.by;
     return {{a.x_of_v + a.v_of_v * b.x_of_v, a.x_of_G + a.v_of_G * b.x_of_v + b.x_of_G, a.v_of_v * b.v_of_v,
@@ -124,10 +124,11 @@ Dragged then(const Dragged& first, double share, const Dragged& second)
 // accelerated back.
 Dragged along_line(double speed, double along, double k, double c, double t)
 {
-    if (!(along < 0)) return one_way(speed, along, k, c, t);
+    if (!(along < 0)) return without_reversal(speed, along, k, c, t);
     const double stop = time_to_stop(speed, -along, k, c);
-    if (stop >= t) return one_way(speed, along, k, c, t);
-    return then(one_way(speed, along, k, c, stop), stop / t, one_way(0, -along, k, c, t - stop));
+    if (stop >= t) return without_reversal(speed, along, k, c, t);
+    return in_sequence(without_reversal(speed, along, k, c, stop), stop / t,
+                       without_reversal(0, -along, k, c, t - stop));
 }
 
 // Uses the mean direction of the velocities before and after.
@@ -152,7 +153,8 @@ Dragged respond_to_quadratic_drag(const Vec3d& v, const Vec3d& G, double k, doub
     if (stop >= t) return along_mean_direction(v, G, k, c, t);
     // The point turns back, and then has another direction.
     const Dragged first = along_mean_direction(v, G, k, c, stop);
-    return then(first, stop / t, along_mean_direction(v * first.by.v_of_v + G * first.by.v_of_G, G, k, c, t - stop));
+    return in_sequence(first, stop / t,
+                       along_mean_direction(v * first.by.v_of_v + G * first.by.v_of_G, G, k, c, t - stop));
 }
 
 }  // namespace rapid

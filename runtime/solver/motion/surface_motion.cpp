@@ -43,12 +43,13 @@ Vec3d SurfaceMotion::begin(double phi, const Vec3d& gradient, const Vec3d& V)
     u0_ = v0 - V0_;
     pull_ = G - (k + 0.5 * t * w2) * V0_;
     const Propagator through = respond(k, w2 + s, t);
-    const double way = u0_.dot(n0_) * through.x_of_v + (pull_.dot(n0_) - s * d0_) * through.x_of_G;
-    return P0 + t * V0_ + along_surface(u0_, n0_) * along.x_of_v + along_surface(pull_, n0_) * along.x_of_G + way * n0_;
+    const double displacement = u0_.dot(n0_) * through.x_of_v + (pull_.dot(n0_) - s * d0_) * through.x_of_G;
+    return P0 + t * V0_ + along_surface(u0_, n0_) * along.x_of_v + along_surface(pull_, n0_) * along.x_of_G +
+           displacement * n0_;
 }
 
 // Returns the end, except for the curvature of the surface. The middle normal is the mean of those at both ends.
-Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
+Vec3d SurfaceMotion::advance(const Vec3d& gradient, const Vec3d& V)
 {
     if (!acts_) return P;
     V1_ = V;
@@ -61,16 +62,16 @@ Vec3d SurfaceMotion::go(const Vec3d& gradient, const Vec3d& V)
     const Vec3d turning = along_surface(n1 - n0_, n_) / t;  // n'
     const double speed = u0_.dot(n0_), integral = integral_of_x_of_G(through, k, w2 + s, t);
     const Vec3d straight = from * along.x_of_v + pull * along.x_of_G;
-    Vec3d way = straight;
+    Vec3d displacement = straight;
     double at_rest = 0;
     for (int iteration = 0; iteration < 2; ++iteration) {
-        at_rest = pull_.dot(n_) + way.dot(turning) / t - s * d0_;
-        way = straight - turning * (speed * through.x_of_G + at_rest * integral);
+        at_rest = pull_.dot(n_) + displacement.dot(turning) / t - s * d0_;
+        displacement = straight - turning * (speed * through.x_of_G + at_rest * integral);
     }
     d1_ = d0_ + speed * through.x_of_v + at_rest * through.x_of_G;
     normal_v_ = speed * through.v_of_v + at_rest * through.v_of_G;
     tangential_ = from * along.v_of_v + pull * along.v_of_G - turning * ((d1_ - d0_) * std::exp(-0.5 * k * t));
-    return at_ = P0 + t * mean_V() + way + (d1_ - d0_) * n_;
+    return at_ = P0 + t * mean_V() + displacement + (d1_ - d0_) * n_;
 }
 
 // Places the point at the distance d1, with the energy that it has there.
@@ -98,9 +99,9 @@ void SurfaceMotion::end(double phi, const Vec3d& gradient)
     if (normal_v_ * normal_v_ > left) normal_v_ = std::copysign(std::sqrt(left), normal_v_);
     left = std::max(0.0, left - normal_v_ * normal_v_);
     const double size2 = tangential_.squaredNorm();
-    const double wanted = k > 0 ? std::min(size2, left) : left;
+    const double target = k > 0 ? std::min(size2, left) : left;
     v = V1_ + normal_v_ * n1;
-    if (size2 > 0) v += std::sqrt(wanted / size2) * turned(tangential_, n_, n1);
+    if (size2 > 0) v += std::sqrt(target / size2) * turned(tangential_, n_, n1);
 }
 
 void SurfaceMotion::settle(double phi, const Vec3d& gradient)
@@ -116,8 +117,8 @@ void SurfaceMotion::settle(double phi, const Vec3d& gradient)
 // (s + w2) d².
 std::optional<double> SurfaceMotion::distance_reached(const Vec3d& surface, const Vec3d& n) const
 {
-    const Vec3d way = surface - P0 - t * mean_V();
-    const double a = s + w2, b = (pull_ - w2 * way).dot(n), c = energy_left(surface, 0);
+    const Vec3d displacement = surface - P0 - t * mean_V();
+    const double a = s + w2, b = (pull_ - w2 * displacement).dot(n), c = energy_left(surface, 0);
     const double root2 = b * b + a * c;
     if (!(root2 >= 0)) return std::nullopt;
     const double root = std::sqrt(root2);
@@ -129,10 +130,11 @@ Vec3d SurfaceMotion::path_v() const
     return acts_ ? Vec3d(V0_ + along_surface(u0_, n0_) + (d1_ - d0_) / t * n0_) : v0;
 }
 
-double SurfaceMotion::energy_left(const Vec3d& place, double distance) const
+double SurfaceMotion::energy_left(const Vec3d& position, double distance) const
 {
-    const Vec3d way = place - P0 - t * mean_V();
-    return u0_.squaredNorm() + s * (d0_ - distance) * (d0_ + distance) + 2 * pull_.dot(way) - w2 * way.squaredNorm();
+    const Vec3d displacement = position - P0 - t * mean_V();
+    return u0_.squaredNorm() + s * (d0_ - distance) * (d0_ + distance) + 2 * pull_.dot(displacement) -
+           w2 * displacement.squaredNorm();
 }
 
 }  // namespace rapid

@@ -38,11 +38,11 @@ struct SurfaceMotion {
     // begin() with those at P0. The gradient is zero if the shape gives no direction; the spring then does not act. V:
     // velocity of the shape at that position.
     Vec3d begin(double phi, const Vec3d& gradient, const Vec3d& V);
-    Vec3d go(const Vec3d& gradient, const Vec3d& V);
+    Vec3d advance(const Vec3d& gradient, const Vec3d& V);
     void end(double phi, const Vec3d& gradient);
     // Returns true if the end may lie beyond a turning point of the distance, such as the middle of a ball. A query at
     // the end, passed to settle(), then corrects the energy to the shape's actual distance.
-    bool far_from_asked() const { return acts_ && std::abs(moved_) > 0.1 * std::abs(d1_ - d0_); }
+    bool far_from_query() const { return acts_ && std::abs(moved_) > 0.1 * std::abs(d1_ - d0_); }
     void settle(double phi, const Vec3d& gradient);
 
     // Returns the initial velocity of the parabola that represents the path; it starts along the surface.
@@ -51,7 +51,7 @@ struct SurfaceMotion {
 private:
     // Returns twice the kinetic energy left at a position with this distance, J/kg; below 0 if the energy does not
     // suffice.
-    double energy_left(const Vec3d& place, double distance) const;
+    double energy_left(const Vec3d& position, double distance) const;
     std::optional<double> distance_reached(const Vec3d& surface, const Vec3d& n) const;
     Vec3d mean_V() const { return 0.5 * (V0_ + V1_); }
     bool turns_away(const Vec3d& gradient) const { return two_sided && gradient.dot(n_) < 0; }

@@ -517,11 +517,11 @@ int report(const Points<columns>& points)
     return 0;
 }
 
-struct Asked {
+struct Arguments {
     double rate;
     int frames;
 };
-inline Asked asked(int count, char** words)
+inline Arguments arguments_of(int count, char** words)
 {
     if (count != 3) {
         std::fprintf(stderr, "%s RATE FRAMES\n", words[0]);

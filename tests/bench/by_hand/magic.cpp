@@ -51,7 +51,7 @@ void step(const Points<columns>& p, std::size_t first, std::size_t last, std::ui
 
 int main(int count, char** words)
 {
-    const auto [rate, frames] = asked(count, words);
+    const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(2 * rate * 2.1) + chunk);
     Dead dead;
     std::size_t born = 0;

@@ -59,7 +59,7 @@ void step(const Points<columns>& p, std::size_t first, std::size_t last, const T
 
 int main(int count, char** words)
 {
-    const auto [rate, frames] = asked(count, words);
+    const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 2.6) + chunk);
     Dead dead;
     std::size_t born = 0;

@@ -16,8 +16,8 @@ describe("follow_leader", function()
       "distance = 1, time = 0.8, response = 0.3, speed = 100", 40)
     local x, v, kept = -4, 0, math.exp(-0.1 / 0.3)
     for frame = 2, 40 do
-      local wanted = 1 + (0.1 * (frame - 2) - 1 - x) / 0.8
-      v = wanted + (v - wanted) * kept
+      local target = 1 + (0.1 * (frame - 2) - 1 - x) / 0.8
+      v = target + (v - target) * kept
       x = x + 0.1 * v
       assert.near({x, 0, 0}, result[frame][2].P, 2e-5)
       assert.near({0.1 * (frame - 1), 0, 0}, result[frame][1].P, 2e-6)

@@ -11,8 +11,8 @@ local function run(nodes, frames, points_text)
   local text = ("return rapid.create { fps = 24, points = %s } "):format(points_text or "two") .. nodes
   local ran = scene.command("run", text, ("-f 1-%d --quiet --stats stats.json"):format(frames))
   assert.equal(0, ran.status, ran.stderr)
-  local told = json.decode(scene.folder:read "stats.json").frames[frames]
-  return told.error, scene.run(text, { frames = {frames, frames} })[frames], told
+  local reported = json.decode(scene.folder:read "stats.json").frames[frames]
+  return reported.error, scene.run(text, { frames = {frames, frames} })[frames], reported
 end
 
 -- Returns the solution of x'' = f(x, v, t) for one point after a second, by Runge-Kutta.
@@ -31,8 +31,8 @@ local function integrated(f, x, v)
   return x
 end
 
-local function within(told, off, what)
-  assert.truthy(told < 4 * off and told > off / 4, ("%s: told %g m, it is %g m"):format(what, told, off))
+local function within(reported, off, what)
+  assert.truthy(reported < 4 * off and reported > off / 4, ("%s: told %g m, it is %g m"):format(what, reported, off))
 end
 
 describe("a force's function of the frame is one of time:", function()
@@ -66,11 +66,11 @@ describe("a force's function of the frame is one of time:", function()
 
     it(name .. ", with its error told", function()
       for _, substeps in ipairs { 1, 2, 16 } do
-        local told, points = run(nodes .. (" :solve { substeps = %d }"):format(substeps))
+        local reported, points = run(nodes .. (" :solve { substeps = %d }"):format(substeps))
         local off = math.abs(truth - points[1].P.x)
-        assert.truthy(told.position_max > off / 4,
-          ("%d sub-steps: told %g m, it is %g m"):format(substeps, told.position_max, off))
-        if substeps == 1 then within(told.position_max, off, name) end
+        assert.truthy(reported.position_max > off / 4,
+          ("%d sub-steps: told %g m, it is %g m"):format(substeps, reported.position_max, off))
+        if substeps == 1 then within(reported.position_max, off, name) end
       end
     end)
   end
@@ -93,9 +93,9 @@ describe("a force's function of the frame is one of time:", function()
   it("the same bits, at all sub-steps in one, where it gives the same in each frame", function()
     for _, force in ipairs { { ":gravity { g = {0, -9, 0} }", ":gravity { g = function() return {0, -9, 0} end }" },
       { ":wind { velocity = {3, 0, 0} }", ":wind { velocity = function() return {3, 0, 0} end }" } } do
-      local told, points = run(force[2] .. " :solve { substeps = 4 }")
+      local reported, points = run(force[2] .. " :solve { substeps = 4 }")
       local _, constant = run(force[1] .. " :solve {}")
-      assert.equal(0, told.position_max)
+      assert.equal(0, reported.position_max)
       assert.equal(constant[1].P, points[1].P)
     end
   end)
@@ -121,10 +121,10 @@ describe("a pin's place that is a function of the frame is one of time:", functi
       truth[i] = integrated(function(x, _, t) return 60 * (2 * math.sin(2 * math.pi * t) - x) end, i - 1, 0)
     end
     for i, substeps in ipairs { 2, 4, 8 } do
-      local told, points = run((":pin { target = %s, compliance = 1 / 60 } :solve { substeps = %d }"):format(place,
+      local reported, points = run((":pin { target = %s, compliance = 1 / 60 } :solve { substeps = %d }"):format(place,
         substeps))
       off[i] = math.max(math.abs(truth[1] - points[1].P.x), math.abs(truth[2] - points[2].P.x))
-      within(told.position_max, off[i], "a pin")
+      within(reported.position_max, off[i], "a pin")
     end
     assert.truthy(off[1] / off[2] > 3.3 and off[2] / off[3] > 3.3, table.concat(off, ", "))
     assert.truthy(off[3] < 2e-3, off[3])
@@ -147,10 +147,10 @@ describe("a pin's place that is a function of the frame is one of time:", functi
     local nodes = [[:group { name = "hook", where = function(p) return p.id == 0 end } :gravity {}
       :pin { group = "hook", target = function(f) return {0.3 * math.sin(9 * f.time), 1, 0} end }
       :distance { pairs = {{1, 2}} } :solve { substeps = 4 }]]
-    local told, points = run(nodes, 18)
+    local reported, points = run(nodes, 18)
     local truth = scene.run("return rapid.create { fps = 24, points = two, subframes = 64 } " .. nodes,
       { frames = {18, 18} })[18]
-    within(told.position_max, (truth[2].P - points[2].P):length(), "a rod on a hook")
+    within(reported.position_max, (truth[2].P - points[2].P):length(), "a rod on a hook")
   end)
 
   it("a jump is gone through within the frame at whose end it is there", function()
@@ -165,19 +165,19 @@ end)
 
 describe("the error of what is a function of the frame is told", function()
   it("of a force's group alone", function()
-    local told = run [[:group { name = "right", where = function(p) return p.P.x > 0.5 end }
+    local reported = run [[:group { name = "right", where = function(p) return p.P.x > 0.5 end }
       :attract { group = "right", core = 1, strength = 5, center = function(f) return {0, 4 * f.time, 0} end }
       :solve { substeps = 2 }]]
-    assert.equal(0, told.position_p50) -- the lower of two
-    assert.truthy(told.position_max > 1e-5)
+    assert.equal(0, reported.position_p50) -- the lower of two
+    assert.truthy(reported.position_max > 1e-5)
   end)
 
   it("of coupled points", function()
     local nodes = [[:gravity { g = function(f) return {0, -6 * math.sin(9 * f.time), 0} end }
       :distance { pairs = {{1, 2}} } :solve { substeps = 1 }]]
-    local told, points = run(nodes)
+    local reported, points = run(nodes)
     local truth = integrated(function(_, _, t) return -6 * math.sin(9 * t) end, 1, 0)
-    within(told.position_max, math.abs(points[1].P.y - truth), "a rod")
+    within(reported.position_max, math.abs(points[1].P.y - truth), "a rod")
   end)
 
   local kinds = {
@@ -193,18 +193,18 @@ describe("the error of what is a function of the frame is told", function()
   for name, entry in pairs(kinds) do
     it(name, function()
       local frames, nodes, set = unpack(entry)
-      local told, points, all = run(nodes, frames, set)
+      local reported, points, all = run(nodes, frames, set)
       assert.falsy(all.left_out_of_errors)
       local text = ("return rapid.create { fps = 24, points = %s, subframes = 64 } "):format(set or "two") .. nodes
       local truth, off = scene.run(text, { frames = {frames, frames} })[frames], 0
       for i = 1, #truth do off = math.max(off, (truth[i].P - points[i].P):length()) end
-      within(told.position_max, off, name)
+      within(reported.position_max, off, name)
     end)
   end
 
   it("and what is not in it is named", function()
-    local _, _, told = run([[:turbulence { octaves = function(f) return 1 + f.number % 2 end } :solve {}]], 4)
+    local _, _, reported = run([[:turbulence { octaves = function(f) return 1 + f.number % 2 end } :solve {}]], 4)
     assert.same({ "turbulence1.octaves, a function of the frame that is called once in each" },
-      told.left_out_of_errors)
+      reported.left_out_of_errors)
   end)
 end)

@@ -19,7 +19,7 @@ struct Orbit {
 
     explicit Orbit(test::Arguments arguments) : solve("solve", std::move(arguments), simulation)
     {
-        simulation->tells_points = true;
+        simulation->per_point_diagnostics = true;
     }
     PointSet step(const PointSet& points, std::int64_t frame = 2)
     {
@@ -29,9 +29,9 @@ struct Orbit {
 
 PointSet at_distances(const std::vector<float>& distances)
 {
-    std::vector<Vec3f> places;
-    for (const float distance : distances) places.emplace_back(distance, 0, 0);
-    return test::points_at(places);
+    std::vector<Vec3f> positions;
+    for (const float distance : distances) positions.emplace_back(distance, 0, 0);
+    return test::points_at(positions);
 }
 
 TEST_CASE("a point's error is twice what twice the sub-steps move it by", "[solve][error]")
@@ -52,7 +52,7 @@ TEST_CASE("a point's error is twice what twice the sub-steps move it by", "[solv
 TEST_CASE("of paths in closed form the error is 0", "[solve][error]")
 {
     const auto simulation = test::simulation();
-    simulation->tells_points = true;
+    simulation->per_point_diagnostics = true;
     NodeTest gravity("gravity", {});
     NodeTest solve("solve", {}, simulation);
     const Flow flow = gravity.evaluate(2, {Flow{at_distances({1, 2}), {}, simulation}});
@@ -102,9 +102,9 @@ TEST_CASE("the state does not keep the figures, and a scene's own attributes sta
     CHECK_FALSE(orbit.simulation->state.has("substeps"));
     CHECK_FALSE(orbit.simulation->state.has("asleep"));
 
-    Orbit untold({});
-    untold.simulation->tells_points = false;
-    CHECK_FALSE(untold.step(at_distances({1})).has("error"));
+    Orbit unreported({});
+    unreported.simulation->per_point_diagnostics = false;
+    CHECK_FALSE(unreported.step(at_distances({1})).has("error"));
 }
 
 // Returns the points after four steps among attractors, neighbours and, with a radius, contacts; some die of age. Uses
@@ -112,7 +112,7 @@ TEST_CASE("the state does not keep the figures, and a scene's own attributes sta
 PointSet after_steps(const test::Arguments& arguments, double radius_of_contacts, bool is_observed)
 {
     const auto simulation = test::simulation();
-    simulation->tells_points = simulation->estimates_errors = is_observed;
+    simulation->per_point_diagnostics = simulation->estimates_errors = is_observed;
     if (is_observed) simulation->record = std::make_shared<StepRecord>();
     NodeTest pull("attract", {{"strength", Value(20.0)}}, simulation);
     NodeTest neighbours("interact", {{"radius", Value(1.0)}, {"separation", Value(30.0)}}, simulation);

@@ -13,19 +13,19 @@ namespace {
 
 using test::close_to;
 
-struct Asked {
+struct Answer {
     double phi;
     Vec3d gradient;
 };
 
-Asked ask(const ShapePtr& shape, const Vec3d& P)
+Answer query(const ShapePtr& shape, const Vec3d& P)
 {
-    Asked asked;
-    shape->distance({&P, 1}, {&asked.phi, 1}, {&asked.gradient, 1});
+    Answer answer;
+    shape->distance({&P, 1}, {&answer.phi, 1}, {&answer.gradient, 1});
     double alone;
     shape->distance({&P, 1}, {&alone, 1}, {});
-    CHECK(alone == asked.phi);
-    return asked;
+    CHECK(alone == answer.phi);
+    return answer;
 }
 
 template <class F>
@@ -44,15 +44,15 @@ TEST_CASE("a plane's points are those with normal · x = offset, for a normal of
     const double length = GENERATE(1e-200, 0.5, 1.0, 3.0, 1e200);
     const Vec3d n = Vec3d(2, 3, 6) / 7;  // a unit vector
     const ShapePtr plane = make_plane(length * n, length * 4);
-    const Asked at = ask(plane, 5 * n);
+    const Answer at = query(plane, 5 * n);
     CHECK(at.phi == Approx(1).epsilon(1e-14));
     CHECK_THAT(at.gradient, close_to(n, 1e-15));
 }
 
 TEST_CASE("a plane across an axis has that axis for its normal, to the bit", "[analytic]")
 {
-    CHECK(ask(make_plane({0, 3, 0}, 0), {1, 2, 3}).gradient == Vec3d(0, 1, 0));
-    CHECK(ask(make_plane({0, 0, -0.1}, 0), {1, 2, 3}).gradient == Vec3d(0, 0, -1));
+    CHECK(query(make_plane({0, 3, 0}, 0), {1, 2, 3}).gradient == Vec3d(0, 1, 0));
+    CHECK(query(make_plane({0, 0, -0.1}, 0), {1, 2, 3}).gradient == Vec3d(0, 0, -1));
     CHECK(make_plane({0, 1, 0}, 2)->bounds().max().y() == 2);
     CHECK(make_plane({0, -1, 0}, 2)->bounds().min().y() == -2);
 }
@@ -60,26 +60,26 @@ TEST_CASE("a plane across an axis has that axis for its normal, to the bit", "[a
 TEST_CASE("the distance of a sphere is that of its centre minus its radius", "[analytic]")
 {
     const ShapePtr sphere = make_sphere_shape(2, {1, 0, 0});
-    CHECK(ask(sphere, {4, 0, 4}).phi == 3);
-    CHECK(ask(sphere, {4, 0, 4}).gradient == Vec3d(0.6, 0, 0.8));
-    CHECK(ask(sphere, {1, 0, -0.5}).phi == -1.5);
-    CHECK(ask(sphere, {1, 0, 0}).phi == -2);
-    CHECK(ask(sphere, {1, 0, 0}).gradient == Vec3d(0, 0, 0));  // at the centre no way out is the nearest
+    CHECK(query(sphere, {4, 0, 4}).phi == 3);
+    CHECK(query(sphere, {4, 0, 4}).gradient == Vec3d(0.6, 0, 0.8));
+    CHECK(query(sphere, {1, 0, -0.5}).phi == -1.5);
+    CHECK(query(sphere, {1, 0, 0}).phi == -2);
+    CHECK(query(sphere, {1, 0, 0}).gradient == Vec3d(0, 0, 0));  // at the centre no way out is the nearest
 }
 
 TEST_CASE("the distance of a box is that of its nearest face, edge or corner", "[analytic]")
 {
     const ShapePtr box = make_box_shape({2, 4, 6}, {10, 0, 0});
-    CHECK(ask(box, {12, 1, 1}).phi == 1);
-    CHECK(ask(box, {12, 1, 1}).gradient == Vec3d(1, 0, 0));
-    CHECK(ask(box, {14, -6, 0}).phi == 5);  // 3 and 4 beyond an edge
-    CHECK_THAT(ask(box, {14, -6, 0}).gradient, close_to(Vec3d(0.6, -0.8, 0), 1e-15));
-    CHECK(ask(box, {8, 4, 5}).phi == 3);  // 1, 2 and 2 beyond a corner
-    CHECK_THAT(ask(box, {8, 4, 5}).gradient, close_to(Vec3d(Vec3d(-1, 2, 2) / 3), 1e-15));
-    CHECK(ask(box, {10, 1.5, 0}).phi == -0.5);
-    CHECK(ask(box, {10, 1.5, 0}).gradient == Vec3d(0, 1, 0));
-    CHECK(ask(box, {11, 0, 0}).phi == 0);
-    CHECK(ask(box, {11, 0, 0}).gradient == Vec3d(1, 0, 0));
+    CHECK(query(box, {12, 1, 1}).phi == 1);
+    CHECK(query(box, {12, 1, 1}).gradient == Vec3d(1, 0, 0));
+    CHECK(query(box, {14, -6, 0}).phi == 5);  // 3 and 4 beyond an edge
+    CHECK_THAT(query(box, {14, -6, 0}).gradient, close_to(Vec3d(0.6, -0.8, 0), 1e-15));
+    CHECK(query(box, {8, 4, 5}).phi == 3);  // 1, 2 and 2 beyond a corner
+    CHECK_THAT(query(box, {8, 4, 5}).gradient, close_to(Vec3d(Vec3d(-1, 2, 2) / 3), 1e-15));
+    CHECK(query(box, {10, 1.5, 0}).phi == -0.5);
+    CHECK(query(box, {10, 1.5, 0}).gradient == Vec3d(0, 1, 0));
+    CHECK(query(box, {11, 0, 0}).phi == 0);
+    CHECK(query(box, {11, 0, 0}).gradient == Vec3d(1, 0, 0));
 }
 
 TEST_CASE("shapes without a size are refused, with the value given", "[analytic]")
@@ -106,11 +106,11 @@ TEST_CASE("births on a shape are on it and uniform, and those in it are in it", 
 
     Vec3d sum_on = Vec3d::Zero(), sum_in = Vec3d::Zero(), normals = Vec3d::Zero();
     for (std::size_t i = 0; i < n; ++i) {
-        const Asked at = ask(shape, on[i].P.cast<double>());
+        const Answer at = query(shape, on[i].P.cast<double>());
         REQUIRE(std::abs(at.phi) < 1e-6);
         REQUIRE(on[i].N.norm() == Approx(1).epsilon(1e-6));
-        REQUIRE(ask(shape, (on[i].P + 0.01f * on[i].N).cast<double>()).phi == Approx(0.01).margin(1e-6));
-        REQUIRE(ask(shape, in[i].P.cast<double>()).phi < 1e-6);
+        REQUIRE(query(shape, (on[i].P + 0.01f * on[i].N).cast<double>()).phi == Approx(0.01).margin(1e-6));
+        REQUIRE(query(shape, in[i].P.cast<double>()).phi < 1e-6);
         sum_on += on[i].P.cast<double>();
         sum_in += in[i].P.cast<double>();
         normals += on[i].N.cast<double>();
@@ -158,7 +158,7 @@ TEST_CASE("the mesh of a shape lies on it", "[analytic]")
     REQUIRE(mesh);
     CHECK(mesh->openness().closed());
     CHECK(mesh->signed_volume() > 0);
-    for (const Vec3f& P : mesh->positions) CHECK(std::abs(ask(shape, P.cast<double>()).phi) < 1e-6);
+    for (const Vec3f& P : mesh->positions) CHECK(std::abs(query(shape, P.cast<double>()).phi) < 1e-6);
 }
 
 }  // namespace

@@ -150,9 +150,9 @@ TEST_CASE("the grid and the surface of a level set are made once, whoever asks",
 
 TEST_CASE("a level set whose grid could not be made is asked for it again", "[level set][baked]")
 {
-    int asked = 0;
+    int queries = 0;
     const auto grid = [&]() -> LevelSetGridPtr {
-        if (++asked < 3) throw std::bad_alloc();
+        if (++queries < 3) throw std::bad_alloc();
         return std::make_shared<const LevelSetGrid>();
     };
     const BakedLevelSet level_set(BakedGrid(), 0, {grid, {}});
@@ -161,7 +161,7 @@ TEST_CASE("a level set whose grid could not be made is asked for it again", "[le
     const LevelSetGridPtr made = level_set.grid();
     CHECK(made);
     CHECK(level_set.grid() == made);
-    CHECK(asked == 3);
+    CHECK(queries == 3);
 }
 
 }  // namespace rapid

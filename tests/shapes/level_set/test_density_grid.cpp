@@ -41,12 +41,12 @@ std::vector<Vec3f> births_in(const DensityGrid& grid, std::size_t n)
 {
     std::vector<Birthplace> out(n);
     grid.scatter()->place(RandomKey(1, "emit1"), 0, out);
-    std::vector<Vec3f> places;
+    std::vector<Vec3f> positions;
     for (const Birthplace& birth : out) {
         CHECK(birth.element == -1);
-        places.push_back(birth.P);
+        positions.push_back(birth.P);
     }
-    return places;
+    return positions;
 }
 
 }  // namespace

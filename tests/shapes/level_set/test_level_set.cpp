@@ -75,7 +75,7 @@ TEST_CASE("a level set sphere is off by at most voxel²/(4 radius) within its ba
         const double voxel = 0.1 / (1 << k);
         const auto sphere = level_set_sphere(radius, center, {voxel, 4.0 * (1 << k)});
         double worst_gradient = 0;
-        int asked = 0;
+        int queries = 0;
         for (const Vec3d& P : random_points(100'000, cube(1.5))) {
             const Vec3d from_center = P - center;
             const double exact = from_center.norm() - radius;
@@ -83,9 +83,9 @@ TEST_CASE("a level set sphere is off by at most voxel²/(4 radius) within its ba
             const auto [phi, gradient] = sample_at(*sphere, P);
             worst[k] = std::max(worst[k], std::abs(phi - exact));
             worst_gradient = std::max(worst_gradient, (gradient - from_center.normalized()).norm());
-            ++asked;
+            ++queries;
         }
-        CHECK(asked > 10'000);
+        CHECK(queries > 10'000);
         CHECK(worst[k] < voxel * voxel / (4 * (radius - 0.2 - voxel)) + 1e-6);
         CHECK(worst_gradient < std::numbers::sqrt3 * voxel / (radius - 0.2 - voxel));
     }
@@ -104,14 +104,14 @@ TEST_CASE("a level set box is exact to rounding along its faces, and round outsi
 TEST_CASE("a level set torus is the distance to its circle minus its tube", "[level set]")
 {
     const auto torus = level_set_torus(0.5, 0.2, Vec3d::Zero(), {0.01, 4});
-    int asked = 0;
+    int queries = 0;
     for (const Vec3d& P : random_points(50'000, cube(0.75))) {
         const double exact = std::hypot(std::hypot(P.x(), P.z()) - 0.5, P.y()) - 0.2;
         if (std::abs(exact) > 0.02) continue;
         REQUIRE(sample_at(*torus, P).phi == Approx(exact).margin(0.01 * 0.01 / 4 * (1 / 0.17 + 1 / 0.27)));
-        ++asked;
+        ++queries;
     }
-    CHECK(asked > 1000);
+    CHECK(queries > 1000);
 }
 
 TEST_CASE("beyond the band the distance is a bound of the right sign, without a gradient", "[level set]")
@@ -178,7 +178,7 @@ TEST_CASE("a level set from a mesh has the distance to the nearest triangle at e
     const auto torus = level_set_from_mesh(mesh, {voxel, 3}, warnings);
     CHECK(warnings.empty());
     double worst = 0;
-    int asked = 0;
+    int queries = 0;
     for (int i = -24; i <= 24; ++i)
         for (int j = -8; j <= 8; ++j)
             for (int k = -24; k <= 24; ++k) {
@@ -186,9 +186,9 @@ TEST_CASE("a level set from a mesh has the distance to the nearest triangle at e
                 const double exact = test::distance_to_all(*mesh, P);
                 if (exact > 2.5 * voxel) continue;
                 worst = std::max(worst, std::abs(std::abs(sample_at(*torus, P).phi) - exact));
-                ++asked;
+                ++queries;
             }
-    CHECK(asked > 2000);
+    CHECK(queries > 2000);
     CHECK(worst < 1e-3 * voxel);
 }
 

@@ -91,10 +91,10 @@ TEST_CASE("an offset ball is a ball with a radius larger or smaller by the offse
 {
     const double by = GENERATE(-0.5, -0.1, 0.02, 0.3, 1.0);
     CAPTURE(by);
-    const LevelSetPtr grown = offset_level_set(ball(1, {0.3, 0, 0}), by), wanted = ball(1 + by, {0.3, 0, 0});
+    const LevelSetPtr grown = offset_level_set(ball(1, {0.3, 0, 0}), by), expected = ball(1 + by, {0.3, 0, 0});
     // The two meshes have the same error, and the band of the grown one has the error of single precision.
-    CHECK(volume_of(grown) == Approx(volume_of(wanted)).epsilon(1e-5));
-    CHECK(area_of(grown) == Approx(area_of(wanted)).epsilon(1e-5));
+    CHECK(volume_of(grown) == Approx(volume_of(expected)).epsilon(1e-5));
+    CHECK(area_of(grown) == Approx(area_of(expected)).epsilon(1e-5));
     CHECK(volume_of(grown) == Approx(ball_volume(1 + by)).epsilon(1.2 * std::pow(0.04 / (1 + by), 2)));
     CHECK(distance(*grown, {0.3, 1 + by + 0.03, 0}) == Approx(0.03).margin(1e-3));
     CHECK(grown->band() == Approx(0.12));

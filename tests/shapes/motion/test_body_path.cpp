@@ -44,10 +44,10 @@ TEST_CASE("the spline of a uniform motion or acceleration is that motion, at one
     const bool before = GENERATE(true, false), after = GENERATE(true, false);
     CAPTURE(before, after);
     if (!before && !after && !a.isZero()) return;  // two positions give a straight line, whatever happens in between
-    const Cubic<Vec3d> way = through(curved(before, after), place, 7);
+    const Cubic<Vec3d> cubic = through(curved(before, after), place, 7);
     for (const double t : {0.0, 0.25, 0.7, 1.0}) {
-        CHECK_THAT(way.at(t), close_to(place(6 + t), 1e-13));
-        CHECK_THAT(way.derivative(t), close_to(Vec3d(v + (6 + t) * a), 1e-13));
+        CHECK_THAT(cubic.at(t), close_to(place(6 + t), 1e-13));
+        CHECK_THAT(cubic.derivative(t), close_to(Vec3d(v + (6 + t) * a), 1e-13));
     }
 }
 
@@ -57,14 +57,14 @@ TEST_CASE(
 {
     const auto errors = [](double angle) {
         const auto place = [&](double f) { return Vec3d(std::cos(angle * f), std::sin(angle * f), 0); };
-        const Cubic<Vec3d> way = through(curved(), place, 3);
+        const Cubic<Vec3d> cubic = through(curved(), place, 3);
         double worst = 0, middle = 0, speed = 0;
         for (int i = 0; i <= 100; ++i) {
             const double t = i / 100.0;
             const Vec3d tangent = angle * Vec3d(-place(2 + t).y(), place(2 + t).x(), 0);
-            worst = std::max(worst, (way.at(t) - place(2 + t)).norm());
-            speed = std::max(speed, (way.derivative(t) - tangent).norm() / angle);
-            if (i == 50) middle = (way.at(t) - place(2 + t)).norm();
+            worst = std::max(worst, (cubic.at(t) - place(2 + t)).norm());
+            speed = std::max(speed, (cubic.derivative(t) - tangent).norm() / angle);
+            if (i == 50) middle = (cubic.at(t) - place(2 + t)).norm();
         }
         return std::array{worst, middle, speed};
     };
@@ -80,9 +80,9 @@ TEST_CASE("the derivative is that of the curve", "[path]")
     rc::prop("by differences", [] {
         const auto coordinate = [] { return *rc::gen::inRange(-1000, 1000) / 100.0; };
         const auto place = [&] { return Vec3d(coordinate(), coordinate(), coordinate()); };
-        const Cubic<Vec3d> way = curved().through<Vec3d>(place(), place(), place(), place());
+        const Cubic<Vec3d> cubic = curved().through<Vec3d>(place(), place(), place(), place());
         const double t = *rc::gen::inRange(10, 990) / 1000.0, d = 1e-5;
-        RC_ASSERT(((way.at(t + d) - way.at(t - d)) / (2 * d) - way.derivative(t)).norm() < 1e-6);
+        RC_ASSERT(((cubic.at(t + d) - cubic.at(t - d)) / (2 * d) - cubic.derivative(t)).norm() < 1e-6);
     });
 }
 
@@ -100,10 +100,10 @@ TEST_CASE("a point at rest has the velocity 0 to the bit, whatever the ends", "[
     for (const FramePath& path :
          {curved(), curved(false), curved(true, false), curved(false, false), curved(true, true, 0.3),
           FramePath{FramePath::AfterCut, 0.5, true, true, {}}, FramePath{FramePath::Straight}}) {
-        const Cubic<Vec3d> way = path.through<Vec3d>(P, P, P, P);
+        const Cubic<Vec3d> cubic = path.through<Vec3d>(P, P, P, P);
         for (const double t : {0.0, 0.3, 1.0}) {
-            CHECK(way.at(t) == P);
-            CHECK(way.derivative(t) == Vec3d::Zero());
+            CHECK(cubic.at(t) == P);
+            CHECK(cubic.derivative(t) == Vec3d::Zero());
         }
     }
 }
@@ -149,10 +149,10 @@ TEST_CASE("after a jump the body has arrived straight along the path on which it
 {
     const FramePath path{FramePath::AfterCut, 0.5, true, true, std::nullopt};
     const Vec3d v(0.5, 0, 0);
-    const Cubic<Vec3d> way = path.through<Vec3d>({-9, 0, 0}, {-8.5, 0, 0}, {100, 1, 0}, Vec3d(100, 1, 0) + v);
-    CHECK_THAT(way.at(1), close_to(Vec3d(100, 1, 0), 1e-13));
-    CHECK_THAT(way.at(0.2), close_to(Vec3d(99.6, 1, 0), 1e-13));
-    CHECK_THAT(way.derivative(0.2), close_to(v, 1e-13));
+    const Cubic<Vec3d> cubic = path.through<Vec3d>({-9, 0, 0}, {-8.5, 0, 0}, {100, 1, 0}, Vec3d(100, 1, 0) + v);
+    CHECK_THAT(cubic.at(1), close_to(Vec3d(100, 1, 0), 1e-13));
+    CHECK_THAT(cubic.at(0.2), close_to(Vec3d(99.6, 1, 0), 1e-13));
+    CHECK_THAT(cubic.derivative(0.2), close_to(v, 1e-13));
 }
 
 TEST_CASE("a turning body carries births along arcs, and their normals turn with it", "[path]")
@@ -165,16 +165,16 @@ TEST_CASE("a turning body carries births along arcs, and their normals turn with
     const AnimatedShape shape(make_sphere_shape(1, {3, 0, 0}), motion);
     const FramePath path = path_of(shape, film_clock, 5, {});
     REQUIRE(path.kind == FramePath::Curved);
-    std::vector<Birthplace> places(3);
-    for (Birthplace& place : places) place.P = {4, 0, 0}, place.N = {1, 0, 0};
+    std::vector<Birthplace> birthplaces(3);
+    for (Birthplace& place : birthplaces) place.P = {4, 0, 0}, place.N = {1, 0, 0};
     std::vector<Vec3d> velocity(3);
     const std::vector<double> t{0, 0.5, 1};
-    rigid_path(*motion, film_clock, 5, path)->carry(t, true, places, velocity);
+    rigid_path(*motion, film_clock, 5, path)->carry(t, true, birthplaces, velocity);
     for (int i = 0; i < 3; ++i) {
         const double at = angle * (3 + t[i]);
         const Vec3d out(std::cos(at), std::sin(at), 0), along(-out.y(), out.x(), 0);
-        CHECK_THAT(places[i].P, close_to(Vec3f((8 * out).cast<float>()), 8 * angle * angle * angle / 20));
-        CHECK_THAT(places[i].N, close_to(Vec3f(out.cast<float>()), 1e-4));
+        CHECK_THAT(birthplaces[i].P, close_to(Vec3f((8 * out).cast<float>()), 8 * angle * angle * angle / 20));
+        CHECK_THAT(birthplaces[i].N, close_to(Vec3f(out.cast<float>()), 1e-4));
         CHECK_THAT(velocity[i], close_to(Vec3d(8 * angle * along), 8 * angle * angle * angle / 6));
     }
 }

@@ -28,10 +28,10 @@ Eigen::Quaterniond about(const Vec3d& axis, double angle)
 class Formula final : public Motion {
 public:
     explicit Formula(std::function<Pose(double time)> pose) : pose_(std::move(pose)) {}
-    Pose at(const Frame& frame) const override { return ++asked, pose_(frame.time); }
+    Pose at(const Frame& frame) const override { return ++queries, pose_(frame.time); }
     FrameRange range() const override { return {-INFINITY, INFINITY}; }
 
-    mutable int asked = 0;
+    mutable int queries = 0;
 
 private:
     std::function<Pose(double)> pose_;
@@ -156,10 +156,10 @@ TEST_CASE("a track of a falling, spinning body is one piece, and exact between i
     for (const double s : {0.0, 0.01, 0.031, 1.0 / 24}) {
         CAPTURE(s);
         const double t = 6.0 / 24 + s;
-        const Pose asked = motion.at({0, t, 0}), read = track.at(s);
-        CHECK_THAT(read.translation, close_to(asked.translation, 1e-12));
-        CHECK(angle_between(read.rotation, asked.rotation) < 1e-7);  // the square root of rounding
-        CHECK(read.scale == Approx(asked.scale).epsilon(1e-13));
+        const Pose queries = motion.at({0, t, 0}), read = track.at(s);
+        CHECK_THAT(read.translation, close_to(queries.translation, 1e-12));
+        CHECK(angle_between(read.rotation, queries.rotation) < 1e-7);  // the square root of rounding
+        CHECK(read.scale == Approx(queries.scale).epsilon(1e-13));
         const VelocityField field = track.velocity_at(s);
         CHECK_THAT(field.linear, close_to(Vec3d(v + t * g), 1e-9));
         CHECK_THAT(field.angular, close_to(spin, 1e-9));
@@ -181,9 +181,9 @@ TEST_CASE(
     const double way = std::min(12.0, 3 * speed / 24);  // two chords are at most two diameters
     for (int i = 0; i <= 100; ++i) {
         const double s = i / 100.0 / 24;
-        const Pose asked = orbit.at({0, 1.0 / 24 + s, 0});
-        CHECK_THAT(track.at(s).translation, close_to(asked.translation, 1.1e-5 * way));
-        const Vec3d x = asked * Vec3d(0.5, 0.2, 0.1);
+        const Pose queries = orbit.at({0, 1.0 / 24 + s, 0});
+        CHECK_THAT(track.at(s).translation, close_to(queries.translation, 1.1e-5 * way));
+        const Vec3d x = queries * Vec3d(0.5, 0.2, 0.1);
         CHECK_THAT(track.velocity_at(s).at(x), close_to(Vec3d(Vec3d(0, speed, 0).cross(x)), 0.005 * 4 * speed));
     }
 }
@@ -193,7 +193,7 @@ TEST_CASE("a motion that jumps is evaluated a bounded number of times", "[motion
     const Formula jump([](double t) { return Pose{{t < 1.02 ? 0.0 : 1e6, 0, 0}}; });
     const MotionTrack track(jump, clock_24, 25, 26);
     CHECK(track.pieces().size() <= 64);
-    CHECK(jump.asked <= 200);
+    CHECK(jump.queries <= 200);
     CHECK(track.at(0).translation.x() == 0);
     CHECK_THAT(track.at(1.0 / 24).translation, close_to(Vec3d(1e6, 0, 0), 1e-6));
 }
@@ -206,26 +206,26 @@ TEST_CASE("a placed shape has the distances and contacts of the shape built ther
     const ShapePtr moved = placed(make_sphere_shape(0.7, center), pose);
 
     const std::vector<Vec3d> P{{0, 0, 0}, {2, -1, 2.5}, {9, 9, 9}};
-    std::vector<double> phi(3), wanted(3);
-    std::vector<Vec3d> gradient(3), wanted_gradient(3);
+    std::vector<double> phi(3), expected(3);
+    std::vector<Vec3d> gradient(3), expected_gradient(3);
     moved->distance(P, phi, gradient);
-    there->distance(P, wanted, wanted_gradient);
+    there->distance(P, expected, expected_gradient);
     const std::vector<Path> paths{{{2, -1, 5}, {0.1, 0, -10}, {0, -9.81, 0}, 1, 0.05},
                                   {{2, 5, 0.5}, {0, 0, 0}, {0, -9.81, 0}, 2, 0},
                                   {{2, 5, 0.5}, {0, 9, 0}, {0, 0, 0}, 2, 0}};
-    std::vector<Contact> contacts(3), wanted_contacts(3);
+    std::vector<Contact> contacts(3), expected_contacts(3);
     moved->first_contact(paths, contacts);
-    there->first_contact(paths, wanted_contacts);
+    there->first_contact(paths, expected_contacts);
     for (int i = 0; i < 3; ++i) {
         CAPTURE(i);
-        CHECK(phi[i] == Approx(wanted[i]).epsilon(1e-12));
-        CHECK_THAT(gradient[i], close_to(wanted_gradient[i], 1e-12));
-        if (wanted_contacts[i].time == Contact::none)
+        CHECK(phi[i] == Approx(expected[i]).epsilon(1e-12));
+        CHECK_THAT(gradient[i], close_to(expected_gradient[i], 1e-12));
+        if (expected_contacts[i].time == Contact::none)
             CHECK(contacts[i].time == Contact::none);
         else
-            CHECK(contacts[i].time == Approx(wanted_contacts[i].time).epsilon(1e-9));
-        CHECK_THAT(contacts[i].n, close_to(wanted_contacts[i].n, 1e-9));
-        CHECK(contacts[i].curvature == Approx(wanted_contacts[i].curvature).margin(1e-5));
+            CHECK(contacts[i].time == Approx(expected_contacts[i].time).epsilon(1e-9));
+        CHECK_THAT(contacts[i].n, close_to(expected_contacts[i].n, 1e-9));
+        CHECK(contacts[i].curvature == Approx(expected_contacts[i].curvature).margin(1e-5));
     }
     for (int axis = 0; axis < 3; ++axis) {
         CHECK(moved->bounds().min()[axis] <= there->bounds().min()[axis] + 1e-12);

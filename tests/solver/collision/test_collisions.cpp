@@ -261,11 +261,11 @@ TEST_CASE("a point in a corner of three planes rests there", "[collide]")
 }
 
 // A plane that counts the paths for which it is queried.
-class AskedPlane final : public Shape {
+class QueriedPlane final : public Shape {
 public:
-    AskedPlane(const Vec3d& normal, double offset) : plane_(make_plane(normal, offset)) {}
+    QueriedPlane(const Vec3d& normal, double offset) : plane_(make_plane(normal, offset)) {}
 
-    mutable std::atomic<std::size_t> asked = 0;
+    mutable std::atomic<std::size_t> queries = 0;
 
     Box3d bounds() const override { return plane_->bounds(); }
     void distance(std::span<const Vec3d> P, std::span<double> phi, std::span<Vec3d> gradient) const override
@@ -274,7 +274,7 @@ public:
     }
     void first_contact(std::span<const Path> paths, std::span<Contact> contacts) const override
     {
-        asked += paths.size();
+        queries += paths.size();
         plane_->first_contact(paths, contacts);
     }
 
@@ -290,8 +290,8 @@ TEST_CASE("a point at the foot of a wall that it nears by rounding alone slides 
     CAPTURE(overhang, approach, speed, substeps);
     constexpr float friction = 0.25f, r = 0.0625f;
     Scene scene(points({{0, r, r}}).v({{speed, 0, -approach}}).set<float>("pscale", {r}));
-    const auto floor = std::make_shared<AskedPlane>(Vec3d(0, 1, 0), 0.0);
-    const auto wall = std::make_shared<AskedPlane>(Vec3d(0, -overhang, 1), 0.0);
+    const auto floor = std::make_shared<QueriedPlane>(Vec3d(0, 1, 0), 0.0);
+    const auto wall = std::make_shared<QueriedPlane>(Vec3d(0, -overhang, 1), 0.0);
     scene.gravity().collide(floor, 0, friction).collide(wall, 0, friction).substeps(substeps).run(24);
 
     CHECK_THAT(scene.P(), close_to(Vec3d(speed * speed / (2 * friction * g), r, r), 1e-6));
@@ -299,7 +299,7 @@ TEST_CASE("a point at the foot of a wall that it nears by rounding alone slides 
     CHECK(scene.v() == Vec3d(0, 0, 0));
     CHECK(scene.penetration_max < 1e-8);
     // One or two paths per substep, instead of alternating between floor and wall at each moment.
-    CHECK(floor->asked + wall->asked < 4u * 24u * static_cast<unsigned>(substeps));
+    CHECK(floor->queries + wall->queries < 4u * 24u * static_cast<unsigned>(substeps));
 }
 
 TEST_CASE("a point slides along a wall at the speed that it has along it", "[collide]")
@@ -427,12 +427,12 @@ TEST_CASE("a point on a curved floor swings as a pendulum, on the surface", "[co
     // T = 2π √(R/g) (1 + θ²/16 + 11 θ⁴/3072), to 1e-5 at 20 degrees
     const double period =
         2 * std::numbers::pi * std::sqrt(R / g) * (1 + amplitude * amplitude / 16 + 11 * std::pow(amplitude, 4) / 3072);
-    const int turns = 10, frames_a_turn = 48;
-    scene.frame_length(period / frames_a_turn);
-    for (int f = 1; f <= turns * frames_a_turn; ++f) {
+    const int turns = 10, frames_per_turn = 48;
+    scene.frame_length(period / frames_per_turn);
+    for (int f = 1; f <= turns * frames_per_turn; ++f) {
         scene.run(1);
         REQUIRE(scene.P().norm() == Approx(R).epsilon(1e-6));
-        if (f % frames_a_turn == 0) {
+        if (f % frames_per_turn == 0) {
             CAPTURE(f);
             CHECK_THAT(scene.P(), close_to(Vec3d(std::sin(amplitude), -std::cos(amplitude), 0), 0.01));
         }

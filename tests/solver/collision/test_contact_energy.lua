@@ -89,9 +89,9 @@ describe("the energy that contacts add and take", function()
       local moves = number % 2 == 0
       local text = random_scene(moves, (":spring { stiffness = %g, target = {0, 0.4, 0} }"):format(stiffness), false)
       local gained, added, taken, size, first = energies(text, stiffness, vec3(0, 0.4, 0))
-      local told = ("gained %g J, told %g - %g J, at most %g J:\n%s"):format(gained, added, taken, size, text)
-      assert.truthy(math.abs(gained - (added - taken)) < rounding * size, told)
-      assert.truthy(added < (moves and 2 or 1e-6) * first, told)
+      local reported = ("gained %g J, told %g - %g J, at most %g J:\n%s"):format(gained, added, taken, size, text)
+      assert.truthy(math.abs(gained - (added - taken)) < rounding * size, reported)
+      assert.truthy(added < (moves and 2 or 1e-6) * first, reported)
     end
   end)
 
@@ -104,11 +104,12 @@ describe("the energy that contacts add and take", function()
           local text = random_scene(moves, kind.forces, couples)
           local gained, added, taken, size = energies(text, kind.stiffness or 0)
           local off = (gained - (added - taken)) / size
-          local told = ("gained %g J, told %g - %g J, at most %g J in motion:\n%s"):format(gained, added, taken, size,
+          local reported =
+            ("gained %g J, told %g - %g J, at most %g J in motion:\n%s"):format(gained, added, taken, size,
             text)
-          assert.truthy(off < rounding and off > -rounding - kind.takes, told)
+          assert.truthy(off < rounding and off > -rounding - kind.takes, reported)
           -- Shapes at rest add nothing to single points.
-          if not moves and not couples then assert.truthy(added < 1e-6 * size, told) end
+          if not moves and not couples then assert.truthy(added < 1e-6 * size, reported) end
         end
       end)
     end

@@ -65,9 +65,9 @@ TEST_CASE("points that may come near another shape after their contact are left 
     add(batch, {0, 0, 0}, {1, 0, 0});   // to x = 0.2
     add(batch, {0, 10, 0}, {1, 0, 0});  // misses, regardless of other shapes
     batch.solve(floor_plane);
-    batch.leave_out_near({Vec3d(0.5, -1, -1), Vec3d(1, 1, 1)}, 0.25);
+    batch.mark_undecided_near({Vec3d(0.5, -1, -1), Vec3d(1, 1, 1)}, 0.25);
     CHECK(batch.outcome(0) == PlaneBatch::Slides);
-    batch.leave_out_near({Vec3d(0.5, -1, -1), Vec3d(1, 1, 1)}, 0.375);
+    batch.mark_undecided_near({Vec3d(0.5, -1, -1), Vec3d(1, 1, 1)}, 0.375);
     CHECK(batch.outcome(0) == PlaneBatch::Undecided);
     CHECK(batch.outcome(1) == PlaneBatch::Misses);
 }

@@ -81,13 +81,13 @@ TEST_CASE("no pair has more energy than before, but for what is told, and each k
         for (std::size_t i = 0; i < pairs.v.size(); i += 2)
             before.push_back(pairs.energy(i)), momentum.push_back(pairs.momentum(i));
         pairs.push(3, *rc::gen::elementOf(std::vector<double>{0, 1e-3, 1}));
-        const double told = pairs.close(bound).added;
+        const double reported = pairs.close(bound).added;
         double gained = 0;
         for (std::size_t i = 0; i < pairs.v.size(); i += 2) {
             gained += std::max(0.0, pairs.energy(i) - before[i / 2]);
             RC_ASSERT((pairs.momentum(i) - momentum[i / 2]).norm() <= 1e-9 * (1 + momentum[i / 2].norm() + 3));
         }
-        RC_ASSERT(gained <= told + 1e-9 * (1 + told));
+        RC_ASSERT(gained <= reported + 1e-9 * (1 + reported));
     });
 }
 
@@ -99,10 +99,10 @@ TEST_CASE("a change that takes energy stays as it is, and is told", "[energy_bou
     const double before = pairs.energy(0);
     const Vec3d mean = pairs.momentum(0) / (1 / pairs.inverse_mass[0] + 1 / pairs.inverse_mass[1]);
     pairs.v[0] = pairs.v[1] = mean;
-    const ContactEnergy told = pairs.close(bound);
+    const ContactEnergy reported = pairs.close(bound);
     CHECK(pairs.v[0] == mean);
-    CHECK(told.added == 0);
-    CHECK(told.lost == Approx(before - pairs.energy(0)));
+    CHECK(reported.added == 0);
+    CHECK(reported.lost == Approx(before - pairs.energy(0)));
 }
 
 TEST_CASE("a pair that corrections of positions lift out of all proportion moves as a rigid body", "[energy_bound]")
@@ -116,10 +116,10 @@ TEST_CASE("a pair that corrections of positions lift out of all proportion moves
     const double before = pairs.energy(0), length = (pairs.start[0] - pairs.start[1]).norm();
     const Vec3d momentum = pairs.momentum(0), other = pairs.points[2].P;
     for (int i : {0, 1}) pairs.points[i].P += Vec3d(0, 1e6, 0);
-    const ContactEnergy told = pairs.close(bound, &fallback);
+    const ContactEnergy reported = pairs.close(bound, &fallback);
     REQUIRE(bound.stalled().size() == 4);
     CHECK((bound.stalled()[0] && bound.stalled()[1] && !bound.stalled()[2] && !bound.stalled()[3]));
-    CHECK(told.added == 0);
+    CHECK(reported.added == 0);
     CHECK(pairs.energy(0) <= before + 1e-12 * std::abs(before));
     CHECK((pairs.momentum(0) - momentum).norm() <= 1e-12 * momentum.norm());
     CHECK((pairs.points[0].P - pairs.points[1].P).norm() == Approx(length));
@@ -148,9 +148,9 @@ TEST_CASE("a pair that corrections of positions move farther off what a spring d
     RigidFallback fallback;
     fallback.begin(pairs.step);
     pairs.points[0].P.y() += (std::sqrt(1.8) - 1) * 0.1;
-    const ContactEnergy told = pairs.close(bound, &fallback);
+    const ContactEnergy reported = pairs.close(bound, &fallback);
     REQUIRE(bound.stalled().size() == 2);
-    CHECK(told.added <= 1e-12);
+    CHECK(reported.added <= 1e-12);
     for (std::size_t i : {0, 1}) CHECK(pairs.points[i].P == pairs.start[i]);
 }
 

@@ -47,12 +47,12 @@ struct Spheres {
 void check_estimate(Spheres spheres, double factor)
 {
     spheres.sort_into_grids();
-    const double pairs = spheres.pairs(), told = estimate_pairs(spheres.grids, spheres.view());
-    CAPTURE(pairs, told);
+    const double pairs = spheres.pairs(), reported = estimate_pairs(spheres.grids, spheres.view());
+    CAPTURE(pairs, reported);
     CHECK(pairs > 1000);
-    CHECK(told < factor * pairs);
-    CHECK(told > pairs / factor);
-    CHECK(most_pairs(spheres.grids) >= pairs);
+    CHECK(reported < factor * pairs);
+    CHECK(reported > pairs / factor);
+    CHECK(max_pairs(spheres.grids) >= pairs);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ struct Body {
         for (std::size_t i = 0; i < values.size(); ++i) sum += mass(i) * values[i], all_mass += mass(i);
         return sum / all_mass;
     }
-    std::vector<Vec3d> places() const
+    std::vector<Vec3d> positions() const
     {
         std::vector<Vec3d> P;
         for (const ProjectedPoint& point : points) P.push_back(point.P);
@@ -81,13 +81,13 @@ TEST_CASE("a rigid fallback keeps distances and momenta, and gives no energy", "
         Body body(seed, 2 + seed % 6, line);
         RigidFallback fallback;
         fallback.begin(body.step);
-        const std::vector<Vec3d> start = body.start, free = body.places();
+        const std::vector<Vec3d> start = body.start, free = body.positions();
         const Vec3d velocity = body.mean(body.v), turning = body.turning(start);
         const double before = body.kinetic();
         for (ProjectedPoint& point : body.points) point.P += 1e3 * body.any();
         for (Vec3d& v : body.v) v = 1e3 * body.any();
         fallback.apply(body.step, body.all, nullptr);
-        const std::vector<Vec3d> P = body.places();
+        const std::vector<Vec3d> P = body.positions();
         for (const std::uint32_t i : body.all)
             for (const std::uint32_t j : body.all)
                 RC_ASSERT(std::abs((P[i] - P[j]).norm() - (start[i] - start[j]).norm()) <= 1e-12);
@@ -125,7 +125,7 @@ TEST_CASE("what is linked to a point at rest, or drawn to a place, stays where i
     const std::vector<Vec3d> start = body.start;
     const Drive at_rest;
     fallback.apply(body.step, body.all, drawn ? nullptr : &at_rest);
-    CHECK(body.places() == start);
+    CHECK(body.positions() == start);
     CHECK(body.kinetic() == 0);
 }
 
@@ -153,7 +153,7 @@ TEST_CASE("a body without a solution goes along with the surfaces that draw it, 
     give_up(body);
     const Vec3d by = both ? Vec3d(0.75 * V) : V;
     for (const std::uint32_t i : body.all) {
-        CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.1 * by), 1e-12));
+        CHECK_THAT(body.positions()[i], test::close_to(Vec3d(start[i] + 0.1 * by), 1e-12));
         CHECK_THAT(body.v[i], test::close_to(by, 1e-12));
     }
 }
@@ -180,7 +180,7 @@ TEST_CASE("a body without a solution goes as a surface that accelerates and draw
     const std::vector<Vec3d> start = body.start;
     give_up(body);
     for (const std::uint32_t i : body.all) {
-        CHECK_THAT(body.places()[i], test::close_to(Vec3d(start[i] + 0.5 * (0.25 - 0.16) * a), 1e-6));
+        CHECK_THAT(body.positions()[i], test::close_to(Vec3d(start[i] + 0.5 * (0.25 - 0.16) * a), 1e-6));
         CHECK_THAT(body.v[i], test::close_to(Vec3d(0.5 * a), 1e-6));
     }
 }
@@ -194,7 +194,7 @@ TEST_CASE("a body without a solution goes along with what drives it", "[rigid_fa
     const Drive by{{1, 2, 3}, {0.1, 0, -0.2}};
     fallback.apply(body.step, body.all, &by);
     for (const std::uint32_t i : body.all) {
-        CHECK(body.places()[i] == start[i] + by.way);
+        CHECK(body.positions()[i] == start[i] + by.displacement);
         CHECK(body.v[i] == by.v);
     }
 }

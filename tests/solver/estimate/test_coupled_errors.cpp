@@ -118,7 +118,7 @@ TEST_CASE("changes by nodes, births and deaths are those of the shadows, too", "
 TEST_CASE("of too many points the errors of the frames 1, 2, 4, 8, ... and 40 are told", "[coupled errors]")
 {
     CoupledErrors errors;
-    Pile pile(CoupledErrors::most_points + 1, 2);
+    Pile pile(CoupledErrors::max_points + 1, 2);
     for (int f = 0; f < 42; ++f) {
         const bool is_due = f < 2 || f == 3 || f == 7 || f == 15 || f == 31 || f == 39;
         const CoupledErrors::Errors found = errors_of_frame(errors, pile.scene);
@@ -126,7 +126,7 @@ TEST_CASE("of too many points the errors of the frames 1, 2, 4, 8, ... and 40 ar
         CHECK_THAT(found.unknown, Catch::Contains("more than 1,000 points act on one another"));
         REQUIRE(found.of_frame.size() == (is_due ? pile.scene.points.size() : 0));
         if (f > 0) continue;
-        Pile other(CoupledErrors::most_points + 1, 4);
+        Pile other(CoupledErrors::max_points + 1, 4);
         CHECK(found.of_frame == twice_the_distances(pile.scene, other.scene.run(1)));
     }
 }
@@ -134,7 +134,7 @@ TEST_CASE("of too many points the errors of the frames 1, 2, 4, 8, ... and 40 ar
 TEST_CASE("the error of one frame is that of all of its sub-frames", "[coupled errors]")
 {
     CoupledErrors errors;
-    Pile pile(CoupledErrors::most_points + 1, 1), fine(CoupledErrors::most_points + 1, 2);
+    Pile pile(CoupledErrors::max_points + 1, 1), fine(CoupledErrors::max_points + 1, 2);
     for (int step = 0; step < 9; ++step) {
         pile.scene.options.begins_frame = step % 3 == 0;  // the third frame is not due
         const CoupledErrors::Errors found = errors_of_frame(errors, pile.scene);

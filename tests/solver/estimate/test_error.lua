@@ -58,15 +58,15 @@ describe("the p95 error of a run since birth is within a factor of four of the t
         local reference = right:by_id(points[i].id)
         if reference then off[#off + 1] = (points[i].P - reference.P):length() end
       end
-      local true_error, told = p95(off), estimated(text:format(substeps))
-      assert.truthy(told < 4 * true_error and told > true_error / 4,
-        ("it is told as %g m, and is %g m"):format(told, true_error))
+      local true_error, reported = p95(off), estimated(text:format(substeps))
+      assert.truthy(reported < 4 * true_error and reported > true_error / 4,
+        ("it is told as %g m, and is %g m"):format(reported, true_error))
     end)
   end
 end)
 
 describe("the drift of the energy of motion", function()
-  local function told(text)
+  local function reported(text)
     local folder = command.folder()
     folder:write("scene.lua", "local rapid = require 'rapid'\n" .. text)
     local ran = command.rapid(("run scene.lua -f 1-%d --stats stats.json"):format(last), { cwd = folder.path })
@@ -95,7 +95,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { s
       mean, most = mean + drift / 50, math.max(most, math.abs(drift))
     end
     assert.truthy(most > 1e-3)
-    local drift, summary = told(text)
+    local drift, summary = reported(text)
     assert.near(mean, drift.mean, 1e-5)
     assert.near(most, drift.max, 1e-5)
     assert.match("energy   of motion, collisions aside: [+-]%d", summary)
@@ -104,18 +104,18 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :attract { s
   it("is none where a closed form moves points, and rounding where they bounce besides, or swing", function()
     local points = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.25, "
       .. "center = {0, 2, 0} } } "
-    assert.same({ mean = 0, max = 0 }, told(points .. ":gravity {} :solve {}"))
+    assert.same({ mean = 0, max = 0 }, reported(points .. ":gravity {} :solve {}"))
     for _, chain in ipairs {
       ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve {}", -- which removes half of 20 J/kg
       ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0.7 } :solve { tolerance = 1e-3 }",
       ":spring { stiffness = 1000 } :solve {}",
     } do
-      assert.truthy(told(points .. chain).max < 2e-3, chain) -- of up to 3 kJ/kg, in single precision
+      assert.truthy(reported(points .. chain).max < 2e-3, chain) -- of up to 3 kJ/kg, in single precision
     end
   end)
 
   it("is of those that are born in the run, too, and of each no longer than it lives", function()
-    local drift = told([[
+    local drift = reported([[
 return rapid.create { seed = 3 } :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 3000, life = 0.2 }
   :attract { strength = 6, core = 0.5 } :solve { substeps = 4 }]])
     assert.truthy(drift.max > 1e-6 and drift.max < 1e-2, drift.max)
@@ -125,7 +125,8 @@ return rapid.create { seed = 3 } :emit { source = rapid.mesh.sphere { radius = 1
     for _, node in ipairs { ":drag { linear = 1 }", ":spring { damping = 1 }", ":turbulence {}", ":wind {}",
       ':action("a", function(p, step) p.v = p.v * 0.9 end)', ":interact { radius = 2, drag = 1 }",
       ':points("b", function(p) p.force = vec3(1, 0, 0) end)' } do
-      local drift, summary = told("return rapid.create { points = rapid.points.from { P = {{1, 0, 0}, {1, 1, 0}} } } "
+      local drift, summary =
+        reported("return rapid.create { points = rapid.points.from { P = {{1, 0, 0}, {1, 1, 0}} } } "
         .. node .. " :solve {}")
       assert.is_nil(drift, node)
       assert.falsy(summary:find "of motion", node)
@@ -186,18 +187,19 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {}
       local due = n == 1 or n == 2 or n == 4 or n == 8 or n == 16 or n == 32 or n == 40
       assert.equal(due, frame.frame_error ~= nil, frame.frame)
     end
-    local told = json.decode(scene.folder:read "stats.json").frames[2].frame_error.position_p95
+    local reported = json.decode(scene.folder:read "stats.json").frames[2].frame_error.position_p95
     local found, truth = scene.run(text:format(4), { frames = {2, 2} })[2],
       scene.run(text:format(256), { frames = {2, 2} })[2]
     local off = {}
     for i = 1, #found do off[i] = (found[i].P - truth[i].P):length() end
     local real = p95(off)
-    assert.truthy(told < 4 * real and told > real / 4, ("it is told as %g m, and is %g m"):format(told, real))
+    assert.truthy(reported < 4 * real and reported > real / 4,
+      ("it is told as %g m, and is %g m"):format(reported, real))
   end)
 end)
 
 describe("what is left out of the error is told:", function()
-  local function told(nodes, arguments)
+  local function reported(nodes, arguments)
     local run = scene.command("run", "return rapid.create { points = two } " .. nodes, arguments or "-f 1-4")
     assert.equal(0, run.status, run.stderr)
     return run.stdout
@@ -205,17 +207,17 @@ describe("what is left out of the error is told:", function()
 
   it("functions of the frame that are held through it", function()
     local nodes = ":collide { name = 'wall', shape = rapid.shape.plane {}, response = %s } :solve {}"
-    local text = told(nodes:format "function(f) return f.time > 1 and 'slide' or 'bounce' end")
+    local text = reported(nodes:format "function(f) return f.time > 1 and 'slide' or 'bounce' end")
     assert.match("\nleft out of the error: wall.response, a function of the frame that is called once in each\n", text)
     for _, in_it in ipairs { ":wind { velocity = function(f) return {f.time, 0, 0} end }",
       ":interact { radius = 2, separation = function(f) return f.time end }",
       ":contact { radius = 0.6, friction = function(f) return f.time end }" } do
-      assert.falsy(told(in_it .. " :solve {}"):find("left out", 1, true), in_it)
+      assert.falsy(reported(in_it .. " :solve {}"):find("left out", 1, true), in_it)
     end
   end)
 
   it("kicks among neighbours that are at the ends of frames", function()
-    local text = told ":interact { name = 'flock', radius = 2, separation = 5 } :solve { tolerance = 1e-3 }"
+    local text = reported ":interact { name = 'flock', radius = 2, separation = 5 } :solve { tolerance = 1e-3 }"
     assert.match("\nleft out of the error: flock, whose kicks with a tolerance are at the ends of frames\n", text)
   end)
 
@@ -224,7 +226,7 @@ describe("what is left out of the error is told:", function()
     for _, nodes in ipairs { ":gravity {} :solve {}",
       ":gravity {} :collide { shape = rapid.shape.plane {}, transform = " .. moving .. " } :solve {}",
       ":gravity {} :contact { radius = 0.1 } :solve {}" } do
-      assert.falsy(told(nodes):find("left out", 1, true), nodes)
+      assert.falsy(reported(nodes):find("left out", 1, true), nodes)
     end
   end)
 end)

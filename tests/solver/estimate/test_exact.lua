@@ -110,7 +110,7 @@ end
 
 describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
   it("whose drags and springs are told to be treated exactly are where a closed form has them", function()
-    local told, faults = 0, {}
+    local reported, faults = 0, {}
     for number = 1, scenes do
       draw.start(seed, number)
       local points = some_points(magnitude(-1, 1))
@@ -119,7 +119,7 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
       local check = scene.command("check", source)
       assert.equal(0, check.status, check.stderr)
       assert.falsy(check.stdout:find("solved in closed form, with", 1, true), source)
-      if check.stdout:find("treated exactly", 1, true) then told = told + 1 end
+      if check.stdout:find("treated exactly", 1, true) then reported = reported + 1 end
       local set = scene.run(source, { frames = {1 + frames, 1 + frames} })[1 + frames]
       for i, p in ipairs(points) do
         local D = p.k * p.k / 4 - p.w2
@@ -138,7 +138,7 @@ describe(("random scenes (%d of seed %d)"):format(scenes, seed), function()
       end
     end
     assert.equal("", table.concat(faults, "\n"))
-    assert.truthy(told > scenes / 3, told)
+    assert.truthy(reported > scenes / 3, reported)
   end)
 
   -- Returns a unit vector, and single-precision components of its direction.

@@ -17,24 +17,26 @@ describe("rounding of positions", function()
     for _, speed in ipairs { 1e-4, 7e-4, 0.01, 0.03 } do
       for _, at in ipairs { 1000, -1000, 5000 } do
         local frames = 241
-        local points, told = run(("P = {{%g, 0, 0}}, v = {{%g, 0, 0}}"):format(at, speed), "", frames)
+        local points, reported = run(("P = {{%g, 0, 0}}, v = {{%g, 0, 0}}"):format(at, speed), "", frames)
         local off = math.abs(points[1].P.x - at - speed * (frames - 1) / 24)
-        assert.truthy(told >= 0.99 * off, ("%g m/s at %g m: off by %g m, told %g m"):format(speed, at, off, told))
-        assert.truthy(told <= off + 1e-3, ("%g m/s at %g m: off by %g m, told %g m"):format(speed, at, off, told))
+        assert.truthy(reported >= 0.99 * off,
+          ("%g m/s at %g m: off by %g m, told %g m"):format(speed, at, off, reported))
+        assert.truthy(reported <= off + 1e-3,
+          ("%g m/s at %g m: off by %g m, told %g m"):format(speed, at, off, reported))
       end
     end
   end)
 
   it("is told where shapes are met early, far from the origin", function()
     local nodes = ":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 0 }"
-    local points, told = run("P = {{1e6, 3, 0}}", nodes, 48)
-    assert.truthy(math.abs(points[1].P.y) <= told)
-    assert.truthy(told >= 0.2 and told <= 2, told)
+    local points, reported = run("P = {{1e6, 3, 0}}", nodes, 48)
+    assert.truthy(math.abs(points[1].P.y) <= reported)
+    assert.truthy(reported >= 0.2 and reported <= 2, reported)
   end)
 
   it("is told of coupled points, and small near the origin", function()
-    local _, told = run("P = {{0, 1, 0}, {0.1, 1, 0}}", ":gravity {} :contact { radius = 0.05 }", 24)
-    assert.truthy(told > 0 and told < 1e-5, told)
+    local _, reported = run("P = {{0, 1, 0}, {0.1, 1, 0}}", ":gravity {} :contact { radius = 0.05 }", 24)
+    assert.truthy(reported > 0 and reported < 1e-5, reported)
   end)
 
   it("is noted by check where the scene is so large that it matters", function()

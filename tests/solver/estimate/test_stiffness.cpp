@@ -79,18 +79,18 @@ TEST_CASE("an attraction is reported by its omega dt, with the errors of a frame
     CHECK(found[0].node == "push1");
     CHECK(found[0].kind == Stiffness::Oscillation);
     CHECK(found[0].step == Approx(1.9).epsilon(1e-6));
-    REQUIRE(found[0].cure);
-    CHECK(found[0].cure->substeps == 8);  // the first halving of 1.9 that falls below 1/4
+    REQUIRE(found[0].improvement);
+    CHECK(found[0].improvement->substeps == 8);  // the first halving of 1.9 that falls below 1/4
 
     const Vec3d right(std::cos(omega * h), 0, 0.5 / omega * std::sin(omega * h));
     for (const auto& [substeps, error] :
-         {std::pair(1, found[0].cure->error), std::pair(8, found[0].cure->error_then)}) {
+         {std::pair(1, found[0].improvement->error), std::pair(8, found[0].improvement->error_after)}) {
         const Vec3d P = pulled_by(omega).substeps(substeps).run(1).P();
         CHECK(error == Approx((P - right).norm()).epsilon(0.05));
     }
     CHECK_THAT(text_of(found[0]), Equals(fmt::format("push1: omega dt = 1.9 at 1 sub-step; estimated error {:.1g} m; 8 "
                                                      "sub-steps would give {:.1g} m",
-                                                     found[0].cure->error, found[0].cure->error_then)));
+                                                     found[0].improvement->error, found[0].improvement->error_after)));
 }
 
 TEST_CASE("an orbit is reported by its angle per sub-step, of the nearest point", "[stiffness]")

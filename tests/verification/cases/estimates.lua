@@ -247,7 +247,7 @@ return from { P = grid(6, 6, 6, 0.2, {0, 0.5, 0}) } :gravity {} :turbulence { am
 }
 
 -- Returns the error of a list in the form in which it is reported, m.
-local function told_of(errors)
+local function reported_as(errors)
   table.sort(errors)
   return errors[#errors > 20 and math.floor(0.95 * (#errors - 1)) + 1 or #errors]
 end
@@ -262,10 +262,10 @@ local function distances(a, b)
 end
 
 -- doubt: distance between two references, m; the finer one is the truth.
-local function ratio(told, real, doubt)
+local function ratio(reported, real, doubt)
   assert(3 * doubt <= real, ("no truth: two references are %g m apart, the error is %g m")
     :format(doubt, real))
-  return told / real
+  return reported / real
 end
 
 local function told_by_true(substeps, last, text)
@@ -278,7 +278,7 @@ local function told_by_true(substeps, last, text)
   local frames = json.decode(scene.folder:read "stats.json").frames
   local error = assert(frames[#frames].error, "no error is told")
   return ratio(#truth > 20 and error.position_p95 or error.position_max,
-    told_of(distances(found, truth)), told_of(distances(near, truth)))
+    reported_as(distances(found, truth)), reported_as(distances(near, truth)))
 end
 
 -- Does the same for the 40th frame of a column, which has too many points for more frames. The reference starts with
@@ -292,7 +292,7 @@ return from %s :gravity {} :collide(floor) :contact { radius = 0.05, friction = 
   local column = "{ P = grid(7, 30, 7, 0.105, {0, 0.06, 0}) }"
   local ran = scene.command("run", text(column, 12), "-f 1-41 --quiet --stats stats.json")
   assert(ran.status == 0, ran.stderr)
-  local told = json.decode(scene.folder:read "stats.json").frames[41].frame_error.position_p95
+  local reported = json.decode(scene.folder:read "stats.json").frames[41].frame_error.position_p95
 
   local run, set = scene.run(text(column, 12), { frames = {40, 41} }), {}
   for _, name in ipairs { "P", "v" } do
@@ -306,7 +306,7 @@ return from %s :gravity {} :collide(floor) :contact { radius = 0.05, friction = 
   local begun = "{ " .. table.concat(set, ", ") .. " }"
   local near = scene.run(text(begun, 32 * 12), { frames = {2, 2} })[2]
   local truth = scene.run(text(begun, 128 * 12), { frames = {2, 2} })[2]
-  return ratio(told, told_of(distances(run[41], truth)), told_of(distances(near, truth)))
+  return ratio(reported, reported_as(distances(run[41], truth)), reported_as(distances(near, truth)))
 end
 
 local rows = {}

@@ -32,11 +32,11 @@ local function start(speed)
 end
 
 local function list(values)
-  local texts = {}
+  local strings = {}
   for i, x in ipairs(values) do
-    texts[i] = type(x) == "table" and ("{%.9g, %.9g, %.9g}"):format(unpack(x)) or ("%.9g"):format(x)
+    strings[i] = type(x) == "table" and ("{%.9g, %.9g, %.9g}"):format(unpack(x)) or ("%.9g"):format(x)
   end
-  return "{" .. table.concat(texts, ", ") .. "}"
+  return "{" .. table.concat(strings, ", ") .. "}"
 end
 
 local function run(P, v, mass, bounce, last)

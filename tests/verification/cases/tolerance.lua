@@ -74,8 +74,8 @@ local function parts(nodes, tolerance)
   end
   local run = scene.command("run", text(given), "-f 1-2 --quiet --stats stats.json")
   assert(run.status == 0, run.stderr)
-  local told = json.decode(scene.folder:read "stats.json").frames[2].beyond_tolerance
-  return math.max(0, beyond - told) / #truth, told / #truth
+  local reported = json.decode(scene.folder:read "stats.json").frames[2].beyond_tolerance
+  return math.max(0, beyond - reported) / #truth, reported / #truth
 end
 
 local rows = {}
@@ -86,8 +86,8 @@ for i, one in ipairs(scenes) do
     law = ("tolerance %g mm, %s: part of the points beyond it, %s"):format(1000 * tolerance, name,
       is_seen and "told or not" or "and not told"),
     measure = function()
-      local untold, told = parts(nodes, tolerance)
-      return is_seen and untold + told or untold
+      local unreported, reported = parts(nodes, tolerance)
+      return is_seen and unreported + reported or unreported
     end,
   }
 end

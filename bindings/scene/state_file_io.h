@@ -15,7 +15,7 @@ namespace rapid {
 
 // Applies f to a file. Errors are rethrown with the file's name.
 template <class F>
-auto of_file(const std::string& path, const F& f) -> Result<decltype(f())>
+auto with_file_name(const std::string& path, const F& f) -> Result<decltype(f())>
 {
     try {
         try {
@@ -44,13 +44,13 @@ inline void require_key(const CheckedJson& header, const std::string& key)
 }
 
 template <class T>
-void write_kept(const std::string& path, const char* what, const std::string& key, const T& value)
+void write_state_file(const std::string& path, const char* what, const std::string& key, const T& value)
 {
     write_state(path, {{"what", what}, {"key", key}, {"build", RAPID_ABI}}, state_of(value));
 }
 
 template <class T>
-T read_kept(const std::string& path, const char* what, const std::string& key)
+T read_state_file(const std::string& path, const char* what, const std::string& key)
 {
     const StateFile file(path);
     const CheckedJson& header = file.header();

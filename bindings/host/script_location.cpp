@@ -1,4 +1,4 @@
-#include "bindings/host/script_place.h"
+#include "bindings/host/script_location.h"
 
 #include <lua.hpp>
 #include <utility>
@@ -20,7 +20,7 @@ Location where(const State& state)
     return state.tail_call;
 }
 
-Location place_of_function(lua_State* L, int index)
+Location location_of_function(lua_State* L, int index)
 {
     lua_Debug info;
     lua_pushvalue(L, index);
@@ -32,9 +32,9 @@ int run_body(lua_State* L)
 {
     State& state = State::of(L);
     struct Ending {
-        Location& place;
+        Location& location;
         Location before;
-        ~Ending() { place = before; }
+        ~Ending() { location = before; }
     } const ending{state.tail_call,
                    std::exchange(state.tail_call, {lua_tostring(L, 2), static_cast<int>(lua_tointeger(L, 3))})};
     lua_remove(L, 3);

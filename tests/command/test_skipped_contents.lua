@@ -74,7 +74,7 @@ def Points "a"
     local shown = command.rapid("info one.ply", { cwd = scene.folder.path })
     assert.matches('left out    its 1 elements "face"', shown.stdout, 1, true)
     local json = require "dkjson"
-    local told = json.decode(command.rapid("info one.ply --json", { cwd = scene.folder.path }).stdout)
-    assert.same({ 'its 1 elements "face"' }, told.left_out)
+    local reported = json.decode(command.rapid("info one.ply --json", { cwd = scene.folder.path }).stdout)
+    assert.same({ 'its 1 elements "face"' }, reported.left_out)
   end)
 end)

@@ -1,4 +1,4 @@
-#include "runtime/operators/goal/free_places.h"
+#include "runtime/operators/goal/free_positions.h"
 
 #include <limits>
 #include <random>
@@ -9,13 +9,14 @@ using namespace rapid;
 
 namespace {
 
-std::vector<Vec3d> random_places(std::size_t n, unsigned seed)
+std::vector<Vec3d> random_positions(std::size_t n, unsigned seed)
 {
     std::mt19937 random(seed);
     std::uniform_int_distribution<int> coordinate(-9, 9);  // creates many ties
-    std::vector<Vec3d> places;
-    for (std::size_t k = 0; k < n; ++k) places.emplace_back(coordinate(random), coordinate(random), coordinate(random));
-    return places;
+    std::vector<Vec3d> positions;
+    for (std::size_t k = 0; k < n; ++k)
+        positions.emplace_back(coordinate(random), coordinate(random), coordinate(random));
+    return positions;
 }
 
 }  // namespace
@@ -24,24 +25,24 @@ TEST_CASE("places are taken as a search of all would: the nearest of those with 
 {
     const std::size_t n = GENERATE(1, 2, 7, 100, 513);
     CAPTURE(n);
-    const std::vector<Vec3d> places = random_places(n, 1), seekers = random_places(3 * n + 5, 2);
-    std::vector<std::uint32_t> takers(n);
-    for (std::size_t k = 0; k < n; ++k) takers[k] = k % 3;
-    FreePlaces free(places, takers);
+    const std::vector<Vec3d> positions = random_positions(n, 1), seekers = random_positions(3 * n + 5, 2);
+    std::vector<std::uint32_t> occupancy(n);
+    for (std::size_t k = 0; k < n; ++k) occupancy[k] = k % 3;
+    FreePositions free(positions, occupancy);
     for (const Vec3d& P : seekers) {
         std::size_t best = n;
         for (std::size_t k = 0; k < n; ++k) {
-            if (takers[k] != *std::min_element(takers.begin(), takers.end())) continue;
-            if (best == n || (places[k] - P).squaredNorm() < (places[best] - P).squaredNorm()) best = k;
+            if (occupancy[k] != *std::min_element(occupancy.begin(), occupancy.end())) continue;
+            if (best == n || (positions[k] - P).squaredNorm() < (positions[best] - P).squaredNorm()) best = k;
         }
-        ++takers[best];
+        ++occupancy[best];
         REQUIRE(free.take(P) == best);
     }
 }
 
 TEST_CASE("who is nowhere takes some place all the same", "[goal]")
 {
-    FreePlaces free(random_places(5, 3), std::vector<std::uint32_t>(5));
+    FreePositions free(random_positions(5, 3), std::vector<std::uint32_t>(5));
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     std::vector<int> taken(5);
     for (const Vec3d& P :

@@ -1,5 +1,5 @@
 // Checks that each thread gets its own values, and the order of their destruction.
-#include "runtime/base/of_thread.h"
+#include "runtime/base/per_thread.h"
 
 #include <new>
 #include <string>
@@ -30,7 +30,7 @@ struct Refused {
 
 std::vector<int>& numbers()
 {
-    thread_local OfThread<std::vector<int>> kept;
+    thread_local PerThread<std::vector<int>> kept;
     return *kept;
 }
 
@@ -52,8 +52,8 @@ TEST_CASE("the values of a thread are destroyed when it ends, the latest first")
 {
     destroyed.clear();
     std::thread([] {
-        thread_local OfThread<Named> first, second;
-        [[maybe_unused]] thread_local OfThread<Named> never;
+        thread_local PerThread<Named> first, second;
+        [[maybe_unused]] thread_local PerThread<Named> never;
         (*first).name = "1";
         (*second).name = "2";
     }).join();
@@ -62,7 +62,7 @@ TEST_CASE("the values of a thread are destroyed when it ends, the latest first")
 
 TEST_CASE("a value that can't be made is an error, and is made when it is asked for again")
 {
-    thread_local OfThread<Refused> kept;
+    thread_local PerThread<Refused> kept;
     is_refused = true;
     CHECK_THROWS_AS(*kept, std::bad_alloc);
     is_refused = false;

@@ -7,12 +7,12 @@
 
 namespace rapid {
 
-class AttributePlaces {
+class AttributeLocations {
 public:
-    virtual ~AttributePlaces() = default;
+    virtual ~AttributeLocations() = default;
 
     // Returns the first location that names the attribute; line 0 if there is none.
-    virtual Location place_of(const std::string& attribute) const = 0;
+    virtual Location location_of(const std::string& attribute) const = 0;
 
     // Returns the number of components of the value that it assigns to the attribute: 3 for a vec3, 4 for a
     // quaternion, 0 if unknown.

@@ -13,10 +13,10 @@
 
 namespace rapid {
 
-class FreePlaces {
+class FreePositions {
 public:
-    // places: finite, at least one. takers: current number of takers of each.
-    FreePlaces(std::vector<Vec3d> places, std::vector<std::uint32_t> takers);
+    // positions: finite, at least one. occupancy: current number of takers of each.
+    FreePositions(std::vector<Vec3d> positions, std::vector<std::uint32_t> occupancy);
 
     // Returns the index of the free position nearest to P, and takes it; ties go to the first. Any is taken if P is
     // not finite.
@@ -31,8 +31,8 @@ private:
     std::size_t count_free(std::size_t begin, std::size_t end);
     void search(std::size_t begin, std::size_t end, const Vec3d& P, Nearest& nearest) const;
 
-    std::vector<Vec3d> places_;
-    std::vector<std::uint32_t> takers_;
+    std::vector<Vec3d> positions_;
+    std::vector<std::uint32_t> occupancy_;
     std::uint32_t round_ = 0;           // the lowest number of takers
     std::vector<std::uint32_t> order_;  // indices of places, in tree order
     std::vector<std::uint8_t> axis_;    // along which a node splits its range

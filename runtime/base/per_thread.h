@@ -1,6 +1,6 @@
 // A per-thread value that is kept until the thread ends, such as a function's buffer:
 //
-//   thread_local OfThread<std::vector<double>> kept;
+//   thread_local PerThread<std::vector<double>> kept;
 //   std::vector<double>& phi = *kept;
 //
 // For values with a destructor. A thread_local std::vector does the same, but glibc allocates memory for its destructor
@@ -13,20 +13,20 @@
 namespace rapid {
 
 // An object that is destroyed when its thread ends.
-struct KeptByThread {
-    KeptByThread() = default;
-    KeptByThread(const KeptByThread&) = delete;
-    KeptByThread& operator=(const KeptByThread&) = delete;
-    virtual ~KeptByThread() = default;
+struct ThreadObject {
+    ThreadObject() = default;
+    ThreadObject(const ThreadObject&) = delete;
+    ThreadObject& operator=(const ThreadObject&) = delete;
+    virtual ~ThreadObject() = default;
 
-    std::unique_ptr<KeptByThread> earlier;  // destroyed after this one
+    std::unique_ptr<ThreadObject> earlier;  // destroyed after this one
 };
 
 // Keeps an object until the calling thread ends. On the main thread, until the process ends.
-void keep_by_thread(std::unique_ptr<KeptByThread> kept);
+void keep_until_thread_ends(std::unique_ptr<ThreadObject> object);
 
 template <class Value>
-class OfThread {
+class PerThread {
 public:
     Value& operator*()
     {
@@ -35,19 +35,19 @@ public:
     }
 
 private:
-    struct Kept final : KeptByThread {
-        explicit Kept(OfThread& of_thread) : owner(of_thread) {}
-        ~Kept() override { owner.value_ = nullptr; }
+    struct Owned final : ThreadObject {
+        explicit Owned(PerThread& per_thread) : owner(per_thread) {}
+        ~Owned() override { owner.value_ = nullptr; }
 
-        OfThread& owner;
+        PerThread& owner;
         Value value{};
     };
 
     void make()
     {
-        auto kept = std::make_unique<Kept>(*this);
-        Value* const value = &kept->value;
-        keep_by_thread(std::move(kept));
+        auto object = std::make_unique<Owned>(*this);
+        Value* const value = &object->value;
+        keep_until_thread_ends(std::move(object));
         value_ = value;
     }
 

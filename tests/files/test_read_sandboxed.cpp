@@ -1,4 +1,4 @@
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -37,7 +37,7 @@ Numbers read(const std::filesystem::path& path, const std::function<Numbers()>& 
     return numbers;
 }
 
-const ApartReader<Numbers> process_number(
+const SandboxedReader<Numbers> process_number(
     "test: number of the process", [](const std::filesystem::path&, const std::string&) { return Numbers{::getpid()}; },
     send, receive);
 

@@ -19,7 +19,7 @@ bool is_graph_code(const lua_Debug& info);
 Location where(const State& state);
 
 // Returns the position of the function at `index`. The file is empty if it is not in graph code.
-Location place_of_function(lua_State* L, int index);
+Location location_of_function(lua_State* L, int index);
 
 // native.run(chunk, file, line, ...): calls the body of a file, or the scene of a study with its knobs. line is that of
 // the call that ends it, or nil.

@@ -3,6 +3,6 @@
 
 namespace rapid {
 
-constexpr double least_voxel = 2e-5;  // m
+constexpr double min_voxel = 2e-5;  // m
 
 }  // namespace rapid

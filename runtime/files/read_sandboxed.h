@@ -24,9 +24,9 @@ namespace rapid {
 std::size_t memory_of_copy();
 
 // Calls `read` in a copy of this process and `receive` here. Throws Error if `read` does, or if the process fails. The
-// copy's memory is limited by the file's size and by `most_memory`.
+// copy's memory is limited by the file's size and by `max_memory`.
 void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                  const std::function<void(MessageReader&)>& receive, std::size_t most_memory = memory_of_copy());
+                  const std::function<void(MessageReader&)>& receive, std::size_t max_memory = memory_of_copy());
 
 // Sets a function that each such process calls before it reads, to confine itself further.
 void confine_copies(std::function<void()> further);
@@ -34,14 +34,15 @@ void confine_copies(std::function<void()> further);
 // A reader function for a library. `what` selects a part of the file, such as the name of a grid. Objects must be
 // created at program start and live as long as the program.
 template <class T>
-class ApartReader {
+class SandboxedReader {
 public:
     using Read = T (*)(const std::filesystem::path& path, const std::string& what);
     using Send = void (*)(const T&, MessageWriter&);
     using Receive = T (*)(MessageReader&);
 
     // name: unique among all readers.
-    ApartReader(const char* name, Read read, Send send, Receive receive) : name_(name), read_(read), receive_(receive)
+    SandboxedReader(const char* name, Read read, Send send, Receive receive)
+        : name_(name), read_(read), receive_(receive)
     {
         define_reader(name, [=](const ReadRequest& request, MessageWriter& message) {
             send(read(request.path, request.what), message);

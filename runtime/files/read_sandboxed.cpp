@@ -1,4 +1,4 @@
-#include "runtime/files/read_apart.h"
+#include "runtime/files/read_sandboxed.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -34,13 +34,13 @@ struct Limits {
     unsigned seconds;    // of processor time
 };
 
-Limits limits_of(std::size_t file_bytes, std::size_t most_memory)
+Limits limits_of(std::size_t file_bytes, std::size_t max_memory)
 {
-    constexpr std::size_t base = std::size_t{1} << 30, factor = 64, bytes_a_second = 2'000'000;
+    constexpr std::size_t base = std::size_t{1} << 30, factor = 64, bytes_per_second = 2'000'000;
     constexpr unsigned base_seconds = 5;
     const std::size_t memory = base + factor * file_bytes;
-    return {std::min(memory, most_memory), most_memory < memory,
-            base_seconds + static_cast<unsigned>(file_bytes / bytes_a_second)};
+    return {std::min(memory, max_memory), max_memory < memory,
+            base_seconds + static_cast<unsigned>(file_bytes / bytes_per_second)};
 }
 
 enum class Outcome : std::uint32_t { None, Read, Refused, OutOfMemory };
@@ -146,8 +146,8 @@ void confine(pid_t parent, const Limits& limits)
     ::sigemptyset(&none);
     ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
     // Nobody reads the libraries' last output.
-    const int nowhere = ::open("/dev/null", O_WRONLY);
-    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+    const int null_device = ::open("/dev/null", O_WRONLY);
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(null_device, stream);
     // Closes inherited descriptors, through which a misbehaving process could reach others.
     ::close_range(STDERR_FILENO + 1, ~0U, 0);
     limit(RLIMIT_CORE, 0);
@@ -211,9 +211,9 @@ std::size_t memory_of_copy()
 }
 
 void read_in_copy(const std::filesystem::path& path, const std::function<void(MessageWriter&)>& read,
-                  const std::function<void(MessageReader&)>& receive, std::size_t most_memory)
+                  const std::function<void(MessageReader&)>& receive, std::size_t max_memory)
 {
-    const Limits limits = limits_of(check_readable(path), most_memory);
+    const Limits limits = limits_of(check_readable(path), max_memory);
     const SharedMemory shared(limits.memory);
     // The copy has only one thread. In an arena without workers TBB requests no others and takes no lock that a thread
     // missing in the copy may hold.

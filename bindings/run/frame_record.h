@@ -33,8 +33,7 @@ struct WrittenFile {
 };
 
 struct FrameRecord {
-    FrameStatistics statistics;
-    std::vector<Stiffness> stiff;
+    FrameFigures statistics;
     std::vector<std::string> warnings;
     Fingerprint read;              // contents of files since the previous frame
     double seconds = 0;            // of the run, until this frame's files were written
@@ -44,7 +43,7 @@ struct FrameRecord {
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(statistics, stiff, warnings, read, seconds, peak_bytes, files);
+        keep(statistics, warnings, read, seconds, peak_bytes, files);
     }
 };
 

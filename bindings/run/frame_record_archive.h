@@ -25,17 +25,23 @@ void serialize(Archive& keep, Stiffness& stiffness)
 }
 
 template <StateArchive Archive>
-void serialize(Archive& keep, FrameStatistics::Error& error)
+void serialize(Archive& keep, ErrorQuantiles& error)
 {
     auto& [p50, p95, max] = error;
     keep(p50, p95, max);
 }
 
 template <StateArchive Archive>
-void serialize(Archive& keep, FrameStatistics::EnergyDrift& drift)
+void serialize(Archive& keep, DriftSummary& drift)
 {
     auto& [mean, max] = drift;
     keep(mean, max);
+}
+
+template <StateArchive Archive, class Summary>
+void serialize(Archive& keep, Sampled<Summary>& figure)
+{
+    keep(figure.summary);
 }
 
 template <StateArchive Archive>
@@ -94,10 +100,10 @@ void serialize(Archive& keep, BandFigures& band)
 }
 
 template <StateArchive Archive>
-void serialize(Archive& keep, Residual::Search& search)
+void serialize(Archive& keep, ContactGrids& grids)
 {
-    auto& [grids, error, excess, seconds] = search;
-    keep(grids, error, excess, seconds);
+    auto& [points, error, excess, search_seconds] = grids;
+    keep(points, error, excess, search_seconds);
 }
 
 template <StateArchive Archive>
@@ -108,23 +114,18 @@ void serialize(Archive& keep, StageSeconds& all)
 }
 
 template <StateArchive Archive>
-void serialize(Archive& keep, FrameStatistics::Node& node)
+void serialize(Archive& keep, NodeWork& work)
 {
-    auto& [nodes, seconds, points, bytes] = node;
-    keep(nodes, seconds, points, bytes);
+    auto& [nodes, stage, begin, seconds, points, bytes] = work;
+    keep(nodes, seconds, points, bytes);  // what statistics have of it
 }
 
 template <StateArchive Archive>
-void serialize(Archive& keep, FrameStatistics& statistics)
+void serialize(Archive& keep, FrameFigures& figures)
 {
-    auto& [frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
-           left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-           constraint_residual_max, constraint_rows, loose_constraints, broken, asleep, contact_search, seconds,
-           nodes] = statistics;
-    keep(frame, points, born, died, collisions, contact_limit, trapped, substeps, error, frame_error,
-         left_out_of_errors, rounding, energy_drift, beyond_tolerance, penetration_max, contact_energy, ledger, bands,
-         constraint_residual_max, constraint_rows, loose_constraints, broken, asleep, seconds, nodes);
-    keep_optional(keep, contact_search);
+#define RAPID_FIGURE(type, name, ...) keep(figures.name);
+    RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
 }
 
 }  // namespace rapid

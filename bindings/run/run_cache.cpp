@@ -324,11 +324,10 @@ std::vector<const FrameRecord*> RunCache::records(std::int64_t first, std::int64
     return list;
 }
 
-void RunCache::computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff)
+void RunCache::computed(const FrameFigures& frame)
 {
     FrameRecord& record = open_[frame.frame];
     record.statistics = frame;
-    record.stiff = stiff;
     record.warnings = std::exchange(warnings_, {});
     record.read = read_->take();
     for (const auto& [name, hash] : record.read) contents_[name] = hash;

@@ -58,7 +58,7 @@ public:
     // Report computed frames, as in RunReport. complete_before: all files of earlier frames are complete; without a
     // value, all files are. The seconds and the peak are those of the run so far.
     void warned(const std::string& text) { warnings_.push_back(text); }
-    void computed(const FrameStatistics& frame, const std::vector<Stiffness>& stiff);
+    void computed(const FrameFigures& frame);
     void written(const FrameFiles::Written& file);
     void complete_before(std::optional<std::int64_t> frame, double seconds, std::uint64_t peak_bytes);
 

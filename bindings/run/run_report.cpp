@@ -11,6 +11,7 @@
 #include "runtime/base/json_text.h"
 #include "runtime/report/frame_profile.h"
 #include "runtime/report/memory.h"
+#include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
 
@@ -34,11 +35,11 @@ void StatisticsFile::append(const std::string& text)
     }
 }
 
-void StatisticsFile::add(const FrameStatistics& frame) { waiting_.push_back(frame); }
+void StatisticsFile::add(const FrameFigures& frame) { waiting_.push_back(frame); }
 
 void StatisticsFile::add_writing(std::int64_t frame, double seconds)
 {
-    for (FrameStatistics& waiting : waiting_)
+    for (FrameFigures& waiting : waiting_)
         if (waiting.frame == frame) waiting.seconds.write += seconds;
 }
 
@@ -192,11 +193,11 @@ double RunReport::now() const { return earlier_seconds_ + stopwatch_.seconds(); 
 void RunReport::frame(const FrameResult& result)
 {
     const auto lock = locked();
-    const FrameStatistics frame = statistics_of(result);
+    const FrameFigures frame = statistics_of(result);
     totals_.add(frame);
     if (statistics_) statistics_->add(frame);
     if (profile_) profile_->add(result);
-    if (cache_) cache_->computed(frame, result.figures.stiff);
+    if (cache_) cache_->computed(frame);
     add_writing();
     keep_worst(run_.stiff, result.figures.stiff);
     listener_.frame(frame, now(), false);
@@ -207,7 +208,7 @@ void RunReport::known_frame(const FrameRecord& record, bool is_before)
     const auto lock = locked();
     totals_.add(record.statistics);
     if (statistics_) statistics_->add(record.statistics);
-    keep_worst(run_.stiff, record.stiff);
+    keep_worst(run_.stiff, record.statistics.stiff);
     for (const std::string& text : record.warnings) report_warning(text, record.statistics.frame);
     if (is_before) {
         earlier_seconds_ = std::max(earlier_seconds_, record.seconds);

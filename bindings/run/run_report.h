@@ -20,7 +20,6 @@
 #include "runtime/io/frame_writer.h"
 #include "runtime/report/frame_warnings.h"
 #include "runtime/report/statistics.h"
-#include "runtime/report/totals.h"
 
 namespace rapid {
 
@@ -32,7 +31,7 @@ public:
     StatisticsFile(std::string path, const RunStatistics& run);
 
     // A frame waits for the time of writing its files, which is known later.
-    void add(const FrameStatistics& frame);
+    void add(const FrameFigures& frame);
     void add_writing(std::int64_t frame, double seconds);
     // Writes the frames before this one, whose files are all complete; without a value, all frames.
     void write_before(std::optional<std::int64_t> frame);
@@ -47,7 +46,7 @@ private:
     const std::string path_;
     std::optional<OutputFile> file_;
     std::optional<Error> error_;
-    std::deque<FrameStatistics> waiting_;
+    std::deque<FrameFigures> waiting_;
     bool is_first_ = true, is_finished_ = false;
 };
 
@@ -88,7 +87,7 @@ public:
     };
     // Called one at a time; none may be empty.
     struct Listener {
-        std::function<void(const FrameStatistics& frame, double seconds, bool is_known)> frame;
+        std::function<void(const FrameFigures& frame, double seconds, bool is_known)> frame;
         std::function<void(const std::string& text)> line;
         std::function<void(const std::string& text)> warning;
     };

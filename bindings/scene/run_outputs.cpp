@@ -223,7 +223,7 @@ Result<std::string> SceneInside::advice_on(Scene& scene, const FileOutputs& file
             const OutputPlan output(impl, files, plan_options(impl, files));
             impl.run_separately([&] {
                 try {
-                    const FrameFigures found = Evaluator(output.plan).examine();
+                    const Trial found = Evaluator(output.plan).examine();
                     text = advice(found.stiff) + text_of(found.resolution);
                 } catch (const Error& error) {
                     if (!is_of_kernel(output.plan, error)) throw;

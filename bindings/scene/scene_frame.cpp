@@ -69,6 +69,16 @@ SceneError unknown_name(const char* what, std::string_view name, const std::vect
     return wrong_call(fmt::format("the frame has no {} \"{}\"{}", what, name, did_you_mean(name, names)));
 }
 
+// Copies the figures for which the summary has a member of the same name and type.
+template <class Summary>
+void copy_by_name(Summary& to, const FrameFigures& all)
+{
+#define RAPID_FIGURE(type, name, ...) \
+    if constexpr (requires { requires std::is_same_v<decltype(to.name), type>; }) to.name = all.name;
+    RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
+}
+
 template <class Map>
 std::vector<std::string> keys_of(const Map& map)
 {
@@ -199,21 +209,15 @@ Result<SceneValue> SceneFrame::detail(std::string_view name) const
 
 FrameStatisticsSummary SceneFrame::statistics() const
 {
-    const FrameStatistics all = statistics_of(data_->result);
+    const FrameFigures all = statistics_of(data_->result);
     FrameStatisticsSummary summary;
-    summary.points = all.points;
-    summary.born = all.born;
-    summary.died = all.died;
-    summary.collisions = all.collisions;
-    summary.substeps = all.substeps;
-    if (all.error) {
+    copy_by_name(summary, all);
+    if (const auto& error = all.error.summary) {
         summary.has_errors = true;
-        summary.error_p50 = all.error->p50;
-        summary.error_p95 = all.error->p95;
-        summary.error_max = all.error->max;
+        summary.error_p50 = error->p50;
+        summary.error_p95 = error->p95;
+        summary.error_max = error->max;
     }
-    summary.penetration_max = all.penetration_max;
-    summary.constraint_residual_max = all.constraint_residual_max;
     summary.seconds = all.seconds.total();
     summary.script_seconds = all.seconds.script;
     summary.solve_seconds = all.seconds.solve;

@@ -91,7 +91,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
           cache(options.cache, scene_options.estimate_errors),
           report({file, scene_options.threads > 0 ? scene_options.threads : tbb::this_task_arena::max_concurrency(),
                   name_in_part(options.statistics, options.part), name_in_part(options.profile, options.part)},
-                 {[this](const FrameStatistics& frame, double seconds, bool is_known) {
+                 {[this](const FrameFigures& frame, double seconds, bool is_known) {
                       call_if_set(listener.frame, RunFrame{frame.frame, frame.points, seconds, is_known});
                   },
                   [this](const std::string& text) { call_if_set(listener.line, text); },

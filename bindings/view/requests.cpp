@@ -12,6 +12,7 @@
 #include "bindings/scene/scene_inside.h"
 #include "bindings/view/request_fields.h"
 #include "runtime/base/json_text.h"
+#include "runtime/solver/figure_table.h"
 
 namespace rapid {
 namespace {
@@ -22,6 +23,20 @@ constexpr std::size_t max_rows = 500;          // of the spreadsheet, per reques
 constexpr std::size_t max_figures = 500;       // frames, per request
 constexpr std::size_t max_segments = 480'000;  // of trails
 constexpr std::size_t max_waiting = 1000;      // requests; a page has one
+
+// Returns the figures that the page draws.
+const std::string& charts()
+{
+    static const std::string text = [] {
+        Json list = Json::array();
+#define RAPID_FIGURE(type, name, together, later, callback, unit, meaning, chart) \
+    if (*chart) list.push_back({{"key", #name}, {"title", chart}, {"unit", unit}});
+        RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
+        return list.dump();
+    }();
+    return text;
+}
 
 Json json_of(const SceneValue& value)
 {
@@ -509,8 +524,8 @@ void ViewRequests::send_figures(const Json& json, const PendingRequest& request)
     const std::uint64_t run = simulation_.status().run;
     const std::vector<std::string> all = simulation_.store().statistics(run, after, max_figures);
     // The texts are forwarded unchanged: parsing and writing them again took ten times as long.
-    request.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}}})", request.re, run,
-                               fmt::join(all, ","), all.size() == max_figures),
+    request.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}, "charts": {}}})", request.re, run,
+                               fmt::join(all, ","), all.size() == max_figures, charts()),
                    false);
 }
 

@@ -81,16 +81,17 @@ FrameResult Evaluator::advance()
     return result;
 }
 
-FrameFigures Evaluator::examine()
+Trial Evaluator::examine()
 {
-    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = true;
+    const auto trial = std::make_shared<Trial>();
+    for (const std::shared_ptr<Simulation>& simulation : simulations_) simulation->trial = trial;
     advance();
-    const FrameFigures found = advance().figures;
+    trial->stiff = advance().figures.stiff;
+    const Trial found = *trial;
     const std::int64_t start = next_ - 2;
-    std::uint64_t idle = found.idle;
-    for (std::int64_t after = 2; idle > 0 && after <= max_tried; after *= 2) {
+    for (std::int64_t after = 2; trial->idle > 0 && after <= max_tried; after *= 2) {
         next_ = start + after;
-        idle = advance().figures.idle;
+        advance();
     }
     return found;
 }
@@ -105,6 +106,8 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     take_columns();
 
     FrameFigures before = std::exchange(frame.figures, {});
+    for (const std::shared_ptr<Simulation>& simulation : simulations_)
+        if (simulation->trial) *simulation->trial = {};
     results.assign(plan_.nodes.size(), {});
     readers.assign(plan_.nodes.size(), 0);
     for (std::size_t i = 0; i < plan_.nodes.size(); ++i) readers[i] = plan_.nodes[i].consumers;
@@ -120,7 +123,7 @@ void Evaluator::advance_subframe(int left, std::vector<Flow>& results, std::vect
     }
     for (std::size_t s = 0; plan_.keeps_steps && s < simulations_.size(); ++s)
         if (simulations_[s]->record) frame.steps[plan_.simulations[s].create->name].push_back(*simulations_[s]->record);
-    before.append(std::move(frame.figures));
+    before.append(frame.figures);
     frame.figures = std::move(before);
 }
 
@@ -242,7 +245,7 @@ Flow Evaluator::evaluate(std::size_t first, std::size_t last, int left, std::vec
     return at_node(node.name, node.location, [&] {
         if (input_) input_(node, evaluation.frame, inputs);
         const double begin = frame_clock_.seconds();
-        const double scripts_before = frame.figures.script_seconds;
+        const double scripts_before = frame.figures.seconds.script;
         std::optional<UndeclaredColumns> undeclared;
         const NodeKind kind = node.type->kind;
         if (checks_declarations_ && (kind == NodeKind::Points || kind == NodeKind::Solve))
@@ -279,8 +282,8 @@ void Evaluator::add_work(std::size_t first, std::size_t last, double begin, doub
     work.seconds = frame_clock_.seconds() - begin;
     if (plan_.nodes[first].node->type->kind == NodeKind::Solve) {
         work.stage = NodeWork::Stage::Solve;
-        frame.figures.solve_seconds += work.seconds;
-    } else if (frame.figures.script_seconds > scripts_before) {
+        frame.figures.seconds.solve += work.seconds;
+    } else if (frame.figures.seconds.script > scripts_before) {
         work.stage = NodeWork::Stage::Script;
     }
     work.points = result.size();

@@ -21,16 +21,6 @@ namespace rapid {
 
 class ChangingNode;
 
-// Cost of one pass of a frame: of a node, or of fused neighbours.
-struct NodeWork {
-    enum class Stage { Graph, Script, Solve };
-    std::vector<std::string> nodes;  // names, in the order of the chain
-    Stage stage = Stage::Graph;      // Script: kernels
-    double begin = 0, seconds = 0;   // s, wall time since advance() began, and duration
-    std::uint64_t points = 0;        // of the result
-    std::uint64_t bytes = 0;         // of its columns; shared columns count in each
-};
-
 struct FrameResult {
     std::int64_t frame = 0;
     std::map<std::string, PointSet> outputs;
@@ -88,7 +78,7 @@ public:
     // which Solve does not move. If an emitter emits nothing in that frame, later ones are tried, at most max_tried
     // frames away: their points also go through the kernels. The evaluator cannot be used afterwards. Throws Error as
     // advance() does.
-    FrameFigures examine();
+    Trial examine();
 
     // Returns the state that later frames depend on, after the last computed frame. Its columns are shared until
     // either side writes them.

@@ -9,10 +9,10 @@
 
 #include "runtime/base/error.h"
 #include "runtime/base/frame.h"
-#include "runtime/graph/figures.h"
 #include "runtime/math/random.h"
 #include "runtime/points/point_set.h"
 #include "runtime/points/range.h"
+#include "runtime/solver/figures.h"
 
 namespace rapid {
 

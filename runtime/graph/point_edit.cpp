@@ -77,7 +77,7 @@ void edit_together(std::span<const PointEdit* const> edits, std::span<const Eval
         });
     run_passes(passes, points, before.removals);
     if (std::any_of(passes.begin(), passes.end(), [](const auto& pass) { return pass->is_script(); }))
-        now.front()->figures.script_seconds += stopwatch.seconds();
+        now.front()->figures.seconds.script += stopwatch.seconds();
 }
 
 }  // namespace rapid

@@ -13,6 +13,8 @@
 #include "runtime/points/point_set.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/estimate/resolution.h"
+#include "runtime/solver/figures.h"
 
 namespace rapid {
 
@@ -58,6 +60,14 @@ private:
     std::size_t last_ = 0;   // run of the last query, which usually holds the next one too
 };
 
+// The findings of a run that examines only kernels and stiffness (Evaluator::examine), in its last subframe; `stiff` is
+// of the whole frame. Emitters emit a sample, and Solve does not move points.
+struct Trial {
+    std::vector<Stiffness> stiff;
+    Resolution resolution;
+    std::uint64_t idle = 0;  // emitters that have emitted nothing so far
+};
+
 // One simulation: started by a Create, fed back by its Solve, shared by all flows from it.
 struct Simulation {
     double fps = 24;
@@ -72,8 +82,8 @@ struct Simulation {
     std::shared_ptr<StepRecord> record;               // of the last step; null if nothing reads it
     std::int64_t first_new = 0;                       // points with this id and above are born in the next step
     std::vector<std::int64_t> condemned;              // ids of points that emitters of other chains remove
-    // Only kernels and stiffness are examined: emitters emit a sample, and Solve does not move points.
-    bool trial = false;
+    // Null except in a trial.
+    std::shared_ptr<Trial> trial;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
     bool estimates_errors = true;                             // if false, Solve estimates none
     bool per_point_diagnostics = false;  // Solve stores per-point figures as attributes (solve/step_observers.cpp)

@@ -166,7 +166,7 @@ struct Emit : Newborn {
         move_source(*flow.simulation, now);
         emit(flow, births(*flow.simulation, now), now);
         has_emitted_ |= now.figures.born > born;
-        if (flow.simulation->trial && !has_emitted_) ++now.figures.idle;
+        if (flow.simulation->trial && !has_emitted_) ++flow.simulation->trial->idle;
         return flow;
     }
 

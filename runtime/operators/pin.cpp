@@ -240,7 +240,7 @@ public:
     {
         for (const Load& load : loads_) step.points[load.i].w = load.own;
     }
-    Residual close(Substep& step) override { return pins_->springs.close(step); }
+    void close(Substep& step, FrameFigures& figures) override { pins_->springs.close(step, figures); }
 
 private:
     // A point on springs, with its own inverse mass and the one while it is held.

@@ -170,7 +170,7 @@ struct Spawn : Newborn {
         Flow flow = start(inputs, now);
         if (now.at_start) return flow;
         has_emitted_ |= now.figures.born > born;
-        if (flow.simulation->trial && !has_emitted_) ++now.figures.idle;
+        if (flow.simulation->trial && !has_emitted_) ++flow.simulation->trial->idle;
         return flow;
     }
 
@@ -251,7 +251,7 @@ void Spawn::emit_children(Flow& flow, const Flow& parent_flow, const Evaluation&
     std::vector<Children> all_children;
     // A chain whose parents have already lived when it begins emits from its next frame on.
     if (!now.at_start || record.h == 0) all_children = clock_.births(parents, plan, now);
-    const bool is_trial = flow.simulation->trial;
+    const bool is_trial = flow.simulation->trial != nullptr;
     const bool is_sample = is_trial && !now.at_start && all_children.empty() && emits(plan);
     if (is_sample) all_children = sample_of(parents);
 

@@ -72,13 +72,13 @@ void CoupledStep::run()
     }
     if (options.interacts) interact(1, options.time);
 
-    SolveResult& result = context_.result();
+    FrameFigures& figures = context_.figures();
     if (sleep_) sleep_->clear_loads();
-    result.residual = projection.close(now_, options.loads);
-    result.contact_energy += projection.energy();
+    projection.close(now_, options.loads, figures);
+    figures.contact_energy += projection.energy();
     if (!scene.constraints.empty())
-        result.ledger = ledger_of(before, LedgerState::of(now_, projection.elastic_energy(now_)), changes(projection),
-                                  is_isolated(projection), now_.acceleration, options.h);
+        figures.ledger = ledger_of(before, LedgerState::of(now_, projection.elastic_energy(now_)), changes(projection),
+                                   is_isolated(projection), now_.acceleration, options.h);
     if (sleep_) sleep_->close(now_, context_.P, context_.v, context_.time);
     context_.for_each_chunk([&](std::size_t begin, std::size_t end) { store(begin, end); });
     if (!displaced_.empty()) add_displacements(projection);
@@ -86,7 +86,7 @@ void CoupledStep::run()
     if (spin_) spin_->store(context_.points);
     if (!sleep_) return;
     sleep_->remember(*options.sleep_records, now_, scene.obstacles);
-    result.asleep = options.sleep_records->records.size();
+    figures.asleep = options.sleep_records->records.size();
 }
 
 // Returns true if the points are subject only to a common acceleration and to each other.
@@ -230,8 +230,9 @@ void CoupledStep::advance_freely(std::size_t begin, std::size_t end)
         for (std::size_t k = 0; k < (block.a.stride ? block.size() : 1); ++k)
             max_acceleration = std::max(max_acceleration, block.a[k].norm());
     }
-    context_.count(collisions, 0, begin);
-    changes.contacts += collisions.counts().energy.added - collisions.counts().energy.lost;
+    const FrameFigures& figures = collisions.figures();
+    context_.count(figures, begin);
+    changes.contacts += figures.contact_energy.added - figures.contact_energy.lost;
     const std::scoped_lock lock(mutex_);
     free_changes_.emplace_back(begin, changes);
     now_.max_acceleration = std::max(now_.max_acceleration, max_acceleration);
@@ -411,7 +412,9 @@ void CoupledStep::store(std::size_t begin, std::size_t end)
         step.require_finite();
         step.store();
     }
-    context_.count_penetration(deepest);
+    FrameFigures figures;
+    figures.penetration_max = deepest;
+    context_.count(figures, begin);
 }
 
 // Adds the work against forces and rows of moving points out of shapes that constraints pushed them into, and back to
@@ -428,13 +431,13 @@ void CoupledStep::add_displacements(const Projection& projection)
         by_acceleration -= now_.acceleration.dot(position - at_[i].P) / inverse_mass_[i];
     }
     const double elastic = projection.elastic_energy(now_, P) - projection.elastic_energy(now_);
-    SolveResult& result = context_.result();
-    result.contact_energy.take(by_forces + elastic);
-    if (!result.ledger) return;
-    result.ledger->potential += by_acceleration;
-    result.ledger->elastic += elastic;
-    result.ledger->by.contacts += by_forces + elastic;
-    result.ledger->by_motion += by_acceleration - by_forces;
+    FrameFigures& figures = context_.figures();
+    figures.contact_energy.take(by_forces + elastic);
+    if (!figures.ledger) return;
+    figures.ledger->potential += by_acceleration;
+    figures.ledger->elastic += elastic;
+    figures.ledger->by.contacts += by_forces + elastic;
+    figures.ledger->by_motion += by_acceleration - by_forces;
 }
 
 // Returns true if a constraint prescribes the position or the point has slept, so that no shape may move it.

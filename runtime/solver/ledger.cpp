@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/spin.h"
 
 namespace rapid {

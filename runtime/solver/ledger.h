@@ -4,9 +4,10 @@
 #include <optional>
 
 #include "runtime/math/vec.h"
-#include "runtime/solver/constraints/constraint.h"
 
 namespace rapid {
+
+struct Substep;
 
 // A residue above this fraction of the energy or momentum in motion is not rounding.
 constexpr double largest_residue = 1e-5;

@@ -35,7 +35,7 @@ bool nothing_moves(const PointSet& points, const Dynamics& dynamics)
     return dynamics.empty() && v.stride == 0 && v[0].isZero(0) && !nonzero_forces_of(points);
 }
 
-SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement* refinement)
+FrameFigures advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement* refinement)
 {
     RAPID_ASSERT(options.substeps >= 1 && std::isfinite(options.h) && options.h >= 0);
     // Interacting points are checked before their constraints or interactions begin.
@@ -46,25 +46,24 @@ SolveResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptio
     else
         CoupledStep(context, dynamics).run();
     if (!refinement) context.remove_dead();
-    context.sum_contact_energy();
-    return context.result();
+    return context.take_figures();
 }
 
 }  // namespace
 
-SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
+FrameFigures solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options)
 {
     if (points.empty()) return {};
-    if (nothing_moves(points, dynamics)) return require_finite(points, options), SolveResult();
-    const SolveResult result = advance(points, dynamics, options, nullptr);
+    if (nothing_moves(points, dynamics)) return require_finite(points, options), FrameFigures();
+    FrameFigures figures = advance(points, dynamics, options, nullptr);
     if (auto* force = points.find<Vec3f>("force")) force->fill(Vec3f::Zero());
-    return result;
+    return figures;
 }
 
-SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement& refinement)
+FrameFigures solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement& refinement)
 {
     RAPID_ASSERT(dynamics.constraints().empty());
-    return points.empty() ? SolveResult() : advance(points, dynamics, options, &refinement);
+    return points.empty() ? FrameFigures() : advance(points, dynamics, options, &refinement);
 }
 
 bool is_closed_form(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options)

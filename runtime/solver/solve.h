@@ -12,11 +12,10 @@
 #include <string>
 
 #include "runtime/points/point_set.h"
-#include "runtime/solver/collision/contact_audit.h"
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/dynamics.h"
-#include "runtime/solver/ledger.h"
+#include "runtime/solver/figures.h"
 
 namespace rapid {
 
@@ -49,18 +48,6 @@ struct SolveOptions {
     SleepRecords* sleep_records = nullptr;
 };
 
-struct SolveResult {
-    std::uint64_t collisions = 0;     // contacts
-    std::uint64_t contact_limit = 0;  // points that reached the limit of contacts in a step
-    std::uint64_t trapped = 0;        // points deep in a shape, with no known way out
-    double penetration_max = 0;       // m, the largest at the end of the frame
-    ContactEnergy contact_energy;
-    std::optional<Ledger> ledger;  // set if points are constrained
-    std::uint64_t died = 0;        // points that actions killed
-    Residual residual;             // of the constraints, at the end of the frame
-    std::uint64_t asleep = 0;      // points, at the end of the frame
-};
-
 // Advances P and v of every point by its own time: the column `dt` if the points have one (s; a newborn's is its age
 // at the end of the frame), else h. A `force` (N) acts too, and is then cleared. Points that an action kills are
 // removed. Ages, other deaths and ids are left to the caller.
@@ -72,12 +59,12 @@ struct SolveResult {
 // not coupled to. Throws Error if a velocity or position is not finite before or after, with the point's id; if a
 // force is not finite, with its node; or if an attribute of a collider or force is missing. Among several points, the
 // first one in the set is named.
-SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
+FrameFigures solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options);
 
 // The same without constraints, with the results of all blocks passed to `refinement` instead of being stored: P, v,
 // `force` and the dead are left to it. Counts are those of the first run of each block; the penetration is the largest
 // of all runs.
-SolveResult solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement& refinement);
+FrameFigures solve(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, Refinement& refinement);
 
 // Returns true if the paths of all points have a closed form for the whole frame, which substeps would only repeat.
 bool is_closed_form(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);

@@ -1,6 +1,7 @@
 #include "runtime/solver/step_context.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "runtime/points/members.h"
 
@@ -44,21 +45,11 @@ CollisionContext StepContext::collision_context()
             scene.actions.empty() ? 1 : 2};
 }
 
-void StepContext::count(const Collisions& collisions, double deepest, std::size_t first)
+void StepContext::count(FrameFigures of_chunk, std::size_t first)
 {
     const std::scoped_lock lock(mutex_);
-    const ContactCounts& counts = collisions.counts();
-    result_.collisions += counts.contacts;
-    result_.contact_limit += counts.limited;
-    result_.trapped += counts.trapped;
-    result_.penetration_max = std::max(result_.penetration_max, deepest);
-    if (counts.energy != ContactEnergy()) energies_.emplace_back(first, counts.energy);
-}
-
-void StepContext::count_penetration(double deepest)
-{
-    const std::scoped_lock lock(mutex_);
-    result_.penetration_max = std::max(result_.penetration_max, deepest);
+    energies_.emplace_back(first, std::exchange(of_chunk.contact_energy, {}));
+    figures_.add(of_chunk);
 }
 
 void StepContext::remove_dead()
@@ -68,15 +59,16 @@ void StepContext::remove_dead()
     for (std::uint8_t& killed : dead) killed = !killed;
     const std::size_t before = points.size();
     points.keep(dead);
-    result_.died = before - points.size();
+    figures_.died = before - points.size();
 }
 
-void StepContext::sum_contact_energy()
+FrameFigures StepContext::take_figures()
 {
     // In the order of the points, because a sum of doubles depends on it.
     std::stable_sort(energies_.begin(), energies_.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& [first, energy] : energies_) result_.contact_energy += energy;
+    for (const auto& [first, energy] : energies_) figures_.contact_energy += energy;
+    return std::move(figures_);
 }
 
 }  // namespace rapid

@@ -10,6 +10,7 @@
 
 #include "runtime/base/parallel.h"
 #include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/figures.h"
 #include "runtime/solver/motion/ballistic_batch.h"
 #include "runtime/solver/point_errors.h"
 #include "runtime/solver/solve.h"
@@ -42,13 +43,13 @@ public:
     template <class F>
     void for_each_chunk(const F& f);
 
-    // Adds the counts of a chunk; first: one of its points. May be called from any thread.
-    void count(const Collisions& collisions, double deepest, std::size_t first);
-    void count_penetration(double deepest);
+    // Adds the figures of a chunk; first: one of its points. May be called from any thread.
+    void count(FrameFigures of_chunk, std::size_t first);
 
     void remove_dead();
-    SolveResult& result() { return result_; }
-    void sum_contact_energy();
+    FrameFigures& figures() { return figures_; }
+    // Returns the figures of the step after all chunks are counted.
+    FrameFigures take_figures();
 
 private:
     Strided<std::uint8_t> members_{nullptr, 0};  // of options.group; null for all
@@ -56,7 +57,7 @@ private:
     std::optional<StuckColumns> stuck_;
 
     std::mutex mutex_;
-    SolveResult result_;
+    FrameFigures figures_;
     std::vector<std::pair<std::size_t, ContactEnergy>> energies_;  // keyed by a point of the chunk
     std::exception_ptr error_;
     std::size_t failed_ = 0;  // the beginning of the chunk in which error_ was thrown

@@ -141,7 +141,9 @@ void UncoupledStep::advance_by_substeps(std::span<const std::uint32_t> indices)
             deepest = std::max(deepest, run.advance(others, at, substeps));
         }
     }
-    context_.count(counted, deepest, indices.front());
+    FrameFigures figures = counted.figures();
+    figures.penetration_max = deepest;
+    context_.count(figures, indices.front());
 }
 
 }  // namespace rapid

@@ -180,7 +180,7 @@ public:
             normal_impulse_[row.pair] = row.normal_impulse, tangential_impulse_[row.pair] = row.tangential_impulse;
     }
 
-    Residual close(Substep&) override { return {}; }
+    void close(Substep&, FrameFigures&) override {}
 
 private:
     struct Row {

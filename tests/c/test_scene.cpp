@@ -2,10 +2,13 @@
 #include <atomic>
 #include <cstring>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "include/rapid/rapid.h"
+#include "runtime/solver/figure_table.h"
 #include "tests/files/temporary_folder.h"
+#include "tests/scene/opened.h"
 #include "tests/test.h"
 
 namespace rapid {
@@ -81,6 +84,43 @@ TEST_CASE("a scene runs in C", "[c]")
     REQUIRE(rapid_scene_release(scene, nullptr) == RAPID_OK);
     CHECK(static_cast<const float*>(P.data)[1] == Approx(10 - 9.81 / 2).epsilon(1e-5));
     REQUIRE(rapid_frame_release(frame, nullptr) == RAPID_OK);
+}
+
+TEST_CASE("the statistics of a frame in C are those of the file of a run", "[c]")
+{
+    rapid_scene* scene = opened(test::every_figure);
+    rapid_frame* frame = nullptr;
+    const char* text = nullptr;
+    auto statistics = sized<rapid_statistics>();
+    REQUIRE(rapid_scene_advance_to(scene, 2, &frame, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_statistics(frame, &statistics, nullptr) == RAPID_OK);
+    REQUIRE(rapid_frame_statistics_json(frame, &text, nullptr) == RAPID_OK);
+    const nlohmann::json json = nlohmann::json::parse(text);
+    int members = 0;
+    const auto check = [&](const char* name, auto& value) {
+        INFO(name);
+        CHECK(value == json.at(name));
+        CHECK(value > 0);
+        ++members;
+    };
+    const auto check_all = [&](const auto& all) {
+#define RAPID_FIGURE(type, name, ...)     \
+    if constexpr (requires { all.name; }) \
+        if (json.at(#name).is_number()) check(#name, all.name);
+        RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
+    };
+    check_all(statistics);
+    CHECK(members == 7);
+    CHECK(statistics.has_errors);
+    CHECK(statistics.error_p50 == json["error"]["position_p50"]);
+    CHECK(statistics.error_p95 == json["error"]["position_p95"]);
+    CHECK(statistics.error_max == json["error"]["position_max"]);
+    CHECK(statistics.seconds == json["seconds"]["total"]);
+    CHECK(statistics.script_seconds == json["seconds"]["script"]);
+    CHECK(statistics.solve_seconds == json["seconds"]["solve"]);
+    REQUIRE(rapid_frame_release(frame, nullptr) == RAPID_OK);
+    REQUIRE(rapid_scene_release(scene, nullptr) == RAPID_OK);
 }
 
 TEST_CASE("the header is of the library's version", "[c]")

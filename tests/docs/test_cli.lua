@@ -93,7 +93,8 @@ local rapid = require "rapid"
 local cube = rapid.levelset.box { size = {4, 0.4, 4}, voxel = 0.1 }
 return rapid.create { points = rapid.points.grid { size = {0.4, 0.4, 0.4}, spacing = 0.1, center = {0, 1, 0} } }
   :attribute { pscale = 0.06 } :detail("none", function() end)
-  :gravity {} :turbulence {} :collide { shape = cube } :contact { friction = 0.3 } :solve { substeps = 4 }]])
+  :gravity {} :turbulence {} :drag { linear = 1000 }
+  :collide { shape = cube } :contact { friction = 0.3 } :solve { substeps = 4 }]])
     folder:write("free.lua", [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.grid {} } :attract { center = {3, 0, 0} } :solve {}]])

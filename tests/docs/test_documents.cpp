@@ -1,4 +1,5 @@
 // Checks that files, folders, names and sections that the documents mention exist.
+#include "runtime/solver/figure_table.h"
 #include "tests/docs/document.h"
 
 namespace rapid {
@@ -148,6 +149,19 @@ TEST_CASE("the folders of the architecture are those that there are", "[docs]")
                 found.insert(fs::relative(entry.path(), project).string() + '/');
     }
     CHECK(described == found);
+}
+
+TEST_CASE("the figures of a frame are documented as they are declared", "[docs]")
+{
+    const std::string rows = section(read_text(project / "docs/cli.md"), "Statistics");
+    const auto check = [&](const std::string& name, const std::string& unit, const std::string& meaning) {
+        CAPTURE(name);
+        CHECK_THAT(rows,
+                   Catch::Contains("\n| `" + name + "` | " + (unit.empty() ? "" : unit + ", ") + meaning + " |\n"));
+    };
+#define RAPID_FIGURE(type, name, together, later, reported, unit, meaning, ...) check(#name, unit, meaning);
+    RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
 }
 
 TEST_CASE("the presets that contributing tells of are those that there are", "[docs]")

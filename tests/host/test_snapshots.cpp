@@ -59,15 +59,15 @@ struct Seen {
     std::map<std::string, SavedState> outputs;
 
     explicit Seen(const FrameResult& result)
-        : errors(result.figures.errors),
-          frame_errors(result.figures.frame_errors),
-          energy_drift(result.figures.energy_drift)
+        : errors(result.figures.error.values),
+          frame_errors(result.figures.frame_error.values),
+          energy_drift(result.figures.energy_drift.values)
     {
-        FrameStatistics figures = statistics_of(result);
+        FrameFigures figures = statistics_of(result);
         figures.seconds = {};
         figures.nodes.clear();
         for (BandFigures& band : figures.bands) band.seconds = 0;
-        if (figures.contact_search) figures.contact_search->seconds = 0;
+        if (figures.contact_grids) figures.contact_grids->search_seconds = 0;
         statistics = json_line(figures, true);
         for (const auto& [name, points] : result.outputs) outputs[name] = state_of(points);
     }

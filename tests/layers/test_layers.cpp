@@ -74,7 +74,9 @@ const std::map<std::string, std::set<std::string>> below = {
     {"runtime/io",
      {"runtime/base", "runtime/math", "runtime/files", "runtime/points", "runtime/shapes/level_set",
       "runtime/picture"}},
-    {"runtime/report", {"runtime/base", "runtime/math", "runtime/files", "runtime/points", "runtime/graph"}},
+    {"runtime/report",
+     {"runtime/base", "runtime/math", "runtime/files", "runtime/points", "runtime/solver", "runtime/solver/estimate",
+      "runtime/graph"}},
 };
 
 // Runtime headers that the command's files may include besides the promised ones: small tools that do not depend on
@@ -84,7 +86,8 @@ const std::set<std::string> small_tools = {
     "runtime/base/first_error.h",   "runtime/base/json_text.h",     "runtime/base/memory_budget.h",
     "runtime/base/memory_watch.h",  "runtime/base/path_list.h",     "runtime/base/printable.h",
     "runtime/picture/tone.h",       "runtime/report/number_text.h", "runtime/report/progress.h",
-    "runtime/base/setting_names.h", "runtime/base/stopwatch.h",     "runtime/base/threads.h"};
+    "runtime/base/setting_names.h", "runtime/base/stopwatch.h",     "runtime/base/threads.h",
+    "runtime/solver/figure_table.h"};
 
 // Internal headers of the library that only the command's files may include; other programs do not need them.
 const std::set<std::string> for_our_programs = {"bindings/host/graph_parameter.h", "bindings/run/study_scene.h",

@@ -140,11 +140,7 @@ public:
     bool keeps_momentum() const override { return true; }
     void project(Substep&) override {}
     void solve_velocities(Substep& step) override { step.v[0] *= in_substeps; }
-    Residual close(Substep& step) override
-    {
-        step.v[0] *= after;
-        return {};
-    }
+    void close(Substep& step, FrameFigures&) override { step.v[0] *= after; }
 };
 
 TEST_CASE("energy or momentum that nothing accounts for is a warning with its size", "[solve][ledger]")

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/report/number_text.h"
-#include "runtime/report/totals.h"
+#include "runtime/report/statistics.h"
 #include "tests/test.h"
 
 using namespace rapid;
@@ -25,8 +25,8 @@ FrameResult frame_result()
     result.figures.penetration_max = 0.25;
     result.figures.contact_energy = {0.5, 3};
     result.figures.bands = {{"collide1", 0.125, 5000, 0.5}};
-    result.figures.script_seconds = 0.125;
-    result.figures.solve_seconds = 0.5;
+    result.figures.seconds.script = 0.125;
+    result.figures.seconds.solve = 0.5;
     result.total_seconds = 1;
     // The work of a frame with two subframes.
     result.work = {{{"emit1"}, NodeWork::Stage::Graph, 0, 0.25, 2, 64},
@@ -37,20 +37,20 @@ FrameResult frame_result()
 
 // A run with its frames, which RunStatistics itself does not store.
 struct Recorded : RunStatistics {
-    std::vector<FrameStatistics> frames;
+    std::vector<FrameFigures> frames;
 };
 
 std::string to_json(const Recorded& run)
 {
     std::string text = json_head(run);
-    for (const FrameStatistics& frame : run.frames) text += json_line(frame, &frame == run.frames.data());
+    for (const FrameFigures& frame : run.frames) text += json_line(frame, &frame == run.frames.data());
     return text + json_end(run);
 }
 
 std::string summary(const Recorded& run)
 {
     RunTotals totals;
-    for (const FrameStatistics& frame : run.frames) totals.add(frame);
+    for (const FrameFigures& frame : run.frames) totals.add(frame);
     return summary(run, totals);
 }
 
@@ -62,7 +62,7 @@ Recorded run_of(std::initializer_list<std::uint64_t> points)
     run.peak_bytes = 3 << 20;
     run.seconds = 0.5;
     for (const std::uint64_t count : points) {
-        FrameStatistics frame;
+        FrameFigures frame;
         frame.frame = static_cast<std::int64_t>(run.frames.size()) + 1;
         frame.points = count;
         run.frames.push_back(frame);
@@ -81,7 +81,7 @@ std::vector<std::string> keys_of(const ordered_json& json)
 
 TEST_CASE("a frame's stages before writing add up to its wall time", "[report]")
 {
-    const FrameStatistics frame = statistics_of(frame_result());
+    const FrameFigures frame = statistics_of(frame_result());
     CHECK(frame.seconds.script == 0.125);
     CHECK(frame.seconds.solve == 0.5);
     CHECK(frame.seconds.graph == 0.375);
@@ -129,7 +129,7 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
 TEST_CASE("estimated errors are told by their median, 95 % and largest, in the file and in the summary", "[report]")
 {
     FrameResult result = frame_result();
-    for (int i = 100; i >= 0; --i) result.figures.errors.push_back(i * 1e-4);
+    for (int i = 100; i >= 0; --i) result.figures.error.values.push_back(i * 1e-4);
     Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     const ordered_json error = ordered_json::parse(to_json(run))["frames"][0]["error"];
@@ -143,7 +143,7 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
 TEST_CASE("where no error is estimated, that is told, and why; unless nothing was solved", "[report]")
 {
     FrameResult result = frame_result();
-    result.figures.errors.clear();
+    result.figures.error.values.clear();
     result.figures.left_out_of_errors = {"all points, as they are strange"};
     Recorded run = run_of({});
     run.frames = {statistics_of(result)};
@@ -165,8 +165,8 @@ TEST_CASE("errors of single frames are told by the worst of these frames, and th
     Recorded run = run_of({});
     for (int k = 0; k < 5; ++k) {
         result.frame = 10 + k;
-        result.figures.frame_errors.clear();
-        for (int i = 0; k % 2 == 1 && i <= 100; ++i) result.figures.frame_errors.push_back(k * i * 1e-4);
+        result.figures.frame_error.values.clear();
+        for (int i = 0; k % 2 == 1 && i <= 100; ++i) result.figures.frame_error.values.push_back(k * i * 1e-4);
         if (k == 2) result.figures.left_out_of_errors = {"the rest"};
         run.frames.push_back(statistics_of(result));
     }
@@ -180,7 +180,7 @@ TEST_CASE("errors of single frames are told by the worst of these frames, and th
 TEST_CASE("what rounding is off by is told by its largest, apart from the estimated error", "[report]")
 {
     FrameResult result = frame_result();
-    result.figures.errors = {0};
+    result.figures.error.values = {0};
     result.figures.rounding = 0.25;
     Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
@@ -191,14 +191,14 @@ TEST_CASE("what rounding is off by is told by its largest, apart from the estima
 TEST_CASE("a drift of energy is told by its mean and its largest, whichever way, where there is an energy", "[report]")
 {
     FrameResult result = frame_result();
-    result.figures.energy_drift = {0.5, -2, 0};
+    result.figures.energy_drift.values = {0.5, -2, 0};
     Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["energy_drift"] == ordered_json{{"mean", -0.5}, {"max", 2.0}});
     CHECK_THAT(summary(run),
                Catch::Contains("collisions aside: -5.0e-01 J/kg since birth on average, 2.0e+00 at most"));
 
-    result.figures.has_no_energy = true;
+    result.figures.energy_drift.is_defined = false;
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][1]["energy_drift"].is_null());
     CHECK_THAT(summary(run), !Catch::Contains("of motion"));
@@ -267,8 +267,8 @@ TEST_CASE("the summary of an empty scene is one of no points, not of none run", 
 TEST_CASE("the totals of a run tell what its frames tell, and writing is added behind them", "[report]")
 {
     FrameResult result = frame_result();
-    for (int i = 0; i <= 100; ++i) result.figures.errors.push_back(i * 1e-4);
-    result.figures.energy_drift = {0.5, -2, 0};
+    for (int i = 0; i <= 100; ++i) result.figures.error.values.push_back(i * 1e-4);
+    result.figures.energy_drift.values = {0.5, -2, 0};
     result.figures.constraint_rows = 3;
     Recorded run = run_of({5, 1, 9, 2});
     for (int k = 0; k < 4; ++k) {
@@ -277,7 +277,7 @@ TEST_CASE("the totals of a run tell what its frames tell, and writing is added b
         run.frames.push_back(statistics_of(result));
     }
     RunTotals totals;
-    for (const FrameStatistics& frame : run.frames) totals.add(frame);
+    for (const FrameFigures& frame : run.frames) totals.add(frame);
     CHECK(summary(run, totals) == summary(run));
     CHECK_THAT(summary(run), Catch::Contains("residual of constraints: 5.0e-01 m at most (frame 12)"));
 

@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
 #include "bindings/scene/scene_inside.h"
 #include "include/rapid/run.h"
+#include "runtime/solver/figure_table.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/scene/opened.h"
 #include "tests/test.h"
@@ -195,6 +197,31 @@ TEST_CASE("a run that was ended goes on in another one to the same files", "[run
     }
     requested.cache.replace = true;
     complete(requested, {}, other);
+}
+
+TEST_CASE("the statistics of a frame have every figure of the table, also if a cache has the frame", "[run]")
+{
+    std::set<std::string> figures;
+#define RAPID_FIGURE(type, name, together, later, reported, ...) \
+    if (std::string(#reported) != "false") figures.insert(#name);
+    RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
+    const test::TemporaryFolder folder;
+    RunOptions requested = options(folder, {1, 2});
+    requested.text = test::every_figure;
+    requested.statistics = folder / "statistics.json";
+    requested.cache.folder = folder / "cache";
+    std::vector<nlohmann::json> frames;
+    for (const bool is_known : {false, true}) {
+        Reported reported;
+        complete(requested, reported.listener());
+        for (const RunFrame& frame : reported.frames) CHECK(frame.is_known == is_known);
+        frames.push_back(nlohmann::json::parse(content(requested.statistics)).at("frames"));
+    }
+    std::set<std::string> keys;
+    for (const auto& [key, value] : frames[0].at(1).items()) keys.insert(key);
+    CHECK(keys == figures);
+    CHECK(frames[0] == frames[1]);
 }
 
 TEST_CASE("without a cache a run ends behind its frame all the same", "[run]")

@@ -35,7 +35,7 @@ public:
     Dynamics dynamics;
     SolveOptions options;
     SleepRecords sleep_records;
-    SolveResult last;              // of the last frame
+    FrameFigures last;             // of the last frame
     std::uint64_t collisions = 0;  // over all frames
     double penetration_max = 0;    // over all frames, m
 

@@ -323,5 +323,46 @@ TEST_CASE("results are the same bits at any place in the set, and whichever othe
     CHECK(same_bits(alone.points.v(), last_of(among.points.v(), 3000)));
 }
 
+TEST_CASE("of the parts of a frame, counts add up, and later figures of its end replace earlier ones", "[solve]")
+{
+    FrameFigures first, second;
+    first.born = 3, first.collisions = 2, first.substeps = 4, first.trapped = 5, first.constraint_rows = 7;
+    first.error.values = {1, 2};
+    first.contact_grids.emplace();
+    first.bands = {{"a", 1, 1, 0.5}, {"b", 1, 1, 0.25}};
+    second.born = 1, second.substeps = 2, second.trapped = 2, second.constraint_rows = 6, second.error.values = {3};
+    second.bands = {{"b", 2, 2, 0.5}};
+    first.append(second);
+    CHECK(first.born == 4);
+    CHECK(first.collisions == 2);
+    CHECK(first.substeps == 4);
+    CHECK(first.trapped == 5);
+    CHECK(first.constraint_rows == 6);
+    CHECK(first.error.values == std::vector<double>{3});
+    CHECK(!first.contact_grids);
+    REQUIRE(first.bands.size() == 2);
+    CHECK((first.bands[0].node == "b" && first.bands[0].seconds == 0.75 && first.bands[0].width == 2));
+    CHECK(first.bands[1].node == "a");
+}
+
+TEST_CASE("of points that are advanced side by side, counts add up, and the largest error stays", "[solve]")
+{
+    FrameFigures all, chunk;
+    all.trapped = 5, all.constraint_rows = 7, all.penetration_max = 0.25, all.rounding = 0.5;
+    all.error.values = {1, 2}, all.energy_drift.values = {1};
+    all.contact_grids.emplace().search_seconds = 1;
+    chunk.trapped = 2, chunk.constraint_rows = 6, chunk.penetration_max = 0.5, chunk.rounding = 0.25;
+    chunk.error.values = {3}, chunk.energy_drift.is_defined = false;
+    all.add(chunk);
+    CHECK(all.trapped == 7);
+    CHECK(all.constraint_rows == 13);
+    CHECK(all.penetration_max == 0.5);
+    CHECK(all.rounding == 0.5);
+    CHECK(all.error.values == std::vector<double>{1, 2, 3});
+    CHECK(all.contact_grids->search_seconds == 1);
+    all.energy_drift.summarise();
+    CHECK(!all.energy_drift.summary);  // not defined for all points
+}
+
 }  // namespace
 }  // namespace rapid

@@ -1,41 +1,49 @@
 // Charts over frames, with one or more curves each. A click goes to a frame.
 import { element, prepare, colour, brief, seconds, unit } from "./dom.js";
 
-const energy = (f) => (f.ledger ? f.ledger.kinetic + f.ledger.potential + f.ledger.elastic : undefined);
-const one = (read) => [["", "accent", read]];
-// name, unit, lines: name, colour and value in a frame of each line.
-const charts = [
-  ["points", "", one((f) => f.points)],
-  ["time of a frame", "s", one((f) => f.seconds?.total)],
-  ["", "s", [["solve", "accent", (f) => f.seconds?.solve], ["scripts", "good", (f) => f.seconds?.script], ["graph", "warn", (f) => f.seconds?.graph]]],
-  ["estimated error, 95 %", "m", one((f) => f.error?.position_p95)],
-  ["deepest penetration", "m", one((f) => f.penetration_max)],
-  ["contacts", "", one((f) => f.collisions)],
-  ["sub-steps", "", one((f) => f.substeps)],
-  ["asleep", "", one((f) => f.asleep)],
-  ["energy of constrained points", "J", one(energy)],
-  ["energy drift, largest", "J/kg", one((f) => f.energy_drift?.max)],
-];
+// The drawn value of a figure that has several.
+const parts = {
+  seconds: (f) => f.seconds?.total,
+  error: (f) => f.error?.position_p95,
+  energy_drift: (f) => f.energy_drift?.max,
+  ledger: (f) => f.ledger && f.ledger.kinetic + f.ledger.potential + f.ledger.elastic,
+};
+const stages = [["solve", "accent", (f) => f.seconds?.solve], ["scripts", "good", (f) => f.seconds?.script], ["graph", "warn", (f) => f.seconds?.graph]];
+
+// Returns name, unit and lines of each chart: a line has a name, a colour and its value in a frame.
+function chartsOf(listed) {
+  return listed.flatMap(({ key, title, unit }) => {
+    const chart = [title, unit, [["", "accent", parts[key] ?? ((f) => f[key])]]];
+    return key === "seconds" ? [chart, ["", unit, stages]] : [chart];
+  });
+}
 
 export class Figures {
   constructor(root, { go }) {
     this.root = element("div", { id: "figures" });
     root.append(this.root);
-    this.known = null;
+    this.go = go;
     this.byFrame = new Map();
-    this.charts = charts.map(([name, of, lines]) => {
+    this.declare([]);
+    new ResizeObserver(() => this.draw()).observe(this.root);
+  }
+
+  // listed: key, title and unit of each figure with a chart, from the server.
+  declare(listed) {
+    if (this.charts?.length) return;
+    this.known = null;
+    this.charts = chartsOf(listed).map(([name, of, lines]) => {
       const canvas = element("canvas", { title: `${name || "seconds by stage"}: a click goes to the frame` }), value = element("span", { class: "number" });
       const names = lines.map(([line, tint]) => element("span", { class: line ? `line ${tint}` : "" }, line || name));
-      const chart = { of, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
+      const chart = { name, of, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
       canvas.addEventListener("click", (event) => {
         const box = canvas.getBoundingClientRect();
-        go(Math.round(this.first + ((event.clientX - box.left) / box.width) * (this.last - this.first)));
+        this.go(Math.round(this.first + ((event.clientX - box.left) / box.width) * (this.last - this.first)));
       });
       this.root.append(chart.box);
       return chart;
     });
     this.know([]);
-    new ResizeObserver(() => this.draw()).observe(this.root);
   }
 
   of(frame) { return this.byFrame.get(frame); }

@@ -237,7 +237,7 @@ async function show(frame, fresh = false) {
 function tellFrame() {
   const figure = figures.of(state.frame);
   graph.figures(figure);
-  inspector.frame(state.frame, figure, state.status);
+  inspector.frame(state.frame, figure, state.status, figures.charts);
 }
 
 // Refreshes the frame's details besides its points.
@@ -510,6 +510,7 @@ async function showFigures(status) {
       // The figures of the previous run stay until new ones arrive.
       const known = state.statisticsRun === state.status.run ? state.statistics : [];
       const answer = await ask("figures", known.length ? { after: known[known.length - 1].frame } : {});
+      figures.declare(answer.charts);
       if (answer.run !== state.status.run || !answer.figures.length) break;
       if (answer.run !== state.statisticsRun) { state.statistics = []; state.statisticsRun = answer.run; }
       state.statistics.push(...answer.figures);

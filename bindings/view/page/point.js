@@ -114,17 +114,16 @@ export class Inspector {
       ...Object.entries(found.groups).map(([name, count]) => element("div", {}, `${brief(count)} in ${name}`)));
   }
 
-  frame(number, figure, status) {
+  frame(number, figure, status, charts) {
     const rows = [];
     const add = (name, text, title) => rows.push(element("tr", title ? { title } : {}, element("th", {}, name), element("td", { class: "number" }, text)));
     if (figure?.seconds) {
       add("points", `${brief(figure.points)}  (+${brief(figure.born)} −${brief(figure.died)})`, "born, died in this frame");
       for (const stage of ["solve", "script", "graph"]) if (figure.seconds[stage] > 0) add(stage, seconds(figure.seconds[stage]));
-      if (figure.error) add("error, 95 %", `${brief(figure.error.position_p95)} m`, "estimated, of the positions since birth");
-      if (figure.collisions) add("contacts", brief(figure.collisions));
-      if (figure.penetration_max) add("deepest", `${brief(figure.penetration_max)} m`);
-      if (figure.asleep) add("asleep", brief(figure.asleep));
-      add("sub-steps", brief(figure.substeps));
+      for (const { name, of, lines } of charts) {
+        const value = lines[0][2](figure);
+        if (name && name !== "points" && of !== "s" && value) add(name, `${brief(value)} ${of}`);
+      }
     } else if (figure) {
       add("points", brief(figure.points));
     }

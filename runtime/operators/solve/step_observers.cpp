@@ -99,9 +99,9 @@ public:
             if (step.tolerance) std::erase_if(found, [](const Stiffness& stiffness) { return !stiffness.is_exact(); });
             append(step.now.figures.stiff, found);
         }
-        if (!step.flow.simulation->trial) return;
-        Resolution& resolution = step.now.figures.resolution;
-        resolution = coarser(resolution, resolution_of(entered, options.h));
+        Trial* const trial = step.flow.simulation->trial.get();
+        if (!trial) return;
+        trial->resolution = coarser(trial->resolution, resolution_of(entered, options.h));
         if (!step.flow.dynamics.actions().empty()) try_actions(step, entered);
     }
 
@@ -152,9 +152,9 @@ public:
         const double rounding = shadows_.rounding(!step.flow.dynamics.colliders().empty());
         figures.rounding = std::max(figures.rounding, rounding);
         if (drift)
-            append(figures.energy_drift, *drift);
+            append(figures.energy_drift.values, *drift);
         else
-            figures.has_no_energy = true;
+            figures.energy_drift.is_defined = false;
     }
 
     void save(StateWriter& to) const override { to(shadows_, coupled_, drift_, tolerance_check_); }
@@ -196,7 +196,7 @@ private:
             finer.log = nullptr;
             step.advance(shadows, step.finer, finer, 2);
         });
-        append(step.now.figures.errors, errors);
+        append(step.now.figures.error.values, errors);
         step.is_exact = shadows_.idle();
         if (!step.is_exact) step.note_errors(shadows_.ids(), std::move(errors));
     }
@@ -205,8 +205,8 @@ private:
     {
         CoupledErrors::Errors found = coupled_.end(step.flow.points);
         FrameFigures& figures = step.now.figures;
-        append(figures.errors, found.since_birth);
-        append(figures.frame_errors, found.of_frame);
+        append(figures.error.values, found.since_birth);
+        append(figures.frame_error.values, found.of_frame);
         if (!found.unknown.empty()) figures.left_out_of_errors.push_back(found.unknown);
         step.note_errors(found.ids, std::move(found.since_birth.empty() ? found.of_frame : found.since_birth));
     }
@@ -262,36 +262,19 @@ private:
 
     static void count(const Step& step)
     {
-        const SolveResult& result = step.done.result;
-        FrameFigures& figures = step.now.figures;
-        figures.substeps = std::max(figures.substeps, step.done.substeps);
-        figures.collisions += result.collisions;
-        figures.died += result.died;
-        figures.contact_limit += result.contact_limit;
-        figures.trapped += result.trapped;
-        figures.constraint_rows += result.residual.rows;
-        figures.loose_constraints += result.residual.loose;
-        figures.broken += result.residual.broken;
-        figures.asleep += result.asleep;
-        if (result.residual.search) figures.contact_search = result.residual.search;
-        figures.constraint_residual_max = std::max(figures.constraint_residual_max, result.residual.worst);
-        figures.contact_energy += result.contact_energy;
-        if (result.ledger && figures.ledger)
-            figures.ledger->append(*result.ledger);
-        else if (result.ledger)
-            figures.ledger = result.ledger;
-        figures.penetration_max = std::max(figures.penetration_max, result.penetration_max);
-        figures.beyond_tolerance += std::max(step.done.beyond_tolerance, step.beyond_tolerance);
+        FrameFigures figures = step.done;
+        figures.beyond_tolerance = std::max(figures.beyond_tolerance, step.beyond_tolerance);
+        step.now.figures.add(figures);
     }
 
     static void warn(const Step& step)
     {
-        const SolveResult& result = step.done.result;
+        const FrameFigures& result = step.done;
         if (result.contact_limit > 0)
             step.warn(
                 "points reached the limit of contacts in a step, two thousand impacts, and rest where they are for "
                 "what was left of it; take more substeps");
-        if (result.residual.loose > 0)
+        if (result.loose_constraints > 0)
             step.warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
         if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
             step.warn(
@@ -304,12 +287,12 @@ private:
                             "half_width shows it farther"
                           : "points are in a shape, with no way out: between shapes that leave no room, or in its "
                             "middle; let them be born outside, or move the shapes apart");
-        if (step.done.beyond_tolerance > 0)
+        if (result.beyond_tolerance > 0)
             step.warn(
                 fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps or "
                             "the tolerance",
-                            step.done.substeps, *step.tolerance));
-        if (step.beyond_tolerance > step.done.beyond_tolerance)
+                            result.substeps, *step.tolerance));
+        if (step.beyond_tolerance > result.beyond_tolerance)
             step.warn(
                 fmt::format("by a sample, {} points are farther than {:g} m from where other sub-steps take them: the "
                             "forces change within a sub-step; take more substeps to begin with",
@@ -400,10 +383,13 @@ private:
 
 double Step::allowed_error() const { return *tolerance / flow.simulation->subframes; }
 
-ToleranceResult Step::advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by) const
+FrameFigures Step::advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by) const
 {
-    if (!tolerance) return {solve(points, dynamics, with), with.substeps, 0};
-    return solve_within(points, dynamics, with, allowed_error() / (finer_by * finer_by), finer_by * max_substeps);
+    if (tolerance)
+        return solve_within(points, dynamics, with, allowed_error() / (finer_by * finer_by), finer_by * max_substeps);
+    FrameFigures figures = solve(points, dynamics, with);
+    figures.substeps = with.substeps;
+    return figures;
 }
 
 void Step::note_errors(std::span<const std::int64_t> of, std::vector<double> found)

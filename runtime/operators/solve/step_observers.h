@@ -25,7 +25,7 @@ struct Step {
     const int max_substeps;                 // with a tolerance
     SolveOptions options = {};
     Dynamics run = {}, finer = {};  // for the points; for shadows, with twice the substeps
-    ToleranceResult done = {};      // after the advance
+    FrameFigures done = {};         // after the advance
 
     // Findings of observers that later ones read.
     std::uint64_t beyond_tolerance = 0;  // points that miss the tolerance, from a sample
@@ -44,8 +44,7 @@ struct Step {
     double allowed_error() const;  // m, from the tolerance
     // Advances points by the step: with the substeps of the options, or with those that the tolerance needs. With
     // twice as fine steps, the allowed error is a quarter.
-    ToleranceResult advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with,
-                            int finer_by = 1) const;
+    FrameFigures advance(PointSet& points, const Dynamics& dynamics, const SolveOptions& with, int finer_by = 1) const;
     void note_errors(std::span<const std::int64_t> of, std::vector<double> found);
     void warn(const std::string& text) const;
 };

@@ -104,8 +104,8 @@ public:
     // Returns the work of contacts in the motion of a point under linear forces, J/kg, since begin().
     double contact_work(std::size_t i) const { return audit_.work().empty() ? 0 : audit_.work()[i]; }
 
-    // Returns the counts of all blocks.
-    const ContactCounts& counts() const { return audit_.counts(); }
+    // Returns the figures of all blocks.
+    const FrameFigures& figures() const { return audit_.figures(); }
 
 private:
     void move_along_free_paths();

@@ -17,7 +17,7 @@ std::map<std::uint32_t, Vec3d> by_point(std::span<const Ejection::Displacement> 
 
 void ContactAudit::add(std::size_t i, int obstacle, const Impact& impact)
 {
-    ++counts_.contacts;
+    ++figures_.collisions;
     const std::optional<double>& record = block_.obstacles[obstacle].record;
     const bool records = record && impact.speed >= *record;
     if (!records && !block_.context.log) return;
@@ -40,7 +40,7 @@ void ContactAudit::add_energy(const TouchedPoints& touched, const StuckPoints& s
         const Vec3d P = motion.initial_P(i), v = motion.initial_v(i);
         const double change =
             0.5 * (block_.v[i] - v).dot(block_.v[i] + v) - motion.acceleration(i).dot(block_.P[i] - P);
-        counts_.energy.take(*mass * change);
+        figures_.contact_energy.take(*mass * change);
     }
 }
 
@@ -53,7 +53,7 @@ void ContactAudit::add_carried(const StuckPoints& stuck, const FreeMotion& motio
         const double work = 0.5 * (at.to_v - at.v).dot(at.to_v + at.v) +
                             (motion.is_damped() ? motion.potential_change(at.i, at.P, at.to_P)
                                                 : -motion.acceleration(at.i).dot(at.to_P - at.P));
-        counts_.energy.take(*mass * work);
+        figures_.contact_energy.take(*mass * work);
         if (motion.is_damped()) all_work_[at.i] += work;
     }
 }
@@ -69,7 +69,7 @@ void ContactAudit::count_work(const TouchedPoints& touched)
     for (const std::uint32_t i : touched.list()) {
         const std::optional<double> mass = block_.moved_mass(i);
         if (work_[i] == 0 || !mass) continue;
-        counts_.energy.take(*mass * work_[i]);
+        figures_.contact_energy.take(*mass * work_[i]);
         all_work_[i] += work_[i];
     }
 }
@@ -79,7 +79,7 @@ void ContactAudit::add_displacements(std::span<const Ejection::Displacement> dis
     for (const auto& [i, by] : by_point(displacements)) {
         const std::optional<double> mass = block_.moved_mass(i);
         if (mass)
-            counts_.energy.take(
+            figures_.contact_energy.take(
                 *mass * (motion.potential(i, motion.initial_P(i) + by) - motion.potential(i, motion.initial_P(i))));
     }
 }
@@ -102,7 +102,7 @@ void ContactAudit::add_final_corrections(std::span<const Vec3d> P,
         if (!mass) continue;
         const double work = motion.is_damped() ? motion.potential(i, P[i]) - motion.potential(i, P[i] - by)
                                                : -motion.acceleration(i).dot(by);
-        counts_.energy.take(*mass * work);
+        figures_.contact_energy.take(*mass * work);
     }
 }
 

@@ -41,6 +41,7 @@ class EnergyIslands;
 class Sleep;
 class StepLog;
 struct ContactMaterial;
+struct FrameFigures;
 struct Spin;
 
 // The coupled points of a set in one substep; shapes [size].
@@ -85,21 +86,6 @@ struct Substep {
     std::size_t size() const { return points.size(); }
     Mobility mobility_of(std::size_t i) const { return mobility.empty() ? Mobility{dt, 0.5 * dt * dt} : mobility[i]; }
     bool lives(std::size_t i) const { return dead.empty() || !dead[i]; }
-};
-
-// Statistics: how well a frame's rows are satisfied and, for contacts, how their pairs were found.
-struct Residual {
-    double worst = 0;          // m
-    std::uint64_t rows = 0;    // active rows
-    std::uint64_t loose = 0;   // active rows with an error above a tenth of their size
-    std::uint64_t broken = 0;  // rows that broke in the frame
-
-    struct Search {
-        std::vector<std::size_t> grids;  // number of points in each, from coarse to fine
-        double error = 0, excess = 0;    // of their cells (RadiusGrids)
-        double seconds = 0;
-    };
-    std::optional<Search> search;
 };
 
 // The rows of one constraint, over the substeps of a frame. Called from one thread. May use others, but results must
@@ -152,8 +138,8 @@ public:
     virtual void add_forces(const Substep&) {}
     virtual void correct_penetration(Substep&) {}
 
-    // Ends the last substep: stores the state that the next frame starts with.
-    virtual Residual close(Substep& step) = 0;
+    // Ends the last substep: stores the state that the next frame starts with, and counts the rows and their errors.
+    virtual void close(Substep& step, FrameFigures& figures) = 0;
 };
 
 // The object that a constraint node adds. It lives for one frame; persistent state belongs to its node.

@@ -17,6 +17,7 @@
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/impact.h"
 #include "runtime/solver/constraints/spin.h"
+#include "runtime/solver/figures.h"
 
 namespace rapid {
 namespace {
@@ -504,15 +505,14 @@ void Contacts::correct_penetration(Substep& step)
     });
 }
 
-Residual Contacts::close(Substep& step)
+void Contacts::close(Substep& step, FrameFigures& figures)
 {
-    Residual result;
     const auto count = [&](std::uint32_t i, std::uint32_t j, double reach, std::uint32_t pair) {
         const double overlap = reach - (step.points[i].P - step.points[j].P).norm();
         if (!(overlap > 0) && !(impulses_.normal[pair] > 0)) return;
-        ++result.rows;
-        result.worst = std::max(result.worst, overlap);
-        result.loose += overlap > 0.1 * std::min(material_.radius[i], material_.radius[j]);
+        ++figures.constraint_rows;
+        figures.constraint_residual_max = std::max(figures.constraint_residual_max, overlap);
+        figures.loose_constraints += overlap > 0.1 * std::min(material_.radius[i], material_.radius[j]);
     };
     packs_.for_each([&](const PairContact& contact) {
         if (!sleep_.both_asleep(contact.i, contact.j)) count(contact.i, contact.j, contact.reach, contact.pair);
@@ -525,10 +525,11 @@ Residual Contacts::close(Substep& step)
             if (sleep_.both_asleep(i, j)) count(i, j, material_.reach(i, j), k);
         }
     }
-    Residual::Search search{{}, grids_.error, grids_.excess, search_seconds_};
-    for (const RadiusGrids::Grid& grid : grids_.grids) search.grids.push_back(grid.points);
-    result.search = std::move(search);
-    return result;
+    ContactGrids& grids = figures.contact_grids.emplace();
+    for (const RadiusGrids::Grid& grid : grids_.grids) grids.points.push_back(grid.points);
+    grids.error = grids_.error;
+    grids.excess = grids_.excess;
+    grids.search_seconds = search_seconds_;
 }
 
 }  // namespace rapid

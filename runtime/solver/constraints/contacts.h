@@ -101,7 +101,7 @@ public:
     void solve_velocities(Substep& step) override;
     void add_forces(const Substep& step) override;
     void correct_penetration(Substep& step) override;
-    Residual close(Substep& step) override;
+    void close(Substep& step, FrameFigures& figures) override;
 
     // Stores all results of the last frame's search, because the next frame may reuse them.
     template <class Archive>

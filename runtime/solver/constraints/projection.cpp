@@ -361,20 +361,11 @@ void Projection::follow_rods(const Substep& step)
     for (CarriedImpulses* carrying : carrying_) carrying->follow_rods(rods_);
 }
 
-Residual Projection::close(Substep& step, ShapeLoads* loads)
+void Projection::close(Substep& step, ShapeLoads* loads, FrameFigures& figures)
 {
-    Residual all;
-    if (!(step.dt > 0)) return all;
-    each([&](Coupling& coupling) {
-        const Residual residual = coupling.close(step);
-        all.worst = std::max(all.worst, residual.worst);
-        all.rows += residual.rows;
-        all.loose += residual.loose;
-        all.broken += residual.broken;
-        if (residual.search) all.search = residual.search;
-    });
+    if (!(step.dt > 0)) return;
+    each([&](Coupling& coupling) { coupling.close(step, figures); });
     if (shapes_ && loads) shapes_->remember(*loads, errors_.ids(), step);
-    return all;
 }
 
 }  // namespace rapid

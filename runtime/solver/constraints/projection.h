@@ -32,7 +32,7 @@ public:
     bool bounces() const;
     // Throws Error if a point's P or v is no longer finite.
     void advance(Substep& step);
-    Residual close(Substep& step, ShapeLoads* loads);
+    void close(Substep& step, ShapeLoads* loads, FrameFigures& figures);
 
     // The energy added so far, by position corrections that no velocity paid for (energy_bound.h) and by drivers; and
     // the energy that contacts, shapes and rows took after rods and springs.

@@ -37,6 +37,7 @@
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/system_motion.h"
 #include "runtime/solver/constraints/tree_motion.h"
+#include "runtime/solver/figures.h"
 #include "runtime/solver/step_log.h"
 
 namespace rapid {
@@ -351,23 +352,22 @@ public:
             });
     }
 
-    Residual close(Substep& step) override
+    void close(Substep& step, FrameFigures& figures) override
     {
-        Residual result;
-        result.broken = std::exchange(broken_, 0);
+        figures.broken += std::exchange(broken_, 0);
         typename Row::Vectors gradient;
         for (Row& row : rows_) {
             if (!row.active) continue;
-            ++result.rows;
+            ++figures.constraint_rows;
             const double residual = row.residual(step, gradient);
             if (!row.resting_residual_exact) row.resting_residual = residual;
             const double error = std::abs(row.error(residual, step.dt));
-            result.worst = std::max(result.worst, error);
+            figures.constraint_residual_max = std::max(figures.constraint_residual_max, error);
             if constexpr (arity > 1)
-                result.loose += row.has_yielded ||
-                                error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
+                figures.loose_constraints +=
+                    row.has_yielded ||
+                    error > 0.1 * (step.points[row.points[0]].P - step.points[row.points[1]].P).norm();
         }
-        return result;
     }
 
 private:

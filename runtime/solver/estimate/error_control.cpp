@@ -28,13 +28,13 @@ public:
         if (StuckColumns::are_needed(dynamics)) StuckColumns::add_to(points);
     }
 
-    ToleranceResult run()
+    FrameFigures run()
     {
         if (limits_.repeats)
             advance_blocks();
         else
             advance_copies();
-        done_.result.died = dead_.size();
+        done_.died = dead_.size();
         if (!dead_.empty()) {
             std::vector<std::uint8_t> alive(points_.size(), 1);
             for (const std::uint32_t i : dead_) alive[i] = 0;
@@ -133,16 +133,13 @@ private:
         options.substeps = substeps;
         options.met = nullptr;  // path kinds give that information
         options.taken = nullptr;
-        const SolveResult result = solve(set, dynamics_, options, run);
-        SolveResult& all = done_.result;
-        all.penetration_max = std::max(all.penetration_max, result.penetration_max);
+        const FrameFigures figures = solve(set, dynamics_, options, run);
+        if (limits_.is_first(substeps))
+            done_.add(figures);
+        else  // contacts are counted once
+            done_.penetration_max = std::max(done_.penetration_max, figures.penetration_max);
         done_.substeps = std::max(done_.substeps, run.largest_substeps());
         done_.beyond_tolerance += run.beyond_tolerance();
-        if (!limits_.is_first(substeps)) return;
-        all.collisions += result.collisions;
-        all.contact_limit += result.contact_limit;
-        all.trapped += result.trapped;
-        all.contact_energy += result.contact_energy;
     }
 
     PointSet& points_;
@@ -150,14 +147,14 @@ private:
     const SolveOptions& options_;
     const StepDoublingLimits limits_;
 
-    ToleranceResult done_;
+    FrameFigures done_;
     std::vector<std::uint32_t> dead_;  // indices
 };
 
 }  // namespace
 
-ToleranceResult solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
-                             int max_substeps)
+FrameFigures solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                          int max_substeps)
 {
     return ToleranceSolver(points, dynamics, options, tolerance, max_substeps).run();
 }

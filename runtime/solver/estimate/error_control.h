@@ -21,15 +21,10 @@
 
 namespace rapid {
 
-struct ToleranceResult {
-    SolveResult result;
-    int substeps = 1;                    // the largest number in a run of any point
-    std::uint64_t beyond_tolerance = 0;  // points that miss the tolerance at max_substeps
-};
-
 // Solves with the substeps that each point needs for an error of at most `tolerance` (m): options.substeps times a
-// power of 2, up to max_substeps.
-ToleranceResult solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
-                             int max_substeps);
+// power of 2, up to max_substeps. Of the figures, `substeps` is the largest number in a run of any point, and
+// `beyond_tolerance` counts the points that miss the tolerance at max_substeps.
+FrameFigures solve_within(PointSet& points, const Dynamics& dynamics, const SolveOptions& options, double tolerance,
+                          int max_substeps);
 
 }  // namespace rapid

@@ -7,47 +7,15 @@
 // given substeps, with as many as resolve the motion, and with many more.
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "runtime/solver/dynamics.h"
+#include "runtime/solver/figures.h"
 
 namespace rapid {
 
 struct SolveOptions;
-
-struct Stiffness {
-    enum Kind {
-        Drag,         // k dt, solved exactly
-        Spring,       // omega dt, solved exactly
-        SquaredDrag,  // c v dt
-        Decay,        // k dt
-        Oscillation,  // omega dt
-    };
-
-    std::string node;  // drag1; action "sun"
-    Kind kind = Drag;
-    double step = 0;         // the product that `kind` names, for the stiffest point
-    int substeps = 1;        // of the frame
-    std::int64_t frame = 0;  // in which it was found
-
-    // The largest position errors of the sample after this frame, m, with the current and with more substeps. Empty
-    // for parts that are solved exactly, and for coupled points, because a sample alone moves differently.
-    struct Improvement {
-        double error;
-        int substeps;
-        double error_after;
-    };
-    std::optional<Improvement> improvement;
-
-    // For a kind that is solved exactly: everything that acts on the points is, so their motion is exact, too.
-    bool alone = false;
-
-    bool is_exact() const { return kind == Drag || kind == Spring; }
-};
 
 // Returns the stiff forces and actions, in the order of the chain, for the points before Solve. Changes nothing.
 std::vector<Stiffness> find_stiff(const PointSet& points, const Dynamics& dynamics, const SolveOptions& options);

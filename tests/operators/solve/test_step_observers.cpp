@@ -88,7 +88,7 @@ TEST_CASE("points without a shadow have no error", "[solve][error]")
     const auto known = std::count_if(error.begin(), error.end(), [](float e) { return !std::isnan(e); });
     CHECK(known >= 1000);
     CHECK(known <= 1250);
-    CHECK(static_cast<std::size_t>(known) == orbit.solve.figures.errors.size());
+    CHECK(static_cast<std::size_t>(known) == orbit.solve.figures.error.values.size());
 }
 
 TEST_CASE("the state does not keep the figures, and a scene's own attributes stay", "[solve]")

@@ -103,7 +103,7 @@ TEST_CASE("a rope falls asleep where it hangs in balance", "[sleep]")
     scene.run(100);
     CHECK(same_bits(scene.points, rests));
     CHECK(scene.last.asleep == 20);
-    CHECK(scene.last.residual.rows == 20);  // sleeping rows are counted, too
+    CHECK(scene.last.constraint_rows == 20);  // sleeping rows are counted, too
 }
 
 TEST_CASE("all of a sleeping rope wakes when any part of it changes", "[sleep]")

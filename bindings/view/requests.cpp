@@ -29,7 +29,7 @@ const std::string& charts()
 {
     static const std::string text = [] {
         Json list = Json::array();
-#define RAPID_FIGURE(type, name, together, later, callback, unit, meaning, chart) \
+#define RAPID_FIGURE(type, name, together, later, callback, unit, meaning, chart, ...) \
     if (*chart) list.push_back({{"key", #name}, {"title", chart}, {"unit", unit}});
         RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE

@@ -204,9 +204,9 @@ std::string band_text(const Total<std::vector<BandFigures>>& bands)
 }
 
 // Returns "warning  points did so 5 times, in 3 frames from 7 to 48"; empty if no frame counted any.
-std::string warning_text(const Total<std::uint64_t>& total, const char* what)
+std::string warning_text(const Total<std::uint64_t>& total, std::string_view what)
 {
-    if (total.frames == 0) return "";
+    if (what.empty() || total.frames == 0) return "";
     const std::string where = total.frames == 1
                                   ? fmt::format("in frame {}", total.first)
                                   : fmt::format("in {} frames from {} to {}", total.frames, total.first, total.last);
@@ -214,19 +214,26 @@ std::string warning_text(const Total<std::uint64_t>& total, const char* what)
                        where);
 }
 
+template <class T>
+std::string warning_text(const Total<T>&, std::string_view)
+{
+    return "";
+}
+
 }  // namespace
 
 std::string summary(const RunStatistics& run, const RunTotals& totals)
 {
-    return points_text(totals) + frames_text(totals, run.seconds) +
-           fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes)) + error_text(totals) +
-           rounding_text(totals.rounding) + energy_text(totals.last.energy_drift.summary) +
-           ledger_text(totals.ledger.sum) + contact_text(totals) + broken_text(totals.broken) +
-           constraint_text(totals) + sleep_text(totals.last) + band_text(totals.bands) + advice(run.stiff) +
-           warning_text(totals.contact_limit, "points reached the limit of contacts") +
-           warning_text(totals.trapped, "points were deep in a shape") +
-           warning_text(totals.loose_constraints, "constraints were off by a tenth of their size") +
-           warning_text(totals.beyond_tolerance, "points were beyond the tolerance");
+    std::string text = points_text(totals) + frames_text(totals, run.seconds) +
+                       fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes)) + error_text(totals) +
+                       rounding_text(totals.rounding) + energy_text(totals.last.energy_drift.summary) +
+                       ledger_text(totals.ledger.sum) + contact_text(totals) + broken_text(totals.broken) +
+                       constraint_text(totals) + sleep_text(totals.last) + band_text(totals.bands) + advice(run.stiff);
+#define RAPID_FIGURE(type, name, together, later, reported, unit, meaning, chart, warning) \
+    text += warning_text(totals.name, warning);
+    RAPID_FIGURES(RAPID_FIGURE)
+#undef RAPID_FIGURE
+    return text;
 }
 
 std::string advice(const std::vector<Stiffness>& stiff)

@@ -498,7 +498,7 @@ return rapid.create {} :emit { source = rapid.mesh.box { size = {2, 4, 6} }, rat
         scene = fall()
         frame, shapes = scene.advance(), scene.shapes(1)
         snapshot = scene.save()
-        self.assertEqual((frame.size, frame.places([3, 99]).tolist()), (16, [3, 2**32 - 1]))
+        self.assertEqual((frame.size, frame.indices([3, 99]).tolist()), (16, [3, 2**32 - 1]))
         self.assertEqual(rapid.Frame.text_of(rapid.Frame.token_of("leaf")), "leaf")
         self.assertGreater(snapshot.size, 100)
         for thing, name in ((frame, "number"), (shapes, "has_camera"), (snapshot, "size"), (scene, "next_frame")):

@@ -226,7 +226,9 @@ void RunReport::line(const std::string& text)
 void RunReport::warning(const std::string& text)
 {
     const auto lock = locked();
-    if (warned_.insert(text).second) listener_.warning(text);
+    if (!warned_.insert(text).second) return;
+    ++totals_.warnings;
+    listener_.warning(text);
 }
 
 void RunReport::warning(const std::string& text, std::int64_t frame)
@@ -239,6 +241,7 @@ void RunReport::warning(const std::string& text, std::int64_t frame)
 void RunReport::report_warning(const std::string& text, std::int64_t frame)
 {
     if (warned_.contains(text) || !frame_warnings_.add(text, frame)) return;
+    ++totals_.warnings;
     listener_.warning(fmt::format("frame {}: {}", frame, text));
 }
 
@@ -285,7 +288,7 @@ void RunReport::add_writing()
 {
     const std::optional<std::int64_t> unwritten = files_.first_unwritten();  // first: files of frames before are taken
     for (const FrameFiles::Written& file : files_.take_written()) {
-        totals_.add_writing(file.seconds);
+        totals_.add_file(file.path, file.film, file.points, file.seconds);
         if (statistics_) statistics_->add_writing(file.frame, file.seconds);
         if (profile_) profile_->add(file);
         if (cache_) cache_->written(file);

@@ -181,8 +181,8 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     std::error_code ignored;
     const std::uintmax_t bytes = std::filesystem::file_size(path, ignored);
     const std::lock_guard lock(mutex_);
-    written_.push_back(
-        {job.frame.number, path, spent, bytes, std::chrono::steady_clock::now(), target.film, std::move(fit)});
+    written_.push_back({job.frame.number, path, spent, bytes, std::chrono::steady_clock::now(), target.film,
+                        std::move(fit), job.points.size()});
     if (--due_[job.frame.number] == 0) due_.erase(job.frame.number);
 }
 

@@ -35,6 +35,7 @@ public:
         bool film = false;  // part of a film, which is complete only with its last frame
         // For a picture: the state from which later frames continue. Null if the picture had to wait for points.
         std::shared_ptr<const PictureFit> fit = nullptr;
+        std::uint64_t points = 0;  // 0 also for a picture that had to wait
     };
 
     using Write = std::function<void(const std::filesystem::path& file, const PointSet& points)>;

@@ -34,6 +34,17 @@ std::string duration_text(double seconds)
     return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
+std::string length_text(double metres)
+{
+    const double least[] = {1, 1e-2, 1e-3};  // m
+    const char* const units[] = {"m", "cm", "mm", "µm"};
+    const double factors[] = {1, 1e2, 1e3, 1e6};
+    const auto unit = std::find_if(std::begin(least), std::end(least), [&](double l) { return metres >= l; });
+    const auto k = static_cast<std::size_t>(unit - std::begin(least));
+    const double value = factors[k] * metres;
+    return value >= 10 ? fmt::format("{:.0f} {}", value, units[k]) : fmt::format("{:.2g} {}", value, units[k]);
+}
+
 std::string table_text(const TextTable& rows, std::size_t left)
 {
     std::vector<std::size_t> widths(rows.front().size());

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -59,19 +60,10 @@ struct Total<T> {
     }
 };
 
-template <class T>
-requires std::is_same_v<T, StageSeconds> || std::is_same_v<T, ContactEnergy>
-struct Total<T> {
-    T sum;
-
-    void add(std::int64_t, const T& figure) { sum += figure; }
-};
-
 template <>
 struct Total<Sampled<ErrorQuantiles>> {
     std::optional<ErrorQuantiles> worst;  // of the frame with the largest error
-    std::int64_t worst_frame = 0;
-    std::uint64_t frames = 0;  // with an estimate
+    std::uint64_t frames = 0;             // with an estimate
 
     void add(std::int64_t frame, const Sampled<ErrorQuantiles>& error);
 };
@@ -84,24 +76,10 @@ struct Total<std::vector<std::string>> {
 };
 
 template <>
-struct Total<std::optional<Ledger>> {
-    std::optional<Ledger> sum;
+struct Total<std::vector<NodeWork>> {
+    std::map<std::string, double> seconds;  // by pass over the points
 
-    void add(std::int64_t, const std::optional<Ledger>& ledger);
-};
-
-template <>
-struct Total<std::optional<ContactGrids>> {
-    double search_seconds = 0;
-
-    void add(std::int64_t, const std::optional<ContactGrids>& grids);
-};
-
-template <>
-struct Total<std::vector<BandFigures>> {
-    std::map<std::string, BandFigures> by_node;  // the largest, and the seconds of all frames
-
-    void add(std::int64_t, const std::vector<BandFigures>& bands);
+    void add(std::int64_t, const std::vector<NodeWork>& passes);
 };
 
 struct RunTotals {
@@ -112,12 +90,19 @@ struct RunTotals {
     FrameFigures last;
     std::optional<std::int64_t> first_solved;  // frame with points
 
+    std::uint64_t warnings = 0;                     // printed during the run
+    std::map<std::string, double> writing_seconds;  // by extension
+    std::uint64_t files = 0, points_of_fullest = 0;
+    std::string fullest_file;
+    std::set<std::string> films;
+
     void add(const FrameFigures& figures);
-    void add_writing(double of_files) { seconds.sum.write += of_files; }
+    // Adds a file of a frame that has been written, or a frame of a film: its points, and the seconds that it took.
+    void add_file(const std::string& path, bool is_film, std::uint64_t points_of_file, double seconds_of_file);
 };
 
-// Returns a line each for points, frames, seconds by stage, memory, errors and other figures; and one for each stiff
-// node and each warning of Solve.
+// Returns six lines for the user: points, frames, the slowest part, the estimated error, the files, and whether all is
+// fine; or, instead of the last, a line for each thing to look at.
 std::string summary(const RunStatistics& run, const RunTotals& totals);
 
 // Returns a line for each stiff node.

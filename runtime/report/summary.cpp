@@ -1,24 +1,23 @@
-// The summary of a run: a line for each subject.
+// The summary of a run: six lines, the last of which says whether all is fine.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
+#include <filesystem>
 #include <string_view>
 
+#include "runtime/base/setting_names.h"
 #include "runtime/report/number_text.h"
 #include "runtime/report/statistics.h"
 #include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
 
-void Total<Sampled<ErrorQuantiles>>::add(std::int64_t frame, const Sampled<ErrorQuantiles>& error)
+void Total<Sampled<ErrorQuantiles>>::add(std::int64_t, const Sampled<ErrorQuantiles>& error)
 {
     if (!error.summary) return;
     ++frames;
-    if (worst && !(error.summary->max > worst->max)) return;
-    worst = error.summary;
-    worst_frame = frame;
+    if (!worst || error.summary->max > worst->max) worst = error.summary;
 }
 
 void Total<std::vector<std::string>>::add(std::int64_t frame, const std::vector<std::string>& strings)
@@ -26,27 +25,9 @@ void Total<std::vector<std::string>>::add(std::int64_t frame, const std::vector<
     for (const std::string& text : strings) first.emplace(text, frame);
 }
 
-void Total<std::optional<Ledger>>::add(std::int64_t, const std::optional<Ledger>& ledger)
+void Total<std::vector<NodeWork>>::add(std::int64_t, const std::vector<NodeWork>& passes)
 {
-    if (ledger && sum)
-        sum->append(*ledger);
-    else if (ledger)
-        sum = ledger;
-}
-
-void Total<std::optional<ContactGrids>>::add(std::int64_t, const std::optional<ContactGrids>& grids)
-{
-    if (grids) search_seconds += grids->search_seconds;
-}
-
-void Total<std::vector<BandFigures>>::add(std::int64_t, const std::vector<BandFigures>& bands)
-{
-    for (const BandFigures& band : bands) {
-        BandFigures& all = by_node[band.node];
-        all.width = std::max(all.width, band.width);
-        all.voxels = std::max(all.voxels, band.voxels);
-        all.seconds += band.seconds;
-    }
+    for (const NodeWork& pass : passes) seconds[fmt::format("{}", fmt::join(pass.nodes, " + "))] += pass.seconds;
 }
 
 void RunTotals::add(const FrameFigures& figures)
@@ -59,159 +40,96 @@ void RunTotals::add(const FrameFigures& figures)
     last = figures;
 }
 
+void RunTotals::add_file(const std::string& path, bool is_film, std::uint64_t points_of_file, double seconds_of_file)
+{
+    writing_seconds[std::filesystem::path(path).extension().string()] += seconds_of_file;
+    if (!is_film || films.insert(path).second) ++files;
+    if (!fullest_file.empty() && points_of_file <= points_of_fullest) return;
+    fullest_file = path;
+    points_of_fullest = points_of_file;
+}
+
 namespace {
+
+// m. Larger errors are usually visible in a picture.
+constexpr double visible_error = 0.01;
+
+// Formats a line of the summary. Labels are padded to one width.
+std::string line(const char* label, const std::string& text) { return fmt::format("{:<9}{}\n", label, text); }
 
 std::string points_text(const RunTotals& totals)
 {
-    if (totals.frames == 0) return "points   none: no frame was run\n";
-    std::string text = fmt::format("points   {}", with_separators(totals.last.points));
+    if (totals.frames == 0) return line("points", "none: no frame was run");
+    std::string text = with_separators(totals.last.points);
     if (*totals.points.most > totals.last.points)
         text += fmt::format(" (most: {} in frame {})", with_separators(*totals.points.most), totals.points.max_frame);
-    return text + '\n';
+    return line("points", text);
 }
 
-std::string frames_text(const RunTotals& totals, double run_seconds)
+std::string frames_text(const RunStatistics& run, const RunTotals& totals)
 {
-    std::string text = fmt::format("frames   {} in {}", totals.frames, duration_text(run_seconds));
-    if (totals.points.sum > 0 && run_seconds > 0)
-        text += fmt::format(", {} points a second", in_millions(static_cast<double>(totals.points.sum) / run_seconds));
-    const StageSeconds& seconds = totals.seconds.sum;
-    return text + fmt::format("\nseconds  graph {:.3f}, script {:.3f}, solve {:.3f}, write {:.3f}\n", seconds.graph,
-                              seconds.script, seconds.solve, seconds.write);
+    std::string text = fmt::format("{} in {}", totals.frames, duration_text(run.seconds));
+    if (totals.points.sum > 0 && run.seconds > 0)
+        text +=
+            fmt::format(", {} points per second", in_millions(static_cast<double>(totals.points.sum) / run.seconds));
+    return line("frames", text + fmt::format(", {} of memory", memory_text(run.peak_bytes)));
 }
 
-std::string worst_text(const Total<Sampled<ErrorQuantiles>>& error, const std::string& what)
+std::string slowest_text(const RunTotals& totals)
 {
-    const std::optional<ErrorQuantiles>& worst = error.worst;
-    if (!worst) return "";
-    // Errors that shadows cannot see must not be reported as zero.
-    constexpr std::string_view same = "the same at twice the sub-steps";
-    const auto within = [&](double e, std::string_view unit) {
-        return e > 0 ? fmt::format("below {:.1e}{}", e, unit) : std::string(same);
-    };
-    if (!(worst->max > 0)) return fmt::format("error    {}: {}\n", what, same);
-    return fmt::format("error    {}: half of the points {}, 95 % {}, the worst {:.1e} (frame {})\n", what,
-                       within(worst->p50, " m"), within(worst->p95, ""), worst->max, error.worst_frame);
+    std::map<std::string, double> all = totals.nodes.seconds;
+    for (const auto& [extension, seconds] : totals.writing_seconds) all["writing " + extension] += seconds;
+    double sum = 0;
+    for (const auto& [name, seconds] : all) sum += seconds;
+    if (!(sum > 0)) return "";
+    const auto slowest =
+        std::max_element(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    return line("slowest", fmt::format("{}, {:.0f} % of the work", slowest->first, 100 * slowest->second / sum));
 }
 
-// Returns the estimated errors of the worst frames, and the contributions that none of them includes.
+std::string within(const ErrorQuantiles& error)
+{
+    if (!(error.max > 0)) return "none found: twice the substeps give the same positions";
+    if (!(error.p95 > 0)) return fmt::format("all positions within {}", length_text(error.max));
+    return fmt::format("95 % of the positions within {}, all within {}", length_text(error.p95),
+                       length_text(error.max));
+}
+
+// Returns the largest estimated error, and the contributions that it does not include.
 std::string error_text(const RunTotals& totals)
 {
     if (!totals.first_solved && !totals.error.worst) return "";
-    std::string text = worst_text(totals.error, "since birth, estimated") +
-                       worst_text(totals.frame_error, fmt::format("of one frame, estimated in {} of {}",
-                                                                  totals.frame_error.frames, totals.frames));
-    if (text.empty()) text = "error    not estimated\n";
+    std::string text = "not estimated";
+    if (totals.error.worst)
+        text = within(*totals.error.worst);
+    else if (totals.frame_error.worst)
+        text = within(*totals.frame_error.worst) +
+               fmt::format(", in one frame ({} of {} estimated)", totals.frame_error.frames, totals.frames);
+    const char* separator = "; without ";
     for (const auto& [what, first] : totals.left_out_of_errors.first) {
-        text += "left out of the error: " + what;
+        text += separator + what;
         if (first > totals.first_solved.value_or(0)) text += fmt::format(" (from frame {} on)", first);
-        text += '\n';
+        separator = "; ";
     }
-    return text;
+    return line("error", text);
 }
 
-// Returns the displacement by rounding positions to single precision. More substeps do not reduce it.
-std::string rounding_text(const Total<double>& rounding)
+std::string files_text(const RunTotals& totals)
 {
-    if (!(rounding.most > 0.0)) return "";
-    return fmt::format("rounding of positions since birth: {:.1e} m at most (frame {})\n", *rounding.most,
-                       rounding.max_frame);
+    if (totals.files == 0)
+        return line("files", fmt::format("none written; {} NAME.####.png writes pictures", name_of(Setting::Output)));
+    return line("files", fmt::format("{} written; look at {}", with_separators(totals.files), totals.fullest_file));
 }
 
-// Returns the change of kinetic energy by the integrator; empty if it is 0 or not defined.
-std::string energy_text(const std::optional<DriftSummary>& drift)
+// Returns a line if any frame has the figure. warning: a sentence, with {} for its number and its frames.
+std::string warning_text(const Total<std::uint64_t>& total, std::string_view warning)
 {
-    if (!drift || drift->max == 0) return "";
-    return fmt::format("energy   of motion, collisions aside: {:+.1e} J/kg since birth on average, {:.1e} at most\n",
-                       drift->mean, drift->max);
-}
-
-// Returns the sources of energy change of constrained points; empty if there are none.
-std::string ledger_text(const std::optional<Ledger>& ledger)
-{
-    if (!ledger) return "";
-    std::vector<std::string> parts;
-    constexpr double rounding = 1e-6;  // of columns
-    const double size = std::abs(ledger->kinetic) + std::abs(ledger->by.contacts) + std::abs(ledger->by.rods) +
-                        std::abs(ledger->by.pins) + std::abs(ledger->by.drag) + std::abs(ledger->by_motion);
-    const auto add = [&](const char* by, double change) {
-        if (std::abs(change) > rounding * size) parts.push_back(fmt::format("{} {:+.3g}", by, change));
-    };
-    add("contacts", ledger->by.contacts);
-    if (ledger->by.split) {
-        add("friction", ledger->by.split->friction);
-        add("moving shapes", ledger->by.split->shapes);
-    }
-    add("rods and springs", ledger->by.rods);
-    add("pins", ledger->by.pins);
-    add("drag", ledger->by.drag);
-    add("all else", ledger->by_motion);
-    std::string text = fmt::format("energy   {:.3g} J of constrained points", ledger->energy());
-    if (!parts.empty()) text += fmt::format("; changed by {} J", fmt::join(parts, ", "));
-    return text + '\n';
-}
-
-// Returns the audit of all collisions; empty if there were none.
-std::string contact_text(const RunTotals& totals)
-{
-    const double deepest = totals.penetration_max.most.value_or(0);
-    if (totals.collisions.sum == 0 && !(deepest > 0)) return "";
-    return fmt::format("contacts {}, deepest {} at a frame's end; they took {:.3g} J, and added {:.3g} J\n",
-                       with_separators(totals.collisions.sum), deepest > 0 ? fmt::format("{:.1e} m", deepest) : "0 m",
-                       totals.contact_energy.sum.lost, totals.contact_energy.sum.added);
-}
-
-std::string broken_text(const Total<std::uint64_t>& broken)
-{
-    if (broken.sum == 0) return "";
-    return fmt::format("broken   {} {}, the first in frame {}\n", with_separators(broken.sum),
-                       broken.sum == 1 ? "pair" : "pairs", broken.first);
-}
-
-// Returns the residual of the constraints, if the frame with the worst one has any, and the grids of the contact
-// search.
-std::string constraint_text(const RunTotals& totals)
-{
-    const Total<double>& residual = totals.constraint_residual_max;
-    const Total<std::uint64_t>& rows = totals.constraint_rows;
-    // A residual of 0 is the worst in the first frame.
-    if (!(residual.most > 0.0) && (rows.frames == 0 || rows.first != residual.max_frame)) return "";
-    std::string text = fmt::format("residual of constraints: {:.1e} m at most (frame {}), {:.1e} m in the last\n",
-                                   *residual.most, residual.max_frame, totals.last.constraint_residual_max);
-    if (const auto& grids = totals.last.contact_grids)
-        text += fmt::format("contacts in {} {} of {} points, cells {:.2g} times too large, searched in {:.3f} s\n",
-                            grids->points.size(), grids->points.size() == 1 ? "grid" : "grids",
-                            fmt::join(grids->points, ", "), grids->excess, totals.contact_grids.search_seconds);
-    return text;
-}
-
-std::string sleep_text(const FrameFigures& last)
-{
-    if (last.asleep == 0) return "";
-    return fmt::format("asleep   {} of {} points in the last frame\n", with_separators(last.asleep),
-                       with_separators(last.points));
-}
-
-// Returns the cost of building narrow bands: a line for each node.
-std::string band_text(const Total<std::vector<BandFigures>>& bands)
-{
-    std::string text;
-    for (const auto& [node, band] : bands.by_node)
-        if (band.seconds > 0)
-            text += fmt::format("band     of {}: {:.3g} m, {} voxels at most, {} to build\n", node, band.width,
-                                with_separators(band.voxels), duration_text(band.seconds));
-    return text;
-}
-
-// Returns "warning  points did so 5 times, in 3 frames from 7 to 48"; empty if no frame counted any.
-std::string warning_text(const Total<std::uint64_t>& total, std::string_view what)
-{
-    if (what.empty() || total.frames == 0) return "";
+    if (warning.empty() || total.frames == 0) return "";
     const std::string where = total.frames == 1
                                   ? fmt::format("in frame {}", total.first)
                                   : fmt::format("in {} frames from {} to {}", total.frames, total.first, total.last);
-    return fmt::format("warning  {} {}, {}\n", what, total.sum == 1 ? "once" : with_separators(total.sum) + " times",
-                       where);
+    const std::string times = total.sum == 1 ? "once" : with_separators(total.sum) + " times";
+    return line("look at", fmt::format(fmt::runtime(warning), times + ", " + where));
 }
 
 template <class T>
@@ -220,20 +138,35 @@ std::string warning_text(const Total<T>&, std::string_view)
     return "";
 }
 
-}  // namespace
-
-std::string summary(const RunStatistics& run, const RunTotals& totals)
+// Returns "all fine", or a line for each thing to look at, with what to do about it.
+std::string result_text(const RunStatistics& run, const RunTotals& totals)
 {
-    std::string text = points_text(totals) + frames_text(totals, run.seconds) +
-                       fmt::format("memory   {} at the peak\n", memory_text(run.peak_bytes)) + error_text(totals) +
-                       rounding_text(totals.rounding) + energy_text(totals.last.energy_drift.summary) +
-                       ledger_text(totals.ledger.sum) + contact_text(totals) + broken_text(totals.broken) +
-                       constraint_text(totals) + sleep_text(totals.last) + band_text(totals.bands) + advice(run.stiff);
+    std::string text;
+    if (totals.warnings > 0)
+        text += line("look at", totals.warnings == 1 ? "the warning above"
+                                                     : fmt::format("the {} warnings above", totals.warnings));
+    if (totals.frames > 0 && *totals.points.most == 0)
+        text += line("look at", "no frame has a point: emit more, keep points alive for longer, or run more frames");
 #define RAPID_FIGURE(type, name, together, later, reported, unit, meaning, chart, warning) \
     text += warning_text(totals.name, warning);
     RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE
-    return text;
+    if (const auto& error = totals.error.worst; error && error->p95 > visible_error)
+        text += line("look at", "the error of positions is visible: give :solve more substeps");
+    for (const Stiffness& one : run.stiff)
+        if (const auto& better = one.improvement; better && !one.is_exact())
+            text += line("look at",
+                         fmt::format("{} is stiff: estimated error {}; {} substeps would give {}", one.node,
+                                     length_text(better->error), better->substeps, length_text(better->error_after)));
+    return text.empty() ? line("result", "all fine") : text;
+}
+
+}  // namespace
+
+std::string summary(const RunStatistics& run, const RunTotals& totals)
+{
+    return points_text(totals) + frames_text(run, totals) + slowest_text(totals) + error_text(totals) +
+           files_text(totals) + result_text(run, totals);
 }
 
 std::string advice(const std::vector<Stiffness>& stiff)

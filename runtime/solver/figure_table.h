@@ -9,7 +9,7 @@
 //   unit         of the value; empty: a count, or several values
 //   meaning      as in docs/cli.md
 //   chart        the title of the chart in the viewer; empty: no chart
-//   warning      the sentence of a run's summary if the count is not always 0; empty: none
+//   warning      the sentence of a run's summary if the count is not always 0, with {} for how often; empty: none
 //
 // The code that measures a figure adds it to the FrameFigures that it receives or returns.
 #pragma once
@@ -47,7 +47,8 @@
     F(std::uint64_t, constraint_rows, sum, last, frame.constraint_rows > 0, "",                                        \
       "active rows at the end of the frame; absent if there are none", "", "")                                         \
     F(std::uint64_t, loose_constraints, sum, last, frame.constraint_rows > 0, "",                                      \
-      "rows with an error of more than a tenth of their size", "", "constraints were off by a tenth of their size")    \
+      "rows with an error of more than a tenth of their size", "",                                                     \
+      "constraints were off by a tenth of their size {}: give :solve more substeps")                                   \
     F(std::uint64_t, broken, sum, sum, frame.broken > 0, "",                                                           \
       "pairs of `:distance` that broke in the frame; absent if none did", "", "")                                      \
     F(std::uint64_t, asleep, sum, last, true, "",                                                                      \
@@ -65,12 +66,14 @@
     F(std::vector<BandFigures>, bands, sum, by_node, !frame.bands.empty(), "",                                         \
       "of each collider with a level set: `node`, `width` (m), `voxels`, `seconds`", "", "")                           \
     F(std::uint64_t, contact_limit, sum, sum, true, "",                                                                \
-      "points that reached the limit of contacts in a step", "", "points reached the limit of contacts")               \
+      "points that reached the limit of contacts in a step", "",                                                       \
+      "points reached the limit of contacts in a step {}: give :solve more substeps")                                  \
     F(std::uint64_t, trapped, sum, most, true, "",                                                                     \
-      "points deep in a shape that could not be moved out", "", "points were deep in a shape")                         \
+      "points deep in a shape that could not be moved out", "",                                                        \
+      "points were deep inside a shape {}: emit them outside of it, or close the mesh")                                \
     F(std::uint64_t, beyond_tolerance, sum, most, true, "",                                                            \
       "points that would need more than `max_substeps`, or whose position a sample with other substeps does not "      \
-      "confirm", "", "points were beyond the tolerance")                                                               \
+      "confirm", "", "points were beyond the tolerance {}: raise it, or max_substeps")                                 \
     F(std::vector<NodeWork>, nodes, last, last, true, "",                                                              \
       "cost of each pass over the points, in order (below)", "", "")                                                   \
     F(std::vector<Stiffness>, stiff, sum, sum, false, "",                                                              \

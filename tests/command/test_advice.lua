@@ -1,4 +1,4 @@
--- Stiff nodes, reported by `rapid check` and in the summary of a run with figures computed from the points.
+-- Stiff nodes, reported by `rapid check` and in the --stats of a run with figures computed from the points.
 local command = require "testing.command"
 local json = require "dkjson"
 
@@ -20,11 +20,13 @@ local function rapid(arguments, text)
   return command.rapid(arguments, { cwd = folder.path }), folder
 end
 
--- Returns the lines about stiff nodes.
+-- Returns the lines about stiff nodes; those of a run are in its --stats.
 local function advice(arguments, text)
-  local result = rapid(arguments, text)
+  local runs = arguments:find "^run"
+  local result, folder = rapid(runs and arguments .. " --stats stats.json" or arguments, text)
   assert.equal(0, result.status, result.stderr)
   local lines = {}
+  if runs then return json.decode(folder:read "stats.json").stiff or lines end
   for line in result.stdout:gmatch "stiff    ([^\n]+)" do lines[#lines + 1] = line end
   return lines
 end
@@ -59,6 +61,14 @@ return rapid.create { fps = 24, points = one } :attribute { mass = 2 }
       end
     end)
   end
+
+  it("is in the summary of a run only if more substeps help", function()
+    local summary = rapid("run scene.lua -f 1-2", sun:format "").stdout
+    assert.match('\nlook at  action "sun" is stiff: estimated error [%d.]+ c?m; 8 substeps would give [%d.]+ [cm]?m\n',
+      summary)
+    assert.match("\nresult   all fine\n", rapid("run scene.lua -f 1-2", head .. [[
+return rapid.create { fps = 24, points = one } :drag { linear = 16 * 24 } :solve {}]]).stdout)
+  end)
 
   it("is of points that are born, and by what they have", function()
     assert.same({ "drag1: k dt = 8; treated exactly" }, advice("check scene.lua", head .. [[
@@ -105,23 +115,23 @@ return rapid.create { points = one } :points("fails", function(_, f) if f.number
 
   -- Points around a torus, attracted to its surface: the stiffness at first, and the worst error after two seconds.
   local function drawn(core)
-    return rapid("run scene.lua -f 1-48", head .. ([[
+    return rapid("run scene.lua -f 1-48 --stats stats.json", head .. ([[
 return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.5 } }
   :attract { shape = rapid.mesh.torus { radius = 0.6, tube = 0.22 }%s } :solve { substeps = 2 }]]):format(core))
   end
 
   it("names core where a surface draws without bound, of a size that is resolved", function()
-    local bare = drawn("")
-    local core = tonumber(bare.stderr:match "give core,[^\n]* from (%S+) m on 1 sub%-step resolves it")
+    local bare, folder = drawn("")
+    local core = tonumber(bare.stderr:match "give core,[^\n]* from (%S+) m on 1 substep resolves it")
     assert.near((16 / 24 ^ 2) ^ (1 / 3), core, 0.006, bare.stderr)
-    assert.truthy(bare.stderr:find('scene.lua:4: node "attract1": without core its pull has no bound', 1, true))
-    local with = drawn(", core = " .. core)
+    assert.truthy(bare.stderr:find('scene.lua:4: node "attract1": without core its pull is unbounded', 1, true))
+    local with, folder_with = drawn(", core = " .. core)
     assert.falsy(with.stderr:find("core", 1, true), with.stderr)
     assert.falsy(with.stdout:find("stiff", 1, true), with.stdout)
-    local function median(result) return tonumber(result.stdout:match "half of the points below (%S+) m") end
-    assert.truthy(median(bare) > 1, bare.stdout)
+    local function median(of) return json.decode(of:read "stats.json").frames[48].error.position_p50 end
+    assert.truthy(median(folder) > 1, bare.stdout)
     -- 1.5 (ratio of reported to true) (omega dt)²/24 of 12 radians, about 2 m: a quarter of a radian per substep.
-    assert.truthy(median(with) < 0.1, with.stdout)
+    assert.truthy(median(folder_with) < 0.1, with.stdout)
   end)
 
   it("says that sub-steps are no remedy where they make nothing better", function()

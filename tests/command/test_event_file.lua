@@ -75,7 +75,7 @@ return rapid.create { fps = 24 }
       for i, frames in ipairs { 20, 200 } do
         local result = scene.command("run", text, ("-f 1-%d --threads 2 --events e.%s"):format(frames, extension))
         assert.equal("", result.stderr)
-        peak[i] = tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak")
+        peak[i] = tonumber(result.stdout:match "([%d.]+) MiB of memory")
         rows[i] = #scene.folder:read("e." .. extension)
       end
       -- 1,600,000 events, of 68 bytes in .bgeo
@@ -101,6 +101,6 @@ return rapid.create { fps = 24 } :emit { source = rapid.mesh.sphere {}, rate = 5
   it("refuses a file that holds no points", function()
     local result = scene.command("run", "return rapid.create {} :solve {}", "-f 1-2 --events events.json")
     assert.equal(2, result.status)
-    assert.match("give a file of [%.%w, ]*%.csv, [%.%w, ]*%.vtp", result.stderr)
+    assert.match("use one of [%.%w, ]*%.csv, [%.%w, ]*%.vtp", result.stderr)
   end)
 end)

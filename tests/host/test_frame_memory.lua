@@ -7,7 +7,7 @@ local scene = require "testing.scene"
 local function peak(text, frames, arguments)
   local result = scene.command("run", text, ("-f 1-%d --threads 2 %s"):format(frames, arguments or ""))
   assert.equal("", result.stderr)
-  return tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak"), result.stdout
+  return tonumber(result.stdout:match "([%d.]+) MiB of memory"), result.stdout
 end
 
 -- A ball that is a new level set of about 400 kB in each frame.
@@ -46,7 +46,7 @@ describe("the memory of a run", function()
       local function of(size, more) return "--size " .. size .. " -o picture.####.png" .. (more or "") end
       local small, large = peak(text, 2, of "32x18"), peak(text, 2, of "2000x1500")
       local refused = scene.command("run", text, "-f 1-2 " .. of("2000x1500", " --memory 150M"))
-      local reported = tonumber(refused.stderr:match "would take about (%d+) MiB")
+      local reported = tonumber(refused.stderr:match "would need about (%d+) MiB")
       assert.truthy(large - small < 1.05 * reported and large - small > least * reported,
         ("%s: %g MiB in place of %g, %d told"):format(shape, large, small, reported))
     end

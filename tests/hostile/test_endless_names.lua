@@ -110,7 +110,7 @@ describe("a file that is there to be slow, or long", function()
     local function peak(output)
       local result = command.rapid("run scene.lua -f 1-1 --threads 1 -o " .. output, { cwd = folder.path })
       assert.equal(0, result.status, result.stderr)
-      return tonumber(result.stdout:match "memory   ([%d.]+) MiB at the peak")
+      return tonumber(result.stdout:match "([%d.]+) MiB of memory")
     end
     local little, padded = peak "a.####.csv", peak "a.####.npz"
     assert.truthy(padded < little + 20, ("%g MiB as .csv, %g as .npz"):format(little, padded))

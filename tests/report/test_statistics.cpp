@@ -126,7 +126,8 @@ TEST_CASE("the statistics file has the shape of the contract", "[report]")
                    { "nodes": ["tint", "fade"], "seconds": 0.125, "points": 2, "bytes": 64 } ] })"));
 }
 
-TEST_CASE("estimated errors are told by their median, 95 % and largest, in the file and in the summary", "[report]")
+TEST_CASE("estimated errors have their median, 95 % and maximum in the file, and the last two in the summary",
+          "[report]")
 {
     FrameResult result = frame_result();
     for (int i = 100; i >= 0; --i) result.figures.error.values.push_back(i * 1e-4);
@@ -136,20 +137,18 @@ TEST_CASE("estimated errors are told by their median, 95 % and largest, in the f
     CHECK(error["position_p50"] == 50 * 1e-4);
     CHECK(error["position_p95"] == 95 * 1e-4);
     CHECK(error["position_max"] == 100 * 1e-4);
-    CHECK_THAT(summary(run),
-               Catch::Contains("half of the points below 5.0e-03 m, 95 % below 9.5e-03, the worst 1.0e-02"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    95 % of the positions within 9.5 mm, all within 1 cm\n"));
 }
 
-TEST_CASE("where no error is estimated, that is told, and why; unless nothing was solved", "[report]")
+TEST_CASE("the summary says why no error is estimated, unless nothing was solved", "[report]")
 {
     FrameResult result = frame_result();
     result.figures.error.values.clear();
     result.figures.left_out_of_errors = {"all points, as they are strange"};
     Recorded run = run_of({});
     run.frames = {statistics_of(result)};
-    CHECK_THAT(summary(run),
-               Catch::Contains("\nerror    not estimated\nleft out of the error: all points, as they are strange\n"));
-    CHECK_THAT(summary(run), !Catch::Contains("the same at"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    not estimated; without all points, as they are strange\n"));
+    CHECK_THAT(summary(run), !Catch::Contains("none found"));
     const ordered_json frame = ordered_json::parse(to_json(run))["frames"][0];
     CHECK_FALSE(frame.contains("error"));
     CHECK(frame["left_out_of_errors"] == ordered_json{"all points, as they are strange"});
@@ -159,7 +158,7 @@ TEST_CASE("where no error is estimated, that is told, and why; unless nothing wa
     CHECK_THAT(summary(run), !Catch::Contains("error  "));
 }
 
-TEST_CASE("errors of single frames are told by the worst of these frames, and their number", "[report]")
+TEST_CASE("the summary has the largest error of a single frame, and the number of frames with one", "[report]")
 {
     FrameResult result = frame_result();
     Recorded run = run_of({});
@@ -172,12 +171,11 @@ TEST_CASE("errors of single frames are told by the worst of these frames, and th
     }
     CHECK(ordered_json::parse(to_json(run))["frames"][1]["frame_error"]["position_p95"] == 95 * 1e-4);
     CHECK_FALSE(ordered_json::parse(to_json(run))["frames"][2].contains("frame_error"));
-    CHECK_THAT(summary(run), Catch::Contains("\nerror    of one frame, estimated in 2 of 5: half of the points below "
-                                             "1.5e-02 m, 95 % below 2.9e-02, the worst 3.0e-02 (frame 13)\n"
-                                             "left out of the error: the rest (from frame 12 on)\n"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    95 % of the positions within 2.9 cm, all within 3 cm, in one "
+                                             "frame (2 of 5 estimated); without the rest (from frame 12 on)\n"));
 }
 
-TEST_CASE("what rounding is off by is told by its largest, apart from the estimated error", "[report]")
+TEST_CASE("the error by rounding is in the file, apart from the estimated error", "[report]")
 {
     FrameResult result = frame_result();
     result.figures.error.values = {0};
@@ -185,23 +183,20 @@ TEST_CASE("what rounding is off by is told by its largest, apart from the estima
     Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["rounding"] == 0.25);
-    CHECK_THAT(summary(run), Catch::Contains("\nrounding of positions since birth: 2.5e-01 m at most (frame 7)\n"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    none found: twice the substeps give the same positions\n"));
 }
 
-TEST_CASE("a drift of energy is told by its mean and its largest, whichever way, where there is an energy", "[report]")
+TEST_CASE("a drift of energy has its mean and its largest magnitude in the file, if there is an energy", "[report]")
 {
     FrameResult result = frame_result();
     result.figures.energy_drift.values = {0.5, -2, 0};
     Recorded run = run_of({});
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["energy_drift"] == ordered_json{{"mean", -0.5}, {"max", 2.0}});
-    CHECK_THAT(summary(run),
-               Catch::Contains("collisions aside: -5.0e-01 J/kg since birth on average, 2.0e+00 at most"));
 
     result.figures.energy_drift.is_defined = false;
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][1]["energy_drift"].is_null());
-    CHECK_THAT(summary(run), !Catch::Contains("of motion"));
 }
 
 TEST_CASE("a run that ended before its first frame has an empty list of frames", "[report]")
@@ -224,66 +219,62 @@ TEST_CASE("a statistics file has a line for each frame", "[report]")
     CHECK(std::count(text.begin(), text.end(), '\n') == 3 + 4);
 }
 
-TEST_CASE("the summary says points, frames, seconds by stage and memory", "[report]")
+TEST_CASE("the summary of a run is six aligned lines", "[report]")
 {
     Recorded run = run_of({100, 2000, 1500});
-    run.frames[0].seconds = {0.25, 0, 0.125, 0.5};
-    run.frames[2].seconds = {0.25, 0.5, 0.125, 0};
-    CHECK(summary(run) ==
+    run.frames[1].substeps = 1;
+    run.frames[0].nodes = {{{"emit1"}, NodeWork::Stage::Graph, 0, 0.25, 100, 0},
+                           {{"tint", "fade"}, NodeWork::Stage::Script, 0, 0.5, 100, 0}};
+    run.frames[2].nodes = {{{"emit1"}, NodeWork::Stage::Graph, 0, 0.5, 1500, 0},
+                           {{"solve1"}, NodeWork::Stage::Solve, 0, 0.25, 1500, 0}};
+    run.frames[2].error.summary = ErrorQuantiles{1e-6, 2.5e-4, 0.0034};
+    RunTotals totals;
+    for (const FrameFigures& frame : run.frames) totals.add(frame);
+    CHECK(summary(run, totals) ==
           "points   1,500 (most: 2,000 in frame 2)\n"
-          "frames   3 in 0.500 s, 7,200 points a second\n"
-          "seconds  graph 0.500, script 0.500, solve 0.250, write 0.500\n"
-          "memory   3.0 MiB at the peak\n");
+          "frames   3 in 0.500 s, 7,200 points per second, 3.0 MiB of memory\n"
+          "slowest  emit1, 50 % of the work\n"
+          "error    95 % of the positions within 250 µm, all within 3.4 mm\n"
+          "files    none written; output NAME.####.png writes pictures\n"
+          "result   all fine\n");
+
+    // The first file has no points, as nothing is born yet; the one to look at is that with the most.
+    totals.add_file("snow.0001.png", false, 0, 0.5);
+    totals.add_file("snow.0002.png", false, 2000, 0.5);
+    totals.add_file("snow.0003.png", false, 1500, 0.5);
+    for (int frame = 0; frame < 3; ++frame) totals.add_file("snow.mp4", true, 1, 0.25);
+    CHECK_THAT(summary(run, totals), Catch::Contains("\nslowest  writing .png, 40 % of the work\n"));
+    CHECK_THAT(summary(run, totals), Catch::Contains("\nfiles    4 written; look at snow.0002.png\n"));
 }
 
-TEST_CASE("the summary adds up what solve warned of, and in which frames", "[report]")
+TEST_CASE("instead of all fine, the summary has a line for each thing to look at, with a remedy", "[report]")
 {
     Recorded run = run_of({1, 1, 1, 1});
-    CHECK_THAT(summary(run), !Catch::Contains("warning"));
+    CHECK_THAT(summary(run), Catch::EndsWith("\nresult   all fine\n") && !Catch::Contains("look at"));
     run.frames[1].contact_limit = 1000;
     run.frames[3].contact_limit = 234;
     run.frames[2].trapped = 1;
+    run.frames[3].error.summary = ErrorQuantiles{0.01, 0.5, 1};
     CHECK_THAT(summary(run),
-               Catch::EndsWith("at the peak\n"
-                               "warning  points reached the limit of contacts 1,234 times, in 2 frames from 2 to 4\n"
-                               "warning  points were deep in a shape once, in frame 3\n"));
+               Catch::EndsWith("look at  points reached the limit of contacts in a step 1,234 times, in 2 frames from "
+                               "2 to 4: give :solve more substeps\n"
+                               "look at  points were deep inside a shape once, in frame 3: emit them outside of it, or "
+                               "close the mesh\n"
+                               "look at  the error of positions is visible: give :solve more substeps\n"));
+    CHECK_THAT(summary(run), !Catch::Contains("all fine"));
+
+    RunTotals warned;
+    ++warned.warnings;
+    CHECK_THAT(summary(run, warned), Catch::EndsWith("\nlook at  the warning above\n"));
+    ++warned.warnings;
+    CHECK_THAT(summary(run, warned), Catch::EndsWith("\nlook at  the 2 warnings above\n"));
 }
 
-TEST_CASE("the summary says what bands took that were built in the run, and nothing of others", "[report]")
+TEST_CASE("the summary of an empty scene says that there are no points, not that no frame was run", "[report]")
 {
-    Recorded run = run_of({1, 1});
-    run.frames[0].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.1, 5000, 0.25}};
-    run.frames[1].bands = {{"collide1", 0.06, 4000, 0}, {"collide2", 0.2, 9000, 0.5}};
-    CHECK_THAT(summary(run), Catch::EndsWith("at the peak\n"
-                                             "band     of collide2: 0.2 m, 9,000 voxels at most, 0.750 s to build\n"));
-}
-
-TEST_CASE("the summary of an empty scene is one of no points, not of none run", "[report]")
-{
-    CHECK(summary(run_of({0, 0})).starts_with("points   0\nframes   2 in 0.500 s\n"));
-    CHECK(summary(run_of({})).starts_with("points   none: no frame was run\n"));
-}
-
-TEST_CASE("the totals of a run tell what its frames tell, and writing is added behind them", "[report]")
-{
-    FrameResult result = frame_result();
-    for (int i = 0; i <= 100; ++i) result.figures.error.values.push_back(i * 1e-4);
-    result.figures.energy_drift.values = {0.5, -2, 0};
-    result.figures.constraint_rows = 3;
-    Recorded run = run_of({5, 1, 9, 2});
-    for (int k = 0; k < 4; ++k) {
-        result.frame = 10 + k;
-        result.figures.constraint_residual_max = k == 2 ? 0.5 : 0.25;
-        run.frames.push_back(statistics_of(result));
-    }
-    RunTotals totals;
-    for (const FrameFigures& frame : run.frames) totals.add(frame);
-    CHECK(summary(run, totals) == summary(run));
-    CHECK_THAT(summary(run), Catch::Contains("residual of constraints: 5.0e-01 m at most (frame 12)"));
-
-    totals.add_writing(0.75);
-    run.frames.back().seconds.write += 0.75;
-    CHECK(summary(run, totals) == summary(run));
+    CHECK_THAT(summary(run_of({0, 0})), Catch::StartsWith("points   0\nframes   2 in 0.500 s, 3.0 MiB of memory\n") &&
+                                            Catch::Contains("look at  no frame has a point"));
+    CHECK_THAT(summary(run_of({})), Catch::StartsWith("points   none: no frame was run\n"));
 }
 
 TEST_CASE("numbers read as people write them", "[report]")
@@ -301,4 +292,10 @@ TEST_CASE("numbers read as people write them", "[report]")
     CHECK(duration_text(59.97) == "60.0 s");
     CHECK(duration_text(125) == "2 min 05 s");
     CHECK(duration_text(3725) == "1 h 02 min");
+    CHECK(length_text(2.5) == "2.5 m");
+    CHECK(length_text(0.034) == "3.4 cm");
+    CHECK(length_text(0.0034) == "3.4 mm");
+    CHECK(length_text(7.5e-7) == "0.75 µm");
+    CHECK(length_text(2.5e-4) == "250 µm");
+    CHECK(length_text(0.9997) == "100 cm");
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -85,7 +86,10 @@ struct Simulation {
     // Null except in a trial.
     std::shared_ptr<Trial> trial;
     std::map<std::string, std::vector<std::string>> varying;  // parameters that are functions of the frame, by node
-    bool estimates_errors = true;                             // if false, Solve estimates none
+    // By node: functions that return true if the end of a point's path in this step does not depend on its state before
+    // it, as that of a point which a goal takes to its target. Errors until then end there.
+    std::map<const void*, std::function<bool(const PointSet& points, std::size_t i)>> arrivals;
+    bool estimates_errors = true;        // if false, Solve estimates none
     bool per_point_diagnostics = false;  // Solve stores per-point figures as attributes (solve/step_observers.cpp)
 
     FrameClock clock() const { return {fps, start, subframes}; }

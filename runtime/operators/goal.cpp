@@ -88,13 +88,20 @@ struct Goal {
         const Strided<float> mass = masses_of(points);
         const Column<float>* own = std::as_const(points).find<float>("dt");
         const Column<float>* age = clock == "age" ? &std::as_const(points).column<float>("age") : nullptr;
+        flow.simulation->arrivals[this] = [this, frame = now.frame, random = now.random](const PointSet& set,
+                                                                                         std::size_t i) {
+            const Column<float>* own_dt = set.find<float>("dt");
+            const double dt = own_dt ? double{(*own_dt)[i]} : frame.dt;
+            const double time_of_point = clock == "age" ? double{set.column<float>("age")[i]} : frame.time - dt;
+            const std::optional<double> left = time_left(time_of_point - start - delay(random, set.id()[i]), dt);
+            return members_of(set, group)[i] && left && *left <= dt;
+        };
         const std::span<Vec3f> v = points.v().write(), force = points.column<Vec3f>("force").write();
         for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 if (!members[i]) continue;
                 const double dt = own ? double{(*own)[i]} : now.frame.dt;
-                const double since = (age ? double{(*age)[i]} : now.frame.time - dt) - start -
-                                     stagger * uniform4(now.random, static_cast<std::uint64_t>(id[i]), stagger_use)[0];
+                const double since = (age ? double{(*age)[i]} : now.frame.time - dt) - start - delay(now.random, id[i]);
                 const std::optional<double> left = time_left(since, dt);
                 if (!left) continue;
                 const Vec3d at = P[i].cast<double>(), d = goal[i].cast<double>() - at;
@@ -109,6 +116,12 @@ struct Goal {
     }
 
 private:
+    // Returns the delay of a point, s.
+    double delay(RandomKey random, std::int64_t id) const
+    {
+        return stagger * uniform4(random, static_cast<std::uint64_t>(id), stagger_use)[0];
+    }
+
     // Returns the remaining time, s, from the beginning of the frame. A path that begins within the frame starts with
     // it, and ends on time. Returns nothing if the point is not on its path.
     std::optional<double> time_left(double since, double dt) const

@@ -93,7 +93,7 @@ return rapid.create { fps = 20 }
     for to, message in pairs {
       ["rapid.shape.sphere {}"] = 'by = "id": ',
       ["rapid.points.from { P = {} }"] = "there are no points to go to",
-      ["rapid.translate(1, 0, 0)"] = "has no places to go to; it must be a mesh, a shape, points, or rapid.attr",
+      ["rapid.translate(1, 0, 0)"] = "can't be a target; it must be a mesh, a shape, points or rapid.attr",
       ["3"] = "to = 3",
     } do
       reported = scene.error(("return rapid.create { points = two } :goal { to = %s } :solve {}"):format(to))
@@ -275,6 +275,24 @@ return rapid.create { seed = 4 } :emit { source = rapid.mesh.sphere { radius = 2
     end
     local command = require "testing.command"
     assert.equal(0, command.shell("cmp whole.0008.bgeo part.0008.bgeo", { cwd = scene.folder.path }).status)
+  end)
+
+  it("ends the errors of the points that it holds", function()
+    local text = [[
+return rapid.create { fps = 24, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } }
+  :turbulence { amplitude = 8, size = 0.4 } :goal { to = rapid.points.grid { size = {1, 1, 1}, spacing = 0.1 },
+    by = "random", start = 1, time = 0.5 } :solve { substeps = %d }]]
+    local result = scene.command("run", text:format(1), "-f 1-72 --quiet --stats stats.json")
+    assert.equal(0, result.status, result.stderr)
+    local frames = require "dkjson".decode(scene.folder:read "stats.json").frames
+    local function last(substeps) return scene.run(text:format(substeps), { frames = {72, 72} })[72] end
+    local coarse, fine = last(1), last(64)
+    local real = 0
+    for i = 1, #coarse do real = math.max(real, (coarse[i].P - fine[i].P):length()) end
+    local reported = frames[72].error.position_max
+    assert.truthy(frames[24].error.position_max > 10 * real) -- before the points have arrived
+    assert.truthy(reported < 4 * real and reported > real / 4,
+      ("%g m is reported, %g m is true"):format(reported, real))
   end)
 
   it("follows the clock in a chain without a solve, too", function()

@@ -130,7 +130,12 @@ public:
         note_excluded(step);
         const PointSet& points = step.flow.points;
         const bool alone = step.moves_alone();
-        shadows_.begin(points, !alone || is_closed_form(points, step.run, step.options), step.options.h);
+        const auto& arrivals = step.flow.simulation->arrivals;
+        const auto arrives = [&](const PointSet& set, std::size_t i) {
+            return std::any_of(arrivals.begin(), arrivals.end(),
+                               [&](const auto& of_node) { return of_node.second(set, i); });
+        };
+        shadows_.begin(points, !alone || is_closed_form(points, step.run, step.options), step.options.h, arrives);
         if (alone)
             drift_.begin(points, shadows_, step.run, step.options);
         else
@@ -252,9 +257,8 @@ private:
         for (const auto& collider : step.flow.dynamics.colliders())
             if (collider->response == Response::Die) {
                 step.now.warnings.push_back(
-                    fmt::format("{}:{}: node \"{}\": kills all points where they are born: with response = \"die\" a "
-                                "point dies within its radius (pscale) of the shape; give radius = 0, or let points be "
-                                "born farther away",
+                    fmt::format("{}:{}: node \"{}\": kills all points at birth: with response = \"die\" a point dies "
+                                "within its radius (pscale) of the shape; give radius = 0, or emit points farther away",
                                 collider->location.file, collider->location.line, collider->node));
                 return;
             }
@@ -272,30 +276,32 @@ private:
         const FrameFigures& result = step.done;
         if (result.contact_limit > 0)
             step.warn(
-                "points reached the limit of contacts in a step, two thousand impacts, and rest where they are for "
-                "what was left of it; take more substeps");
+                "some points reached the limit of 2,000 impacts in one step and were stopped for the rest of it; give "
+                "more substeps");
         if (result.loose_constraints > 0)
-            step.warn("constraints are off by more than a tenth of their size; take more substeps, or more iterations");
+            step.warn(
+                "some constraints are violated by more than a tenth of their size; if points overlap at birth, give "
+                "fewer points or a smaller radius, otherwise more substeps or iterations");
         if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
             step.warn(
-                fmt::format("constraints gave {:.1e} of the energy and {:.1e} of the momentum in motion that nothing "
-                            "accounts for; take more substeps, or more iterations",
+                fmt::format("constraints changed the energy by {:.1e} and the momentum by {:.1e} of their amounts "
+                            "without a cause; give more substeps or iterations",
                             result.ledger->residue->energy, result.ledger->residue->momentum));
         if (result.trapped > 0)
             step.warn(has_band(step.flow.dynamics)
-                          ? "points are deep in a shape, where its field shows no way out; a level set of a larger "
-                            "half_width shows it farther"
-                          : "points are in a shape, with no way out: between shapes that leave no room, or in its "
-                            "middle; let them be born outside, or move the shapes apart");
+                          ? "some points are so deep in a shape that its level set has no gradient there; give the "
+                            "level set a larger half_width"
+                          : "some points can't leave a shape, because they are in its middle or between shapes without "
+                            "room; emit them outside, or move the shapes apart");
         if (result.beyond_tolerance > 0)
             step.warn(
-                fmt::format("points need more than {} sub-steps for an error of {:g} m a frame; raise max_substeps or "
-                            "the tolerance",
+                fmt::format("some points need more than {} substeps for an error of {:g} m per frame; raise "
+                            "max_substeps or the tolerance",
                             result.substeps, *step.tolerance));
         if (step.beyond_tolerance > result.beyond_tolerance)
             step.warn(
-                fmt::format("by a sample, {} points are farther than {:g} m from where other sub-steps take them: the "
-                            "forces change within a sub-step; take more substeps to begin with",
+                fmt::format("in a sample, {} points differ by more than {:g} m with other substeps, because forces "
+                            "change within a substep; give a larger number of substeps to begin with",
                             step.beyond_tolerance, *step.tolerance));
     }
 

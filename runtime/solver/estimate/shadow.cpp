@@ -108,7 +108,8 @@ void keep_found(std::vector<std::uint32_t>& indices, std::vector<T>&... lists)
 
 }  // namespace
 
-void Shadows::begin(const PointSet& points, bool is_exact, double h)
+void Shadows::begin(const PointSet& points, bool is_exact, double h,
+                    const std::function<bool(const PointSet& points, std::size_t i)>& arrives)
 {
     idle_ = is_exact && !off_;
     prefetch(points, indices_);
@@ -154,6 +155,7 @@ void Shadows::begin(const PointSet& points, bool is_exact, double h)
     for (std::size_t k = 0; k < ids_.size(); ++k) {
         const std::uint32_t i = indices_[k];
         rounding_[k] = {P0[i], v0[i], own ? (*own)[i] : h, rounding_[k].displacement};
+        if (arrives && arrives(points, i)) dP_[k] = dv_[k] = Vec3d::Zero();
     }
     if (idle_) return;
 

@@ -17,6 +17,7 @@
 // since birth. Exact under constant accelerations; on other paths as random as the rounding itself.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -29,8 +30,10 @@ namespace rapid {
 class Shadows {
 public:
     // Call before Solve: creates shadows for some of the points born since the last call. is_exact: finer steps would
-    // only repeat the frame. h: s, the frame's length, for points without an individual time.
-    void begin(const PointSet& points, bool is_exact, double h = 0);
+    // only repeat the frame. h: s, the frame's length, for points without an individual time. arrives: returns true for
+    // a point whose state after this step does not depend on that before it; its errors until now end.
+    void begin(const PointSet& points, bool is_exact, double h = 0,
+               const std::function<bool(const PointSet& points, std::size_t i)>& arrives = {});
 
     // Advances the shadows by `solve_finer`. Returns the estimated errors of P, m, in order of id.
     template <class F>

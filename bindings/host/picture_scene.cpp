@@ -219,7 +219,8 @@ void SceneOfPlan::add_look(Described& to, const Node& node, const Frame& now, do
     PointStyle style{.group = picture.group};
     if (gives(node, "blend")) style.additive = picture.blend == "add";
     if (gives(node, "shutter")) style.shutter = picture.shutter / fps;
-    if (style.additive || style.shutter) to.scene->styles.push_back(style);
+    if (gives(node, "draw")) style.cards = picture.draw == "cards";
+    if (style.additive || style.shutter || style.cards) to.scene->styles.push_back(style);
     if (const CameraPtr camera = picture.camera.at(now.number))
         to.scene->camera = {camera->position, camera->target, camera->fov, camera->group};
     if (gives(node, "emitters")) to.emitters = picture.emitters;

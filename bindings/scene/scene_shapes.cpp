@@ -75,7 +75,7 @@ struct StoredScene {
             keep_room(keep, styles, rest.styles);
         }
         for (PictureScene::Plane& plane : rest.planes) keep(plane.normal, plane.offset);
-        for (PointStyle& style : rest.styles) keep(style.group, style.additive, style.shutter);
+        for (PointStyle& style : rest.styles) keep(style.group, style.additive, style.cards, style.shutter);
         keep(rest.camera.position, rest.camera.target, rest.camera.fov, rest.camera.group, rest.grid);
     }
 
@@ -169,8 +169,8 @@ std::shared_ptr<const PictureOptions> picture_options(const PictureCamera& camer
         return !place || std::all_of(place->begin(), place->end(), [](double x) { return std::isfinite(x); });
     };
     if (!is_finite(camera.position) || !is_finite(camera.target))
-        refuse("the camera's position and target must be numbers that are finite");
-    if (camera.position && camera.position == camera.target) refuse("the camera looks at its own place");
+        refuse("the camera's position and target must be finite");
+    if (camera.position && camera.position == camera.target) refuse("the camera's position and target are equal");
     auto options = std::make_shared<PictureOptions>();
     options->width = size.width;
     options->height = size.height;
@@ -219,7 +219,7 @@ Result<std::string> Scene::picture(const SceneFrame& frame, PictureSize size)
 {
     return impl_->call(SceneError::WrongCall, [&] {
         const SceneFrame::Data& data = *frame.data_;
-        if (data.scene != impl_->number) refuse("the frame is of another scene");
+        if (data.scene != impl_->number) refuse("the frame belongs to another scene");
         FrameInfo info;
         info.number = static_cast<int>(frame.number());
         info.time = frame.time();

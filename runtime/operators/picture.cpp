@@ -49,8 +49,8 @@ void read_value(const Param& param, const Value& value, CameraTrack& field)
     }
     const auto fault = [&] {
         return Error(
-            fmt::format("{} = {}; it must be a rapid.camera {{ ... }}, keys {{[1] = a, [48] = b}} of such, or "
-                        "a function of the frame that returns one",
+            fmt::format("{} = {}; it must be a rapid.camera {{ ... }}, cameras by frame {{[1] = a, [48] = b}}, or a "
+                        "function of the frame that returns a camera",
                         param.name, describe(value)));
     };
     const Table* table = value.table();
@@ -73,9 +73,13 @@ NodeType PictureNode::declare()
 {
     return node<PictureNode>("picture", "Sets how points and shapes look in pictures, without changing any point.")
         .takes("age")
+        .takes("orient")
         .param(&PictureNode::blend, "blend", std::string("over"), any_number(), "",
                "over: nearer points hide others; add: points add their light and cast no shadow")
         .choices({"over", "add"})
+        .param(&PictureNode::draw, "draw", std::string("balls"), any_number(), "",
+               "cards: flat discs across the y axis of orient, which show how points turn")
+        .choices({"balls", "cards"})
         .param(&PictureNode::shutter, "shutter", 0.0, between(0, 1), "",
                "fraction of the frame for which the picture is exposed, so that moving points leave streaks")
         .param(&PictureNode::camera, "camera", Value(), any_number(), "",

@@ -37,7 +37,7 @@ struct CameraTrack {
 void read_value(const Param& param, const Value& value, CameraTrack& field);
 
 struct PictureNode {
-    std::string blend, group;
+    std::string blend, draw, group;
     double shutter;
     bool emitters, colliders, grid;
     CameraTrack camera;

@@ -61,6 +61,7 @@ public:
                     if (members[i]) of_points[i] = static_cast<std::uint8_t>(k + 1);
             };
             if (styles_[k].additive) apply_to(additive_);
+            if (styles_[k].cards) apply_to(cards_);
             if (styles_[k].shutter) apply_to(shutter_);
         }
     }
@@ -69,6 +70,7 @@ public:
     {
         return !additive_.empty() && additive_[i] != 0 && *styles_[additive_[i] - 1].additive;
     }
+    bool is_card(std::size_t i) const { return !cards_.empty() && cards_[i] != 0 && *styles_[cards_[i] - 1].cards; }
     // Returns the exposure time in s.
     double shutter(std::size_t i) const
     {
@@ -78,7 +80,7 @@ public:
 private:
     const std::vector<PointStyle>& styles_;
     // The style that applies to each point: its index in styles_ plus 1, or 0 for none. Empty if no point has one.
-    std::vector<std::uint8_t> additive_, shutter_;
+    std::vector<std::uint8_t> additive_, cards_, shutter_;
 };
 
 // Returns how much brighter than white a colour is, at most 1.
@@ -102,6 +104,7 @@ struct PointLook {
     const Strided<Vec3f> P, v;
     const Column<Vec3f>* Cd;
     const Column<float>*Alpha, *pscale, *age;
+    const Column<Quatf>* orient;
     Trails trails;
 
     PointLook(const PointSet& drawn, const TileGrid& grid, const PictureScene& in, const PictureView& from,
@@ -118,6 +121,7 @@ struct PointLook {
           Alpha(drawn.find<float>("Alpha")),
           pscale(drawn.find<float>("pscale")),
           age(drawn.find<float>("age")),
+          orient(drawn.find<Quatf>("orient")),
           trails(drawn)
     {
     }
@@ -183,6 +187,19 @@ struct PointLook {
         m.length = length;
     }
 
+    // Makes the mark a card, seen from its front or its back.
+    void turn(const Quatf& by, Mark& m) const
+    {
+        constexpr float least = 0.02f;  // of the normal towards the viewer: a card seen from its edge is a line
+        Vec3f n = by * Vec3f::UnitY();
+        if (!n.allFinite()) return;
+        if (n.dot(lens.forward) > 0) n = -n;
+        m.card = true;
+        m.dx = n.dot(lens.right);
+        m.dy = -n.dot(lens.up);
+        m.ddepth = std::max(least, -n.dot(lens.forward));
+    }
+
     Mark mark(std::size_t i) const
     {
         Mark m{};
@@ -198,6 +215,7 @@ struct PointLook {
         size(m);
         if (m.radius == 0 && trails.count(i) == 0) return m;
         m.additive = styles.is_additive(i);
+        if (m.length == 0 && orient && styles.is_card(i)) turn((*orient)[i], m);
         const float fog = std::exp(-0.35f * std::max(0.0f, s.z() / far - 1));
         const Vec3f own = colour(i);
         m.colour = own * fog;
@@ -254,6 +272,8 @@ public:
         const bool hidden = surfaces_.nearest <= last;
         if (m.line)
             hidden ? line<true>(m) : line<false>(m);
+        else if (m.card)
+            hidden ? card<true>(m) : card<false>(m);
         else if (m.length > 0)
             hidden ? streak<true>(m) : streak<false>(m);
         else
@@ -332,6 +352,24 @@ private:
             if (roundness == 0) return add(pixel, m, cover, flat);
             const float shaded = shade(dx * inverse, dy * inverse, bulge);
             add(pixel, m, cover, m.colour * (0.85f + roundness * (shaded - 0.85f)));
+        });
+    }
+
+    // Draws a flat disc with the normal n. Above a pixel (x, y) from its centre it has the height z = -(n_x x + n_y y)
+    // / n_z, and it covers the pixel while r = |(x, y, z)| <= R. The edge is as wide as a pixel: (R - r) / |grad r|
+    // from it.
+    template <bool hidden>
+    void card(const Mark& m)
+    {
+        const float slope_x = -m.dx / m.ddepth, slope_y = -m.dy / m.ddepth;
+        const Vec3f colour = m.additive ? m.colour : Vec3f(m.colour * shade(m.dx, m.dy, m.ddepth));
+        for_each_pixel(m, [&](Pixel& pixel, std::size_t offset, float dx, float dy) {
+            const float z = slope_x * dx + slope_y * dy, r = std::sqrt(dx * dx + dy * dy + z * z);
+            const float grad = std::hypot(dx + z * slope_x, dy + z * slope_y) / std::max(r, 1e-6f);
+            float cover = m.opacity * std::clamp((m.radius - r) / std::max(grad, 1.0f) + 0.5f, 0.0f, 1.0f);
+            if (cover == 0) return;
+            if constexpr (hidden) cover *= visible_fraction(offset, m.depth - z * m.metres / m.radius);
+            add(pixel, m, cover, colour);
         });
     }
 

@@ -1,4 +1,4 @@
-// The points of a picture, drawn as discs, or as streaks if they move during the exposure.
+// The points of a picture, drawn as balls, as cards, or as streaks if they move during the exposure.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,7 @@ struct Mark {
     float opacity;         // 0 to 1
     Vec3f colour;
     bool additive;
+    bool card;  // a flat disc; (dx, dy, ddepth) is then its normal: right, down, to the viewer
     bool line;  // a segment of a trail, which covers its whole length evenly
 };
 

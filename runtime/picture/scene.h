@@ -23,6 +23,7 @@ struct PictureOptions {
 struct PointStyle {
     std::string group = {};              // group that it applies to; empty: all points
     std::optional<bool> additive = {};   // glowing: the points add light and block none
+    std::optional<bool> cards = {};      // flat discs across the y axis of orient, instead of balls
     std::optional<double> shutter = {};  // s, length of the exposure, which ends at the frame's time
 };
 

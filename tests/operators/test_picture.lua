@@ -23,10 +23,11 @@ return %s]]
   it("refuses what it can't show, with what would be right", function()
     for says, right in pairs {
       ['blend = "screen"'] = 'blend = "screen"',
+      ['draw = "discs"'] = 'draw = "discs" is unknown; it must be one of balls, cards',
       ["shutter = 2"] = "shutter = 2 is out of range; it must be from 0 to 1",
-      ["camera = {0, 1, 5}"] = "it must be a rapid.camera { ... }, keys {[1] = a, [48] = b} of such, or a function",
+      ["camera = {0, 1, 5}"] = "it must be a rapid.camera { ... }, cameras by frame {[1] = a, [48] = b}, or a function",
       ["camera = { [3] = 2 }"] = "it must be a rapid.camera { ... }",
-      ["camera = rapid.camera { position = {0, 1, 0}, target = {0, 1, 0} }"] = "position and target are the same place",
+      ["camera = rapid.camera { position = {0, 1, 0}, target = {0, 1, 0} }"] = "position and target are equal",
       ["camera = rapid.camera { fov = 0 }"] = "fov = 0 is out of range; it must be from 1 to 170",
       ["camera = rapid.camera { postion = {0, 1, 0} }"] = 'did you mean "position"?',
       ['camera = rapid.camera { group = "pear" }'] = '"pear"',

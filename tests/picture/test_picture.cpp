@@ -206,6 +206,27 @@ TEST_CASE("a streak has the light of its disc, spread along the way during the e
     CHECK(added(Vec3f(1, 2, 0) + 0.3f * way) == 0);
 }
 
+TEST_CASE("a card covers a disc times the cosine between its normal and the view", "[io][picture]")
+{
+    PointSet points = balls({{0, 0, 0}}, {Vec3f(0.3f, 0.3f, 0.3f)}, 2);
+    const double disc = light_of(points, styled({.additive = true}));
+    points.add({"orient", Quatf(Quatf::Identity())});
+    for (const double degrees : {90.0, 60.0, 30.0, -45.0}) {  // from the ground towards the viewer; -: its back
+        CAPTURE(degrees);
+        const double angle = degrees * std::acos(-1.0) / 180;
+        points.column<Quatf>("orient").write()[0] = Quatf(Eigen::AngleAxisf(static_cast<float>(angle), Vec3f::UnitX()));
+        CHECK(light_of(points, styled({.additive = true, .cards = true})) ==
+              Approx(disc * std::abs(std::sin(angle))).epsilon(0.03));
+        CHECK(light_of(points, styled({.additive = true, .cards = false})) == disc);
+    }
+    // A card that faces the light is brighter than one that is turned away from it by 60°.
+    const auto shaded = [&](const Vec3f& normal) {
+        points.column<Quatf>("orient").write()[0] = Quatf::FromTwoVectors(Vec3f::UnitY(), normal);
+        return render(points, small, styled({.cards = true}), front_view()).pixel(160, 100)[1];
+    };
+    CHECK(shaded(Vec3f(-0.3f, 0.4f, 1)) > shaded(Vec3f(0.6f, -0.8f, 1)) + 20);
+}
+
 TEST_CASE("a ball that hardly moves is shaded as one at rest", "[io][picture]")
 {
     PointSet points = balls({{0, 0, 0}}, {{0.4f, 0.4f, 0.4f}}, 2);

@@ -5,29 +5,40 @@
 
 local function added(text, remedy) return { message = ("%s; %s"):format(text, remedy) } end
 
-local no_clock = "a script has neither a clock nor an environment: frame.time is the time, rapid.param takes values"
-local no_chance = "math.random is not there, as each run would differ: p:rand(k) of a point is the same in every run"
+local no_clock = "a script has no clock and no environment variables; use frame.time, and rapid.param for values"
+local no_time = "the time is frame.time, in function(frame) ... end"
+local no_chance = "math.random does not exist, because each run would differ; use p:rand(k), which is the same in " ..
+  "every run"
 
 -- memory_limit: the message for a state that exceeds its memory limit. output: the program's name for the setting of
 -- output files.
 return function(memory_limit, output)
-  local no_files = ("a script has no files: rapid.points.read and rapid.mesh.read read some, :write and %s write them")
+  local no_files = ("a script can't open files; rapid.points.read and rapid.mesh.read read files, :write and %s " ..
+    "write them")
     :format(output)
   return {
     ["not enough memory"] = { message = memory_limit, is_memory = true },
     -- Functions for Lua turn their exceptions into errors: this one found no memory for that.
     ["C++ exception"] = { message = "C++ exception", is_memory = true },
-    ["stack overflow"] = { message = "stack overflow: a function calls itself without end", full_stack = true },
+    ["stack overflow"] = { message = "stack overflow: a function calls itself endlessly", full_stack = true },
     -- `p.v.x = 1`
     ["attempt to write to constant location"] = {
-      message = "neither a component nor the frame can be assigned; make a new vec3: p.v = vec3(1, p.v.y, p.v.z)",
+      message = "a component of a vector or a field of the frame can't be assigned; make a new vec3: p.v = vec3(1, " ..
+        "p.v.y, p.v.z)",
     },
     ["attempt to index global 'io' (a nil value)"] = added("attempt to index global 'io' (a nil value)", no_files),
     ["attempt to index global 'os' (a nil value)"] = added("attempt to index global 'os' (a nil value)", no_clock),
+    ["attempt to index global 'rapid' (a nil value)"] =
+      added("attempt to index global 'rapid' (a nil value)", 'begin the file with: local rapid = require "rapid"'),
+    ["attempt to perform arithmetic on global 'time' (a nil value)"] =
+      added("attempt to perform arithmetic on global 'time' (a nil value)", no_time),
+    ["attempt to index global 'frame' (a nil value)"] =
+      added("attempt to index global 'frame' (a nil value)", no_time),
     ["attempt to call field 'random' (a nil value)"] =
       added("attempt to call field 'random' (a nil value)", no_chance),
     endings = {
-      ["(number expected, got cdata)"] = "the frame, a point and a vec3 are no numbers: frame.time, p.age, v.x are",
+      ["(number expected, got nil)"] = "a name that does not exist is nil; " .. no_time,
+      ["(number expected, got cdata)"] = "the frame, a point and a vec3 are not numbers; use frame.time, p.age or v.x",
     },
   }
 end

@@ -879,7 +879,7 @@ function Node:distance(params) end
 function Node:drag(params) end
 
 ---@class rapid.params.emit
----@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points  object that emits the points [mesh, level set, shape, fog, curve or points, required]
+---@field source rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Place|fun(frame: rapid.Frame): rapid.Mesh|rapid.Shape|rapid.Fog|rapid.Curve|rapid.Points|rapid.Place  object that emits the points [mesh, level set, shape, fog, curve, points or vec3, required]
 ---@field from? "surface"|"volume"|"points"|fun(frame: rapid.Frame): "surface"|"volume"|"points"  part of the source that emits; the default is "points" for points, otherwise "surface" (the points of a mesh are its vertices) [string, one of surface, volume, points]
 ---@field density? string|fun(frame: rapid.Frame): string  attribute of the source's points, or of a mesh's vertices or faces; births are distributed in proportion to it [string]
 ---@field source_group? string  group of a mesh's faces; only these emit [string, constant]
@@ -897,7 +897,7 @@ function Node:drag(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values; between two vectors on a line [attributes]
 ---@field name? string  name of the node in messages [string]
 
 ---Emits points from a surface, a volume, a curve or points.
@@ -906,7 +906,7 @@ function Node:drag(params) end
 function Node:emit(params) end
 
 ---@class rapid.params.fade_by_age
----@field attribute? string  float attribute that is written [name of an attribute, default "pscale", constant]
+---@field attribute? string  float attribute that is written [name of a number attribute, default "pscale", constant]
 ---@field first? number|fun(frame: rapid.Frame): number  value at birth [number, default 1]
 ---@field hold? number|fun(frame: rapid.Frame): number  fraction of the life before the change begins [number, from 0 to 0.999, default 0]
 ---@field last? number|fun(frame: rapid.Frame): number  value at death [number, default 0]
@@ -1113,6 +1113,7 @@ function Node:merge(...) end
 ---@class rapid.params.picture
 ---@field group? string|fun(frame: rapid.Frame): string  limits the node to the points of this group [string]
 ---@field blend? "over"|"add"|fun(frame: rapid.Frame): "over"|"add"  over: nearer points hide others; add: points add their light and cast no shadow [string, one of over, add, default "over"]
+---@field draw? "balls"|"cards"|fun(frame: rapid.Frame): "balls"|"cards"  cards: flat discs across the y axis of orient, which show how points turn [string, one of balls, cards, default "balls"]
 ---@field shutter? number|fun(frame: rapid.Frame): number  fraction of the frame for which the picture is exposed, so that moving points leave streaks [number, from 0 to 1, default 0]
 ---@field camera? rapid.Camera|table<integer, rapid.Camera>|fun(frame: rapid.Frame): rapid.Camera|table<integer, rapid.Camera>  rapid.camera, a function of the frame that returns one, or keys; by default fitted to the scene [camera]
 ---@field emitters? boolean|fun(frame: rapid.Frame): boolean  shows the shapes that emit points [boolean, default true]
@@ -1163,7 +1164,7 @@ function Node:points(params) end
 function Node:ramp(params) end
 
 ---@class rapid.params.randomize
----@field attribute? string  float attribute that is written [name of an attribute, default "pscale", constant]
+---@field attribute? string  float attribute that is written [name of a number attribute, default "pscale", constant]
 ---@field bias? number|fun(frame: rapid.Frame): number  exponent of the distribution: 1 is uniform, larger values favour min [number, at least 0.001, default 1]
 ---@field max? number|fun(frame: rapid.Frame): number  largest value [number, default 1]
 ---@field min? number|fun(frame: rapid.Frame): number  smallest value [number, default 0]
@@ -1217,7 +1218,7 @@ function Node:solve(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values; between two vectors on a line [attributes]
 ---@field inherit? string|string[]|fun(frame: rapid.Frame): string|string[]  names of attributes that newborn points copy from their parent [names]
 ---@field inherit_velocity? number|fun(frame: rapid.Frame): number  fraction of the parent's velocity that is added [number, default 1]
 ---@field split? boolean|fun(frame: rapid.Frame): boolean  divides the parent's mass and volume among points that are born together [boolean, default false]
@@ -1299,6 +1300,9 @@ function Node:transfer(params) end
 
 ---@class rapid.params.tumble
 ---@field drag? number|fun(frame: rapid.Frame): number  rate at which w decreases [number, 1/s, at least 0, default 0]
+---@field speed? number|fun(frame: rapid.Frame): number  given to points whose w is 0, about a random axis [number, deg/s, at least 0, default 0]
+---@field stop_at_rest? boolean|fun(frame: rapid.Frame): boolean  points slower than 1 cm/s do not turn [boolean, default false]
+---@field variation? number|fun(frame: rapid.Frame): number  fraction of the speed by which points differ [number, from 0 to 1, default 0]
 ---@field group? string  limits the node to the points of this group [string, constant]
 ---@field name? string  name of the node in messages [string]
 

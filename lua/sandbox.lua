@@ -10,7 +10,7 @@ local protected = require "protected"
 
 local raw_tostring, raw_format, raw_pairs = tostring, string.format, pairs
 
-local weak = "a table can't be weak (__mode): what it holds would depend on when memory is collected"
+local weak = "a table can't be weak (__mode), because its contents would depend on the garbage collector"
 
 local function copy(library, without)
   local result = {}
@@ -45,7 +45,7 @@ local function sorted_keys(map, what)
     end
   end
   if #others > 1 then
-    error(("%s can't order keys that are neither numbers nor strings (here: %s); keep them in a list"):format(what,
+    error(("%s can't order keys that are not numbers or strings (here: %s); use a list"):format(what,
       type(others[1])), 3)
   end
   table.sort(numbers)
@@ -59,7 +59,7 @@ local function sorted_keys(map, what)
 end
 
 local function sorted_pairs(map)
-  if type(map) ~= "table" then error(("pairs takes a table, not %s"):format(describe.kind(map)), 2) end
+  if type(map) ~= "table" then error(("pairs needs a table, not %s"):format(describe.kind(map)), 2) end
   local keys, place = sorted_keys(map, "pairs"), 0
   return function()
     repeat
@@ -71,7 +71,7 @@ local function sorted_pairs(map)
 end
 
 local function sorted_next(map, key)
-  if type(map) ~= "table" then error(("next takes a table, not %s"):format(describe.kind(map)), 2) end
+  if type(map) ~= "table" then error(("next needs a table, not %s"):format(describe.kind(map)), 2) end
   local keys = sorted_keys(map, "next")
   if key == nil then return keys[1], map[keys[1]] end
   for place, known in ipairs(keys) do
@@ -86,7 +86,7 @@ end
 
 local function safe_format(format, ...)
   if type(format) == "string" and format:gsub("%%%%", ""):find "%%[%d%.%-%+ #]*p" then
-    error("%p is not there: addresses differ from run to run", 2)
+    error("%p is not available, because addresses differ from run to run", 2)
   end
   local count, values = select("#", ...), { ... }
   for place = 1, count do
@@ -96,6 +96,14 @@ local function safe_format(format, ...)
   return raw_format(format, unpack(values, 1, count))
 end
 jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
+
+-- Returns a message of the compiler with a remedy if it is likely that a comma or a bracket is missing.
+local function with_remedy(message)
+  local bracket, near = message:match "'([})])' expected.* near '([^']+)'$"
+  if not bracket then return message end
+  if near == "<eof>" then return ("%s; a %s is missing before the end of the file"):format(message, bracket) end
+  return near:find "^[%w_\"{]" and ("%s; is a comma missing before %s?"):format(message, near) or message
+end
 
 -- native.read_module(name) returns the text and the chunk name of a module next to the graph, or nil and the searched
 -- paths; native.outside_kernels(action, remedy) raises an error while a kernel runs. In a quiet environment (a
@@ -126,7 +134,7 @@ local function make(native, run)
   env.coroutine.resume, env.coroutine.wrap = protected.resume, protected.wrap
 
   function env.setmetatable(object, meta)
-    if type(object) ~= "table" then error("setmetatable takes a table", 2) end
+    if type(object) ~= "table" then error("setmetatable needs a table", 2) end
     if type(meta) == "table" and rawget(meta, "__mode") ~= nil then error(weak, 2) end
     return setmetatable(object, meta)
   end
@@ -143,27 +151,27 @@ local function make(native, run)
 
   -- Text only: bytecode can do more than Lua.
   local function load_text(text, name)
-    if type(text) ~= "string" then return nil, "load takes a text, not " .. describe.kind(text) end
-    if text:byte(1) == 27 then return nil, "bytecode is not loaded" end
+    if type(text) ~= "string" then return nil, "load needs a string, not " .. describe.kind(text) end
+    if text:byte(1) == 27 then return nil, "bytecode can't be loaded" end
     local chunk, message = loadstring(text, name)
     local with_calls = chunk and power_operator.rewrite(text)
     if with_calls then chunk, message = loadstring(with_calls, name) end
-    if not chunk then return nil, message end
+    if not chunk then return nil, with_remedy(message) end
     return setfenv(chunk, env)
   end
   -- A chunk named "=..." would be taken for one of Rapid's own.
   function env.load(text, name)
-    native.outside_kernels("load", "what it makes can't be checked there")
-    return load_text(text, "@" .. (type(name) == "string" and name:gsub("^[@=]", "") or "text given to load"))
+    native.outside_kernels("load", "its result can't be checked there")
+    return load_text(text, "@" .. (type(name) == "string" and name:gsub("^[@=]", "") or "string given to load"))
   end
   env.loadstring = env.load
 
   local loaded, loading = {}, {}
   function env.require(name)
-    if type(name) ~= "string" then error("require takes the name of a module", 2) end
+    if type(name) ~= "string" then error("require needs the name of a module", 2) end
     if loaded[name] ~= nil then return loaded[name] end
-    native.outside_kernels("require", "let the graph's body do it first")
-    if loading[name] then error(("module %q requires itself, by way of those that it requires"):format(name), 2) end
+    native.outside_kernels("require", "call it first in the graph's body")
+    if loading[name] then error(("module %q requires itself through other modules"):format(name), 2) end
     local text, where = native.read_module(name)
     if not text then error(("no module %q; looked for %s"):format(name, where), 2) end
     local chunk, message = load_text(text, where)

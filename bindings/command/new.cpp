@@ -48,11 +48,11 @@ bool make_file(const std::string& path, const std::string& text)
 class New : public Command {
 public:
     std::string name() const override { return "new"; }
-    std::string doc() const override { return "makes a scene and its test in this folder, to begin with"; }
+    std::string doc() const override { return "makes a scene and its test in this folder, as a start"; }
 
     void declare(Options& options) override
     {
-        options.add_option("NAME", name_, "of the scene, such as sparks: makes sparks.lua and test_sparks.lua")
+        options.add_option("NAME", name_, "name of the scene, such as sparks: makes sparks.lua and test_sparks.lua")
             .type_name("")
             .required();
     }
@@ -63,7 +63,7 @@ public:
         const std::string scene = name_ + ".lua", test = "test_" + name_ + ".lua";
         for (const std::string& file : {scene, test})
             if (std::error_code none; fs::exists(fs::symlink_status(file, none)))
-                throw Error("is there already and is left as it is; take another name").at({file, 0});
+                throw Error("exists already and is not changed; choose another name").at({file, 0});
 
         const fs::path lua = Installation::find().value().lua;
         make(scene, fill_in(lua, "scene.lua", name_));
@@ -72,7 +72,8 @@ public:
         JsonText editor(2);
         editor.object("runtime.version", "LuaJIT", "workspace.library", std::array{(lua / "rapid.d.lua").string()});
         make(".luarc.json", editor.text() + '\n');
-        print(fmt::format("now: rapid run {} -f 1-96 -o {}.####.png\n     rapid test {}\n", scene, name_, test));
+        print(fmt::format("now: {0} run {1} -f 1-96 -o {2}.####.png\n     {0} test {3}\n", name_of_command(), scene,
+                          name_, test));
         return status_done;
     }
 
@@ -84,14 +85,14 @@ private:
                                       [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
         if (!word)
             throw Error(
-                fmt::format("rapid new: \"{}\" is no name of a scene; it must be made of letters, digits, _ and "
-                            "-, and begin with a letter",
+                fmt::format("rapid new: \"{}\" can't be the name of a scene; it must consist of letters, digits, _ "
+                            "and -, and begin with a letter or _",
                             name_));
         const std::vector<SceneNodeType> types = SceneInside::all_node_types().value();
         if (std::any_of(types.begin(), types.end(), [&](const SceneNodeType& type) { return type.name == name_; }))
             throw Error(
-                fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from scenes "
-                            "beside it; take another name",
+                fmt::format("rapid new: \"{0}\" is the name of a node, and {0}.lua would hide it from the scenes "
+                            "in this folder; choose another name",
                             name_));
     }
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -39,6 +40,12 @@ void print_error(std::string_view error, std::string_view trace)
 }
 
 }  // namespace
+
+std::string name_of_command()
+{
+    const std::string called = program_invocation_name;  // of glibc: argv[0]
+    return called.find('/') == std::string::npos ? "rapid" : called;
+}
 
 CommandRegistration::CommandRegistration(std::unique_ptr<Command> (*make)()) { command_makers().push_back(make); }
 
@@ -112,7 +119,8 @@ std::size_t read_bytes(const std::string& option, const std::string& text)
     std::uint64_t value = 0;
     const bool number = parse(std::string_view(text).substr(0, text.size() - (shift > 0)), value);
     if (!number || value == 0 || value > (UINT64_MAX >> shift))
-        throw Error(fmt::format("{} = \"{}\"; it must be bytes above 0, such as 1073741824, 512M or 1G", option, text));
+        throw Error(fmt::format("{} = \"{}\"; it must be a number of bytes above 0, such as 1073741824, 512M or 1G",
+                                option, text));
     return value << shift;
 }
 

@@ -37,6 +37,9 @@ public:
     virtual int run(const CommonOptions& common) = 0;
 };
 
+// Returns the word by which the user called this program: "rapid", or a path such as "./rapid".
+std::string name_of_command();
+
 // Returns the commands, ordered by name.
 std::vector<std::unique_ptr<Command>> make_commands();
 

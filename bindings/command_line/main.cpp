@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -60,7 +61,7 @@ Error no_command(CLI::App& app, const Arguments& arguments)
     for (const std::string& argument : arguments) {
         if (argument.starts_with('-')) continue;
         if (argument.ends_with(".lua"))
-            return Error(fmt::format("no command; to run the graph, type: rapid run {}", argument));
+            return Error(fmt::format("no command; to run the scene, type: {} run {}", name_of_command(), argument));
         const std::string near = did_you_mean(argument, names);
         return Error(fmt::format("unknown command \"{}\"{}", argument,
                                  near.empty() ? fmt::format("; it must be one of {}", fmt::join(names, ", ")) : near));
@@ -68,12 +69,27 @@ Error no_command(CLI::App& app, const Arguments& arguments)
     return Error(fmt::format("no command; it must be one of {}", fmt::join(names, ", ")));
 }
 
+// Returns the error for an argument without an option. Bash makes --set a={1,2,3} into --set a=1 a=2 a=3.
+Error unexpected(const CLI::App& command, const std::string& argument)
+{
+    const std::string text = fmt::format("unexpected argument \"{}\"", argument);
+    const CLI::Option* set = command.get_option_no_throw("--set");
+    const std::size_t equals = argument.find('=');
+    if (!set || equals == std::string::npos) return Error(text);
+    const std::string name = argument.substr(0, equals + 1);
+    const std::vector<std::string> given = set->results();
+    if (std::any_of(given.begin(), given.end(), [&](const std::string& other) { return other.starts_with(name); }))
+        return Error(
+            fmt::format("{}; the shell has split a list, so put it in quotes: --set '{}{{1, 2, 3}}'", text, name));
+    return Error(fmt::format("{}; to set a value, type: --set {}", text, argument));
+}
+
 // Refuses arguments that no option took.
 void refuse_rest(const CLI::App& command)
 {
     for (const std::string& argument : command.remaining()) {
         if (argument == "--") continue;
-        if (!argument.starts_with('-')) throw Error(fmt::format("unexpected argument \"{}\"", argument));
+        if (!argument.starts_with('-')) throw unexpected(command, argument);
         std::vector<std::string> names;
         for (const CLI::Option* option : command.get_options())
             for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
@@ -116,15 +132,15 @@ void declare_common(CLI::App& command, CommonOptions& common)
                 if (threads > most) throw Error(fmt::format("--threads = {}; it must be at most {}", text, most));
                 common.threads = static_cast<int>(threads);
             },
-            "threads to use; 0, the default, is all that the machine has")
+            "number of threads; 0, the default, uses all of the machine")
         ->type_name("N");
     command
         .add_option_function<std::vector<std::string>>(
             "--plugin", [&](const std::vector<std::string>& files) { common.plugins = files; },
-            "loads nodes from a library built against Rapid; so does RAPID_PLUGIN_PATH, a list of files and folders")
+            "loads nodes from a library built against Rapid; RAPID_PLUGIN_PATH is a list of such files and folders")
         ->type_name("FILE")
         ->allow_extra_args(false);
-    command.add_flag("--verbose", common.verbose, "with the script's call stack, where an error has one");
+    command.add_flag("--verbose", common.verbose, "prints the call stack of a script error");
     command.allow_extras();
 }
 
@@ -224,11 +240,12 @@ void name_options()
 int run(const Arguments& arguments)
 {
     name_options();
-    CLI::App app("Rapid: particles from Lua graphs, without a user interface.", "rapid");
+    CLI::App app("Rapid: a particle system. Scenes are Lua files.", "rapid");
     app.set_version_flag("--version", "rapid " RAPID_VERSION);
     app.footer(
-        "`rapid COMMAND --help` tells more. Exit status: 0 done; 1 found while a frame ran, a failed test, a\n"
-        "difference; 2 found before (usage, a mistake in the graph, a missing file).");
+        "`rapid COMMAND --help` lists the options of a command. Exit status: 0 done; 1 an error while a frame ran, a "
+        "failed\ntest, a difference; 2 an error before the first frame (usage, a mistake in the graph, a missing "
+        "file).");
     app.require_subcommand(0, 1);  // after a command, another command's name is an argument: `rapid nodes merge`
     CommonOptions common;
     const std::vector<std::unique_ptr<Command>> commands = make_commands();
@@ -265,7 +282,7 @@ namespace {
 // functions that may not throw. This function allocates nothing.
 void end_without_exception()
 {
-    const char* text = "an exception could not be passed on, as a rule for want of memory\n";
+    const char* text = "an exception could not be passed on, usually because memory ran out\n";
     try {
         if (std::current_exception()) throw;
     } catch (const std::bad_alloc&) {

@@ -42,6 +42,17 @@ std::vector<std::string> made_by(const NodeType& type)
     return names;
 }
 
+// Shows that a value may be a function of the frame, for the first number or vector that may; empty if none may.
+std::string function_example(const NodeType& type)
+{
+    const auto found = std::find_if(type.params.begin(), type.params.end(), [](const Param& param) {
+        return param.of_the_frame && !param.internal && (param.type == "vec3" || param.type == "number");
+    });
+    if (found == type.params.end()) return "";
+    return fmt::format("\nA value may be a function of the frame: {} = function(frame) return {} end\n", found->name,
+                       found->type == "vec3" ? "{math.sin(frame.time), 0, 0}" : "2 * frame.time");
+}
+
 }  // namespace
 
 std::string json_of(const NodeType& type)
@@ -74,6 +85,7 @@ std::string page_of(const NodeType& type)
     }
     if (!type.find("name")) text += fmt::format("  {:{}}  name of the node in messages [string]\n", "name", width);
     if (type.rest) text += fmt::format("  {:{}}  {} [{}]\n", "...", width, type.rest->doc, type.rest->type);
+    text += function_example(type);
 
     const auto names = [&](std::string_view what, const std::vector<std::string>& list) {
         if (!list.empty()) text += fmt::format("\n{} {}", what, fmt::join(list, ", "));

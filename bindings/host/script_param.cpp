@@ -8,6 +8,7 @@
 #include "bindings/host/ramp.h"
 #include "bindings/host/script_operator.h"
 #include "runtime/graph/step_shape.h"
+#include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
@@ -57,7 +58,7 @@ void keep_name(const Param& param, void* fields, const Value& value)
         arguments.joins.insert(name);
     } else {
         if (access == Access::Writes && is_read_only(name))
-            throw Error(fmt::format("{} = \"{}\"; that attribute is read only", param.name, name));
+            throw Error(fmt::format("{} = \"{}\": this attribute is read-only", param.name, name));
         if (access == Access::Reads && name == "nage")
             arguments.reads.insert({"age", "life"});  // the kernel's nage is computed from these
         else
@@ -90,6 +91,7 @@ const std::map<std::string, DeclaredType>& declared_types()
         {"vec3", {"vec3", keep_as<Vec3d>, true}},
         {"vec3s", {"list of vec3", keep_list<Vec3d>, true}},
         {"write", {attribute_type, keep_name<Access::Writes>, false, true}},
+        {"write_number", {number_attribute_type, keep_name<Access::Writes>, false, true}},
     };
     return types;
 }
@@ -130,7 +132,7 @@ const DeclaredType& find_type(const std::string& type, const std::string& what)
     for (const auto& [name, declared] : declared_types()) names.push_back(name);
     const std::string near = did_you_mean(type, names);
     throw Error(fmt::format("{}: unknown type \"{}\"{}", what, type,
-                            near.empty() ? fmt::format("; there are {}", fmt::join(names, ", ")) : near));
+                            near.empty() ? fmt::format("; it must be one of {}", fmt::join(names, ", ")) : near));
 }
 
 // Checks a default at its declaration.
@@ -151,25 +153,26 @@ Param read_param(const std::string& name, const Value& declared, const std::stri
     const std::string what = fmt::format("rapid.node \"{}\", parameter {}", node_name, name);
     const Table* table = declared.table();
     const std::string* type = table && !table->list.empty() ? table->list.front().get<std::string>() : nullptr;
-    if (!type) throw Error(what + ": declare it as { \"float\", default = 1, doc = \"...\" }");
+    if (!type) throw Error(what + ": the declaration must look like { \"float\", default = 1, doc = \"...\" }");
     check_param_fields(*table, what);
 
     Param param;
     param.name = name;
     param.unit = text_field(*table, "unit", what);
     param.doc = text_field(*table, "doc", what);
-    if (param.doc.empty()) throw Error(what + ": say what it is, doc = \"...\"");
+    if (param.doc.empty()) throw Error(what + ": the documentation is missing; add doc = \"...\"");
     read_limit(*table, "min", what, param.range.lo);
     read_limit(*table, "max", what, param.range.hi);
     param.range.infinity = find_field(*table, "max") && std::isinf(param.range.hi);  // max = math.huge allows it
     read_required(*table, what, param.required);
     if (const Value* choices = find_field(*table, "choices")) read_value(param, *choices, param.choices);
     if (const Value* fallback = find_field(*table, "default")) param.fallback = *fallback;
-    if (param.fallback.is_nil() && !param.required) throw Error(what + ": give it a default, or required = true");
+    if (param.fallback.is_nil() && !param.required)
+        throw Error(what + ": the default is missing; add default = ..., or required = true");
 
     const DeclaredType& known = find_type(*type, what);
     if (param.range.bounded() && !known.ranged)
-        throw Error(fmt::format("{}: min and max mean nothing for a {}", what, *type));
+        throw Error(fmt::format("{}: a {} has no min and max; remove them", what, *type));
     param.type = known.shown;
     param.assign = known.assign;
     param.of_the_frame = !known.constant;

@@ -9,7 +9,7 @@ return rapid.node {
   name = "fade_by_age",
   doc  = "Changes an attribute over the life of each point.",
   params = {
-    attribute = { "write", default = "pscale", doc = "float attribute that is written" },
+    attribute = { "write_number", default = "pscale", doc = "float attribute that is written" },
     first     = { "float", default = 1, doc = "value at birth" },
     last      = { "float", default = 0, doc = "value at death" },
     hold      = { "float", default = 0, min = 0, max = 0.999, doc = "fraction of the life before the change begins" },

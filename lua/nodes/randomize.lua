@@ -7,7 +7,7 @@ return rapid.node {
   name = "randomize",
   doc  = "Gives each point its own random value of an attribute.",
   params = {
-    attribute = { "write", default = "pscale", doc = "float attribute that is written" },
+    attribute = { "write_number", default = "pscale", doc = "float attribute that is written" },
     min       = { "float", default = 0, doc = "smallest value" },
     max       = { "float", default = 1, doc = "largest value" },
     bias      = { "float", default = 1, min = 1e-3,

@@ -28,18 +28,32 @@ std::string unknown(const NodeType& type, const std::string& name)
     const Param* values = type.find("attributes");
     const bool gives_attributes = values && values->type == param_type<std::map<std::string, AttributeValue>>();
     const std::string made = name == "name" ? "" : advice_for_making(name);
-    if (gives_attributes && (known_attribute(name) || conventional_attribute(name)))
+    const auto conventional_or_known = [](const std::string& attribute) {
+        return known_attribute(attribute) || conventional_attribute(attribute);
+    };
+    if (gives_attributes && conventional_or_known(name))
         return fmt::format("unknown parameter \"{}\"; it is an attribute of points: attributes = {{ {} }}", name, made);
+    const std::string known(name_of_synonym(name));
+    if (!known.empty() && type.find(known))
+        return fmt::format("unknown parameter \"{}\"; did you mean \"{}\"?", name, known);
+    if (gives_attributes && conventional_or_known(known))
+        return fmt::format("unknown parameter \"{}\"; the {} of points is {}: attributes = {{ {} }}", name, name, known,
+                           advice_for_making(known));
+    constexpr std::string_view amounts[] = {"amount", "births", "number", "particles", "quantity"};
+    if (type.find("rate") && type.find("count") &&
+        std::find(std::begin(amounts), std::end(amounts), name) != std::end(amounts))
+        return fmt::format("unknown parameter \"{}\"; give rate (points per second) or count (points per frame)", name);
     const std::vector<std::string> names = type.param_names();
     if (const std::string near = did_you_mean(name, names); !near.empty())
         return fmt::format("unknown parameter \"{}\"{}", name, near);
     if (gives_attributes)
         return fmt::format(
-            "unknown parameter \"{}\"; rapid nodes {} lists them, and an attribute of points goes into "
+            "unknown parameter \"{}\"; `rapid nodes {}` lists the parameters; an attribute of points goes into "
             "attributes = {{ {} }}",
             name, type.name, made);
     constexpr std::size_t most = 12;  // names in a message
-    if (names.size() > most) return fmt::format("unknown parameter \"{}\"; rapid nodes {} lists them", name, type.name);
+    if (names.size() > most)
+        return fmt::format("unknown parameter \"{}\"; `rapid nodes {}` lists the parameters", name, type.name);
     return fmt::format("unknown parameter \"{}\"; {} has {}", name, type.name, fmt::join(names, ", "));
 }
 
@@ -50,7 +64,8 @@ void assign_at(const Param& param, Operator& op, const FrameFunction& function, 
     try {
         const Value result = function.call(frame);
         if (result.is_nil() && !param.may_be_nil) wrong_type(param, result);
-        if (result.function()) throw Error(fmt::format("{} is a function that returned a function", param.name));
+        if (result.function())
+            throw Error(fmt::format("{} is a function that returned a function; it must return a value", param.name));
         param.assign(param, op.fields(), in_step(param, result, clock, frame));
     } catch (const Error& error) {
         throw error.reworded(fmt::format("{} (frame {})", error.message(), frame.number));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_function.h"
 #include "runtime/graph/points_object.h"
+#include "runtime/points/attribute_like.h"
+#include "runtime/shapes/shape.h"
 #include "runtime/solver/collision/hits.h"
 
 namespace rapid {
@@ -61,7 +64,8 @@ void warn_of_dropped_nodes(const Graph& graph, const Plan& plan, std::vector<std
         if (ends || is_reported || taken.count(node.get()) || !reached.count(node->inputs.front().get())) continue;
         warnings.push_back(warning_of(
             *node,
-            fmt::format("leads to no output, as its result is dropped; keep it: chain = chain:{} {{ ... }}", type)));
+            fmt::format("leads to no output, because its result is not used; assign it: chain = chain:{} {{ ... }}",
+                        type)));
     }
 }
 
@@ -75,7 +79,132 @@ void warn_of_missing_lives(const Plan& plan, std::vector<std::string>& warnings)
         const std::vector<std::string> reads = uses_of(planned).reads;
         if (!names(reads, "age") || !names(reads, "life") || is_provided_to(plan, planned, "life")) continue;
         warnings.push_back(
-            warning_of(*planned.node, "its points live for ever, so their age is no part of a life; give emit a life"));
+            warning_of(*planned.node, "needs the life of its points, but they live for ever; give emit a life"));
+    }
+}
+
+// Warns of forces after a goal that holds its points, which no force can move.
+void warn_of_held_points(const Plan& plan, std::vector<std::string>& warnings)
+{
+    std::map<std::size_t, const Node*> goals;  // by simulation; null once warned
+    const auto given = [](const Node& node, const char* param) {
+        const auto found = node.arguments.find(param);
+        return found == node.arguments.end() ? nullptr : &found->second;
+    };
+    for (const PlannedNode& planned : plan.nodes) {
+        const Node& node = *planned.node;
+        if (!planned.in_loop || given(node, "group")) continue;
+        const Value* hold = given(node, "hold");
+        const bool holds = !hold || (hold->get<bool>() && *hold->get<bool>());
+        if (node.type->name == "goal" && holds) {
+            goals.emplace(planned.simulation, &node);
+        } else if (const auto goal = goals.find(planned.simulation);
+                   goal != goals.end() && goal->second && node.type->has(Stage::Forces)) {
+            warnings.push_back(
+                warning_of(node, fmt::format("can't move the points that have arrived, as {} holds them; to let them "
+                                             "go, give {} hold = false",
+                                             goal->second->name, goal->second->name)));
+            goal->second = nullptr;
+        }
+    }
+}
+
+// Returns the value that a node gives to an attribute of points; null if it gives none.
+const Value* given_attribute(const Node& node, const std::string& name)
+{
+    const auto in = [&](const std::map<std::string, Value>& values) {
+        const auto found = values.find(name);
+        return found == values.end() ? nullptr : &found->second;
+    };
+    if (node.type->rest) return in(node.arguments);
+    const auto attributes = node.arguments.find("attributes");
+    const Table* table = attributes == node.arguments.end() ? nullptr : attributes->second.table();
+    return table ? in(table->named) : nullptr;
+}
+
+// Returns the numbers in a constant value.
+std::vector<double> numbers_in(const Value& value)
+{
+    if (const double* number = value.get<double>()) return {*number};
+    if (const Vec3d* vector = value.get<Vec3d>()) return {vector->begin(), vector->end()};
+    std::vector<double> numbers;
+    if (const Table* table = value.table())
+        for (const Value& entry : table->list)
+            for (const double number : numbers_in(entry)) numbers.push_back(number);
+    return numbers;
+}
+
+// Returns the diagonal of the shape on which points are born, m; infinity for a plane, a few metres for other sources.
+double size_of_source(const Node& node)
+{
+    constexpr double usual = 3;
+    const auto source = node.arguments.find("source");
+    const auto shape = source == node.arguments.end() ? nullptr : source->second.object<Shape>();
+    return shape ? shape->bounds().sizes().norm() : usual;
+}
+
+// Warns of values that are legal but suggest another unit.
+void warn_of_units(const Plan& plan, std::vector<std::string>& warnings)
+{
+    constexpr double brightest = 30;  // of linear light: fires and lamps stay below it
+    for (const PlannedNode& planned : plan.nodes) {
+        const Node& node = *planned.node;
+        const auto warn = [&](const std::string& text) { warnings.push_back(warning_of(node, text)); };
+        if (const Value* Cd = given_attribute(node, "Cd"))
+            if (const auto all = numbers_in(*Cd);
+                std::any_of(all.begin(), all.end(), [](double c) { return c > brightest; }))
+                warn(fmt::format("Cd = {}: colours go from 0 to 1; divide by 255", describe(*Cd)));
+        if (const Value* pscale = given_attribute(node, "pscale"))
+            if (const auto all = numbers_in(*pscale); !all.empty()) {
+                const double least = *std::min_element(all.begin(), all.end());
+                if (least >= 1 && least > size_of_source(node))
+                    warn(fmt::format("pscale = {} is a radius in metres, larger than the source", describe(*pscale)));
+            }
+        const auto life = node.arguments.find("life");
+        if (life == node.arguments.end() || !node.type->has(Stage::Emission)) continue;
+        const double fps = plan.simulations[planned.simulation].fps;
+        constexpr double frames_of_a_shot = 1000;
+        const std::vector<double> all = numbers_in(life->second);
+        if (!all.empty() && all.front() >= fps && all.back() <= frames_of_a_shot)
+            warn(
+                fmt::format("life = {} is in seconds; if frames are meant, divide by {}", describe(life->second), fps));
+    }
+}
+
+// Warns of attributes under names that other programs use, which nothing reads.
+void warn_of_other_names(const Plan& plan, std::vector<std::string>& warnings)
+{
+    for (const PlannedSimulation& simulation : plan.simulations)
+        for (const PlannedAttribute& attribute : simulation.attributes) {
+            const std::string_view known = name_of_synonym(attribute.name);
+            const bool is_used =
+                !attribute.read_by.empty() || !attribute.written_by.empty() || attribute.requested_by_name;
+            if (known.empty() || attribute.made_by.empty() || is_used) continue;
+            const Node& maker = *plan.nodes[attribute.made_by.front()].node;
+            if (given_attribute(maker, attribute.name))
+                warnings.push_back(
+                    warning_of(maker, fmt::format("gives points \"{}\", which nothing reads; the {} of points is {}",
+                                                  attribute.name, attribute.name, known)));
+        }
+}
+
+// Warns of nodes :tumble in chains whose points have no angular velocity.
+void warn_of_still_tumbles(const Plan& plan, std::vector<std::string>& warnings)
+{
+    const auto turns = [&](const std::vector<std::size_t>& nodes) {
+        return std::any_of(nodes.begin(), nodes.end(),
+                           [&](std::size_t node) { return plan.nodes[node].node->type->name != "tumble"; });
+    };
+    for (const PlannedNode& planned : plan.nodes) {
+        if (planned.node->type->name != "tumble" || planned.node->arguments.count("speed")) continue;
+        if (std::none_of(planned.carries.begin(), planned.carries.end(), [&](std::size_t s) {
+                const PlannedAttribute* w = plan.simulations[s].find("w");
+                return w && (turns(w->made_by) || turns(w->written_by));
+            }))
+            warnings.push_back(
+                warning_of(*planned.node,
+                           "turns nothing, as the angular velocity w of all points is 0; give it a speed in "
+                           "degrees per second: :tumble { speed = 360 }"));
     }
 }
 
@@ -85,8 +214,9 @@ void warn_of_idle_spins(const Plan& plan, std::vector<std::string>& warnings)
     for (const PlannedSimulation& simulation : plan.simulations) {
         const PlannedAttribute* w = simulation.find("w");
         if (!w || w->made_by.empty() || !w->read_by.empty()) continue;
-        warnings.push_back(warning_of(*plan.nodes[w->made_by.front()].node,
-                                      "makes w, by which nothing turns; add :tumble {}, or give :contact spin = true"));
+        warnings.push_back(
+            warning_of(*plan.nodes[w->made_by.front()].node,
+                       "makes w, but no node turns points by it; add :tumble {}, or give :contact spin = true"));
     }
 }
 
@@ -151,8 +281,8 @@ void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& 
             continue;
         warnings.push_back(
             warning_of(*mover->node,
-                       "moves P and leaves v at 0, so that files and motion blur have no velocities; assign "
-                       "p.v = (place - p.P) / frame.dt instead of p.P, and :solve moves the point there"));
+                       "moves P but leaves v at 0, so files and motion blur have no velocities; instead of p.P assign "
+                       "p.v = (position - p.P) / frame.dt, and :solve moves the point there"));
     }
 }
 
@@ -164,6 +294,10 @@ std::vector<std::string> warnings_about(const Graph& graph, const Plan& plan)
     warn_of_dropped_nodes(graph, plan, warnings);
     warn_of_missing_lives(plan, warnings);
     warn_of_idle_spins(plan, warnings);
+    warn_of_still_tumbles(plan, warnings);
+    warn_of_held_points(plan, warnings);
+    warn_of_other_names(plan, warnings);
+    warn_of_units(plan, warnings);
     warn_of_moves_without_velocity(plan, warnings);
     return warnings;
 }
@@ -226,11 +360,30 @@ std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
                                                      [&](std::size_t other) { return is_provided(other, name); });
             if (comes_elsewhere) continue;
             warnings.insert(
-                fmt::format("{}:{}: node \"{}\": reads {}, which no collider writes; give a :collide record = true",
+                fmt::format("{}:{}: node \"{}\": reads {}, which no collider writes; give :collide record = true",
                             reader.node->location.file, reader.node->location.line, reader.node->name, name));
             break;
         }
     return warnings;
+}
+
+// Throws Error if a node writes numbers to an attribute that is not a number.
+void check_number_attributes(const Plan& plan)
+{
+    for (const PlannedNode& planned : plan.nodes)
+        for (const Param& param : planned.node->type->params) {
+            if (param.type != number_attribute_type) continue;
+            const auto given = planned.node->arguments.find(param.name);
+            const Value& value = given == planned.node->arguments.end() ? param.fallback : given->second;
+            const PlannedAttribute* attribute = plan.simulations[planned.simulation].find(*value.get<std::string>());
+            if (!attribute || attribute->group) continue;
+            const AttributeType type = type_of(attribute->spec.fallback);
+            if (type == AttributeType::Float || type == AttributeType::Int32 || type == AttributeType::Int64) continue;
+            name_errors(planned.node->name, planned.node->location, [&] {
+                throw Error(fmt::format("{} = \"{}\" is a {}; it must be an attribute with one number per point",
+                                        param.name, attribute->name, type_name(type)));
+            });
+        }
 }
 
 }  // namespace
@@ -259,6 +412,7 @@ Plan::Plan(const Graph& graph, const PlanOptions& options)
     for (std::size_t s = 0; s < simulations.size(); ++s) check_names(nodes, flow, s);
     for (std::size_t s = 0; s < simulations.size(); ++s)
         simulations[s].attributes = find_attributes(nodes, flow, s, options);
+    check_number_attributes(*this);
     keep_for_merges(nodes, simulations);
     for (PlannedSimulation& simulation : simulations)
         for (const PlannedAttribute& attribute : simulation.attributes)
@@ -287,7 +441,7 @@ void Plan::collect_nodes(const Graph& graph)
     for (const auto& [serial, node] : reached) {
         name_errors(node->name, node->location, [&, &made = node] {
             if (const auto [other, fresh] = by_name.emplace(made->name, made.get()); !fresh)
-                throw Error(fmt::format("the name is taken by the node at line {}; give each its own",
+                throw Error(fmt::format("the node at line {} has the same name; give each node a different name",
                                         other->second->location.line));
         });
         PlannedNode planned;
@@ -319,7 +473,8 @@ void Plan::collect_nodes(const Graph& graph)
         pruned.push_back(node);
         if (node->type->name == "write" || node->type->name == "rasterize")
             warnings.push_back(
-                fmt::format("{}:{}: node \"{}\": writes nothing: no output comes from it; return it, or go on from it",
+                fmt::format("{}:{}: node \"{}\": writes nothing, because it leads to no output; return it, or continue "
+                            "the chain from it",
                             node->location.file, node->location.line, node->name));
     }
 }
@@ -335,9 +490,9 @@ void Plan::warn_of_idle_nodes()
         if (planned.in_loop || (!is_dynamic && !node.type->has(Stage::Emission))) continue;
         if (!reported.insert(planned.simulation).second) continue;
         warnings.push_back(
-            fmt::format("{}:{}: node \"{}\": {}: no :solve comes after it; end the chain with :solve {{}}",
+            fmt::format("{}:{}: node \"{}\": {}, because no :solve comes after it; end the chain with :solve {{}}",
                         node.location.file, node.location.line, node.name,
-                        is_dynamic ? "acts on nothing" : "its points are gone after the frame of their birth"));
+                        is_dynamic ? "has no effect" : "its points exist only in the frame of their birth"));
     }
 }
 
@@ -388,15 +543,13 @@ void Plan::check_source(const PlannedNode& planned, std::size_t s)
     PlannedSimulation& from = simulations[source.simulation];
     const std::string& name = source.node->name;
     if (!from.solve)
-        throw Error(fmt::format(
-            "from = node \"{}\": its points are not moved by a solve; end its chain with :solve{{}}", name));
+        throw Error(fmt::format("from = node \"{}\": no solve moves its points; end its chain with :solve {{}}", name));
     if (source.simulation != planned.simulation && source.in_loop && source.node->type->kind != NodeKind::Solve)
-        throw Error(fmt::format("from = node \"{}\" comes before its solve; give \"{}\", or a node after it", name,
+        throw Error(fmt::format("from = node \"{}\" comes before its solve; give \"{}\" or a node after it", name,
                                 from.solve->name));
     if (from.fps != simulations[planned.simulation].fps)
         throw Error(
-            fmt::format("from = node \"{}\" runs at {} frames a second, and this chain at {}; give both the "
-                        "same fps",
+            fmt::format("from = node \"{}\" runs at {} frames per second and this chain at {}; give both the same fps",
                         name, from.fps, simulations[planned.simulation].fps));
     from.recorded = true;
 }
@@ -412,7 +565,7 @@ void Plan::start_simulation(PlannedNode& create)
     simulation.subframes = static_cast<int>(constant_argument(node, "subframes"));
     simulation.seed = static_cast<std::uint64_t>(constant_argument(node, "seed"));
     if (!simulations.empty() && simulations.front().subframes != simulation.subframes)
-        throw Error(fmt::format("subframes = {}, and {} at \"{}\"; all simulations of a graph have the same",
+        throw Error(fmt::format("subframes = {}, but {} at \"{}\"; all simulations of a graph must have the same",
                                 simulation.subframes, simulations.front().subframes, simulations.front().create->name))
             .in_node(node.name)
             .at(node.location);
@@ -427,9 +580,10 @@ void Plan::feed_back(const PlannedNode& solve)
     for (const std::size_t s : solve.carries) {
         if (simulations[s].solve) {
             const Node& other = *simulations[s].solve;
-            throw Error(fmt::format("a second solve after \"{}\": \"{}\" at line {} feeds it back already; a create "
-                                    "has one solve",
-                                    simulations[s].create->name, other.name, other.location.line))
+            throw Error(
+                fmt::format(
+                    "a second solve after \"{}\": \"{}\" at line {} is already its solve; a create can have only one",
+                    simulations[s].create->name, other.name, other.location.line))
                 .in_node(solve.node->name)
                 .at(solve.node->location);
         }
@@ -466,16 +620,16 @@ void Plan::find_changes()
     for (PlannedNode& planned : nodes) {
         const std::string argument = varying_argument(*planned.node);
         if (planned.in_loop)
-            planned.changes = "its points are fed back from frame to frame";
+            planned.changes = "its points continue from frame to frame";
         else if (!argument.empty())
             planned.changes = fmt::format("its {} changes with the frame", argument);
         else if (planned.node->type->varies)
-            planned.changes = "its result may be another one in each frame";
+            planned.changes = "its result may differ in each frame";
         else
             for (const std::size_t input : planned.inputs)
                 if (planned.changes.empty() && !nodes[input].once)
                     planned.changes = fmt::format("\"{}\" before it is evaluated again", nodes[input].node->name);
-        if (keeps_all && planned.changes.empty()) planned.changes = "nothing is left out";
+        if (keeps_all && planned.changes.empty()) planned.changes = "nothing is pruned";
         planned.once = planned.changes.empty();
     }
 }

@@ -40,17 +40,25 @@ struct ColliderShape {
     MotionPtr motion;
 };
 
+// Returns a voxel with about 64 of them along the mesh, with one digit.
+std::string suggested_voxel(const Mesh& mesh)
+{
+    const float size = mesh.bounds().sizes().maxCoeff();
+    return size > 0 ? fmt::format("{:.1g}", size / 64) : "0.05";
+}
+
 [[noreturn]] void refuse_mesh(const Param& param, const Value& value, const Mesh& mesh)
 {
+    const std::string remedy = fmt::format(
+        "use rapid.levelset.from_mesh(mesh, {{ voxel = {} }}); a smaller voxel follows the mesh more closely",
+        suggested_voxel(mesh));
     const std::size_t open = mesh.openness().boundary_edges;
     if (open == 0)
         throw Error(
-            fmt::format("{} = {} has no inside to keep out of; take rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
-                        param.name, describe(value)));
-    throw Error(
-        fmt::format("{} = {} has no inside to keep out of, as it is open: {} of its edges have one face; {}, then take "
-                    "rapid.levelset.from_mesh(mesh, {{voxel = ...}})",
-                    param.name, describe(value), open, open_mesh_remedy));
+            fmt::format("{} = {} has no inside that could keep points out; {}", param.name, describe(value), remedy));
+    throw Error(fmt::format(
+        "{} = {} has no inside that could keep points out, as it is open: {} of its edges have one face; {}, then {}",
+        param.name, describe(value), open, open_mesh_remedy, remedy));
 }
 
 void read_value(const Param& param, const Value& value, ColliderShape& shape)
@@ -121,13 +129,13 @@ struct Collide {
         if (holds) return;
         if (adhesion)
             throw Error(
-                fmt::format("adhesion is for points that stick or slide, and response is \"{}\"; give response "
-                            "= \"stick\" or \"slide\"",
+                fmt::format("adhesion needs points that stick or slide, but response is \"{}\"; give response = "
+                            "\"stick\" or \"slide\"",
                             response));
         if (!viscosity.attribute.empty() || viscosity.constant > 0)
             throw Error(
-                fmt::format("viscosity is for points that slide or stick, and response is \"{}\"; give "
-                            "response = \"slide\" or \"stick\"",
+                fmt::format("viscosity needs points that slide or stick, but response is \"{}\"; give response = "
+                            "\"slide\" or \"stick\"",
                             response));
     }
 

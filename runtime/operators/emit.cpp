@@ -58,8 +58,28 @@ std::span<float> expanded(Column<float>& column)
     return values;
 }
 
+// A source, which may be given as a position.
+struct EmitSource {
+    static constexpr std::string_view param_type = "mesh, level set, shape, fog, curve, points or vec3";
+
+    ObjectPtr object;
+};
+
+void read_value(const Param& param, const Value& value, EmitSource& field)
+{
+    const Table* list = value.table();
+    if (!value.get<Vec3d>() && !(list && list->list.size() == 3 && list->list.front().get<double>()))
+        return rapid::read_value(param, value, field.object);
+    Vec3f position;
+    rapid::read_value(param, value, position);
+    auto points = std::make_shared<PointsObject>();
+    points->points.append(1);
+    points->points.P().write()[0] = position;
+    field.object = std::move(points);
+}
+
 struct Emit : Newborn {
-    ObjectPtr source;
+    EmitSource source;
     std::string from, density, source_group;
     std::optional<double> rate;
     std::optional<int> count;
@@ -87,7 +107,6 @@ struct Emit : Newborn {
     static void declare_source(Declaration<Emit>& type)
     {
         type.param(&Emit::source, "source", Value(), any_number(), "", "object that emits the points")
-            .of_type("mesh, level set, shape, fog, curve or points")
             .required()
             .param(&Emit::from, "from", Value(), any_number(), "",
                    "part of the source that emits; the default is \"points\" for points, otherwise \"surface\" (the "
@@ -135,10 +154,10 @@ struct Emit : Newborn {
     {
         check_amount();
         check_attributes();
-        if (std::dynamic_pointer_cast<const NodeHandle>(source))
-            throw Error("source is a node, whose points are parents; give it to spawn: :spawn { from = ... }");
-        if (!source_.is(source, from, density, source_group)) {
-            BirthSource next(source, from, density, source_group);
+        if (std::dynamic_pointer_cast<const NodeHandle>(source.object))
+            throw Error("source is a node; to emit from its points, use :spawn { from = ... }");
+        if (!source_.is(source.object, from, density, source_group)) {
+            BirthSource next(source.object, from, density, source_group);
             next.follow(source_);
             source_ = std::move(next);
         }
@@ -182,11 +201,12 @@ private:
     void check_amount() const
     {
         const int given = rate.has_value() + count.has_value() + impulse.has_value();
-        if (given == 0) throw Error("nothing says how many points are born; give rate, count or impulse");
+        if (given == 0) throw Error("the number of points is missing; give rate, count or impulse");
         if (given > 1)
-            throw Error(fmt::format("{} are given together; keep one of them", !impulse ? "rate and count"
-                                                                               : !count ? "rate and impulse"
-                                                                               : !rate  ? "count and impulse"
+            throw Error(fmt::format("{} are given together; give only one of them", !impulse ? "rate and count"
+                                                                                    : !count ? "rate and impulse"
+                                                                                    : !rate
+                                                                                        ? "count and impulse"
                                                                                         : "rate, count and impulse"));
         if (impulse)
             for (const auto& [frame, n] : *impulse)
@@ -197,7 +217,7 @@ private:
     void check_source() const
     {
         if (!is_zero(speed) && !source_.has_normals())
-            throw Error(fmt::format("speed = {} goes along N, which {} does not have; give velocity instead",
+            throw Error(fmt::format("speed = {} needs a normal N, which {} does not have; give velocity instead",
                                     describe(speed), from == "volume" ? "a volume" : "this set of points"));
         for (const std::string& name : inherited()) {
             const AttributeType type = type_of(*source_.values().find(name));
@@ -217,7 +237,7 @@ private:
         if (!rate) return births_of_frame(step, clock);
         const double steps = clock.steps_per_second();
         if (*rate / steps > max_births)
-            throw Error(fmt::format("rate = {} would bear {:.3g} points in a frame; at most {} fit", *rate,
+            throw Error(fmt::format("rate = {} would emit {:.3g} points in a frame; at most {} are possible", *rate,
                                     *rate / steps, max_births));
         return clock_.at_rate(*rate, step, steps);
     }
@@ -261,7 +281,7 @@ private:
         const double bytes = static_cast<double>(n) * bytes_per_birth + static_cast<double>(points.bytes());
         if (fits_in_memory(bytes)) return;
         const char* amount = rate ? "rate" : count ? "count" : "impulse";
-        throw memory_exceeded(fmt::format("{} births in a frame, behind {} points,", n, points.size()), bytes,
+        throw memory_exceeded(fmt::format("{} births in a frame, in addition to {} points,", n, points.size()), bytes,
                               fmt::format("give a smaller {}", amount));
     }
 
@@ -296,14 +316,13 @@ void Emit::move_source(const Simulation& simulation, const Evaluation& now)
     at_beginning_ = move.at_beginning;
     if (move.unmatched > 0 && !std::exchange(warned_unmatched_, true))
         now.warnings.push_back(fmt::format(
-            "{}:{}: node \"{}\": {} of {} points of the source were not in it at the frame before {}, by "
-            "their ids; they bear along their v, or where they are",
+            "{}:{}: node \"{}\": by their ids, {} of {} points of the source are new in frame {}; they emit along "
+            "their v, or at their position",
             now.location.file, now.location.line, now.node, move.unmatched, source_.values().size(), frame));
     if (move.jump)
         now.warnings.push_back(
-            fmt::format("{}:{}: node \"{}\": the source {}; nothing is born on the way (cut = {{{}}} says so, cut = "
-                        "{{}} that it is "
-                        "no jump)",
+            fmt::format("{}:{}: node \"{}\": the source {}; no points are born on the way (to confirm, give cut = "
+                        "{{{}}}; if it is not a jump, cut = {{}})",
                         now.location.file, now.location.line, now.node, describe(*move.jump, frame), frame));
 }
 

@@ -47,14 +47,13 @@ std::string advice_for_making(const std::string& name, int numbers)
     return fmt::format("{} = {:g}", name, !number ? 0 : std::isfinite(*number) ? *number : 1);
 }
 
-// Returns Rapid's attribute name for a word common elsewhere ("color" gives "Cd"). Empty if the word is not a known
-// synonym.
 std::string_view name_of_synonym(std::string_view word)
 {
     static const std::map<std::string_view, std::string_view> names = {
-        {"alpha", "Alpha"},     {"col", "Cd"},      {"color", "Cd"},   {"colour", "Cd"},     {"normal", "N"},
-        {"opacity", "Alpha"},   {"pos", "P"},       {"position", "P"}, {"radius", "pscale"}, {"rgb", "Cd"},
-        {"rotation", "orient"}, {"size", "pscale"}, {"vel", "v"},      {"velocity", "v"},
+        {"alpha", "Alpha"},     {"col", "Cd"},        {"color", "Cd"},      {"colour", "Cd"},
+        {"normal", "N"},        {"lifespan", "life"}, {"lifetime", "life"}, {"opacity", "Alpha"},
+        {"pos", "P"},           {"position", "P"},    {"radius", "pscale"}, {"rgb", "Cd"},
+        {"rotation", "orient"}, {"size", "pscale"},   {"vel", "v"},         {"velocity", "v"},
     };
     const auto found = names.find(word);
     return found == names.end() ? std::string_view() : found->second;
@@ -64,8 +63,8 @@ std::string no_attribute(const std::string& name, const std::vector<std::string>
 {
     if (const PointName* computed = find_point_name(name); computed && computed->role == PointName::Field)
         return fmt::format(
-            "\"{0}\" is no attribute but computed where a kernel asks for p.{0}; give an attribute its "
-            "value by :points(\"NAME\", function(p) p.heat = p.{0} end)",
+            "\"{0}\" is not an attribute; only kernels compute p.{0}; copy it into an attribute: :points(\"NAME\", "
+            "function(p) p.heat = p.{0} end)",
             name);
     if (const std::string known(name_of_synonym(name)); !known.empty()) {
         const bool is_there = std::find(names.begin(), names.end(), known) != names.end();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "runtime/points/point_set.h"
@@ -15,6 +16,13 @@ const AttributeSpec* conventional_attribute(std::string_view name);
 // Returns the parameters with which a node `attribute` creates this attribute: "Cd = {1, 1, 1}", "heat = 0". numbers:
 // the components of a value if the name does not determine them: 3 for a vec3, 4 for a quaternion, otherwise 1.
 std::string advice_for_making(const std::string& name, int numbers = 1);
+
+// Returns Rapid's attribute name for a word common elsewhere ("color" gives "Cd"); empty if the word is not a known
+// synonym.
+std::string_view name_of_synonym(std::string_view word);
+
+// Type of parameters that name an attribute with one number per point.
+constexpr std::string_view number_attribute_type = "name of a number attribute";
 
 // Returns the error message for an attribute that no node creates, with a suggestion from `names`.
 std::string no_attribute(const std::string& name, const std::vector<std::string>& names, int numbers = 1);

@@ -6,8 +6,9 @@ describe("rapid new", function()
     local folder = command.folder()
     local made = command.rapid("new rain", { cwd = folder.path })
     assert.equal(0, made.status)
+    local rapid = command.binary() -- the path by which it is called, as the user may have no other
     assert.equal("made rain.lua\nmade test_rain.lua\nmade .luacheckrc\nmade .luarc.json\n" ..
-      "now: rapid run rain.lua -f 1-96 -o rain.####.png\n     rapid test test_rain.lua\n", made.stdout)
+      ("now: %s run rain.lua -f 1-96 -o rain.####.png\n     %s test test_rain.lua\n"):format(rapid, rapid), made.stdout)
     assert.same({ ".luacheckrc", ".luarc.json", "rain.lua", "test_rain.lua" }, folder:list())
     assert.is_nil(folder:read("rain.lua"):find("NAME", 1, true))
 
@@ -25,7 +26,7 @@ describe("rapid new", function()
       folder:write(name, "mine")
       local result = command.rapid("new rain", { cwd = folder.path })
       assert.equal(2, result.status)
-      assert.equal(name .. ": is there already and is left as it is; take another name\n", result.stderr)
+      assert.equal(name .. ": exists already and is not changed; choose another name\n", result.stderr)
       assert.same({ name }, folder:list())
       assert.equal("mine", folder:read(name))
     end
@@ -41,10 +42,11 @@ describe("rapid new", function()
   it("refuses what is no name, and the name of a node", function()
     local folder = command.folder()
     for name, expected in pairs {
-      ["../rain"] = 'rapid new: "../rain" is no name of a scene; it must be made of letters, digits, _ and -, ' ..
-        "and begin with a letter\n",
-      ["swirl"] = 'rapid new: "swirl" is the name of a node, and swirl.lua would hide it from scenes beside it; ' ..
-        "take another name\n",
+      ["../rain"] = 'rapid new: "../rain" can\'t be the name of a scene; it must consist of letters, digits, _ and ' ..
+        '-, ' ..
+        "and begin with a letter or _\n",
+      ["swirl"] = 'rapid new: "swirl" is the name of a node, and swirl.lua would hide it from the scenes in this ' ..
+        "folder; choose another name\n",
     } do
       local result = command.rapid("new " .. name, { cwd = folder.path })
       assert.equal(2, result.status)

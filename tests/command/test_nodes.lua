@@ -25,7 +25,7 @@ describe("rapid nodes", function()
     local folder = command.folder()
     command.shell('cp "$RAPID" rapid', { cwd = folder.path })
     local result = command.shell("./rapid nodes", { cwd = folder.path })
-    assert.match("Rapid's Lua files are missing; they belong into share/rapid/lua", result.stderr)
+    assert.match("Rapid's Lua files are missing; they belong in share/rapid/lua", result.stderr)
     assert.equal(2, result.status)
   end)
 
@@ -68,6 +68,17 @@ describe("rapid nodes", function()
     end
   end)
 
+  it("shows how a value becomes a function of the frame, and the example runs", function()
+    local example = command.rapid("nodes wind").stdout:match("\nA value may be a function of the frame: (velocity " ..
+      "= [^\n]+)\n")
+    local folder = command.folder()
+    folder:write("scene.lua", ([[local rapid = require "rapid"
+return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :wind { %s } :solve {}
+]]):format(example))
+    assert.equal(0, command.rapid("run scene.lua -f 1-3 --quiet", { cwd = folder.path }).status)
+    assert.falsy(command.rapid("nodes create").stdout:find("function of the frame", 1, true))
+  end)
+
   it("knows what an unknown node was meant to be", function()
     local result = command.rapid "nodes gravty"
     assert.equal(2, result.status)
@@ -99,7 +110,7 @@ describe("rapid nodes", function()
   it("refuses the annotations of one node", function()
     local result = command.rapid "nodes gravity --annotations"
     assert.equal(2, result.status)
-    assert.equal("rapid nodes: --annotations is of all nodes; leave out gravity\n", result.stderr)
+    assert.equal("rapid nodes: --annotations describes all nodes; remove gravity\n", result.stderr)
   end)
 
   it("has the nodes that lie in the current folder and on RAPID_PATH, and tells what is wrong with one", function()

@@ -40,7 +40,15 @@ describe("rapid", function()
   it("says how a graph that stands alone is run", function()
     local result = rapid "scene.lua"
     assert.equal(2, result.status)
-    assert.equal("rapid: no command; to run the graph, type: rapid run scene.lua\n", result.stderr)
+    assert.equal(("rapid: no command; to run the scene, type: %s run scene.lua\n"):format(command.binary()),
+      result.stderr)
+  end)
+
+  it("says how a list is given to --set, which the shell splits without quotes", function()
+    assert.equal('rapid run: unexpected argument "tint=0.2"; the shell has split a list, so put it in quotes: '
+      .. "--set 'tint={1, 2, 3}'\n", rapid("run scene.lua --set tint=0.1 tint=0.2 tint=0.9").stderr)
+    assert.equal('rapid run: unexpected argument "rate=5"; to set a value, type: --set rate=5\n',
+      rapid("run scene.lua rate=5").stderr)
   end)
 
   it("knows what an unknown option was meant to be", function()
@@ -64,7 +72,8 @@ describe("rapid", function()
       ["--seed -1"] = '--seed = "-1"; it must be a whole number from 0 to 2^64 - 1',
       ["--threads many"] = '--threads = "many"; it must be a whole number, at least 0',
       ["--script-timeout 0"] = '--script-timeout = "0"; it must be a number above 0',
-      ["--script-memory 1T"] = '--script-memory = "1T"; it must be bytes above 0, such as 1073741824, 512M or 1G',
+      ["--script-memory 1T"] = '--script-memory = "1T"; it must be a number of bytes above 0, such as 1073741824, ' ..
+        '512M or 1G',
       ["--set count"] = '--set "count"; it must be NAME=VALUE',
       ["--cache ''"] = '--cache = ""; it must be the name of a folder',
       ["--stats ''"] = '--stats = ""; it must be the name of a file',

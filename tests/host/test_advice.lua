@@ -58,7 +58,7 @@ describe("a message", function()
   end)
 
   it("says who sees the neighbours of a point", function()
-    expect('p has no method "neighbours", as a kernel sees one point; a :detail sees all of them: '
+    expect('p has no method "neighbours", because a kernel sees only one point; use '
       .. "points:neighbours(i, radius)", kernel_fault "for _, k in ipairs(p:neighbours(1)) do p.v = p.v * k end")
   end)
 
@@ -73,25 +73,28 @@ describe("a message", function()
   it("closes an open ground before a level set is made of it", function()
     local ground = "local g = rapid.mesh.grid { size = {2, 2} } return rapid.create { points = POINTS } "
       .. ":collide { shape = %s } :solve {}"
-    local remedy = "close it: a ground, by a copy of its outer edge lower down, faces between the two, and a bottom"
+    local remedy = "close it: for a ground, add a copy of its outer edge lower down, faces between the two, and a " ..
+      "bottom"
     expect("it is open: ", fault(ground:format "g"))
     expect(remedy, fault(ground:format "g"))
     expect(remedy, fault(ground:format "rapid.levelset.from_mesh(g, { voxel = 0.1 })"))
-    expect("has no inside to keep out of; take rapid.levelset.from_mesh", fault(
+    expect("has no inside that could keep points out; use rapid.levelset.from_mesh(mesh, { voxel = 0.02 })", fault(
       "return rapid.create { points = POINTS } :collide { shape = rapid.mesh.box {} } :solve {}"))
+    expect("voxel = 0.2 }", fault(
+      "return rapid.create { points = POINTS } :collide { shape = rapid.mesh.box { size = {10, 1, 1} } } :solve {}"))
   end)
 
   it("names frame.time where the frame stands for a number", function()
-    local number = "the frame is no number; compute with what it has, by name: frame.time"
+    local number = "the frame is not a number; use one of its fields, such as frame.time"
     local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function(frame) %s end } "
       .. ":solve {}"
     expect(number, fault(emit:format "return 5 * frame"))
     expect(number, fault(emit:format "if frame > 5 then return 1 end return 2"))
     expect(number, kernel_fault "p.v = vec3(0, frame * 2, 0)")
     expect("the frame can't be used as a value here; it has frame.time", fault(emit:format "return frame"))
-    expect("number expected, got cdata); the frame, a point and a vec3 are no numbers: frame.time, p.age",
+    expect("number expected, got cdata); the frame, a point and a vec3 are not numbers; use frame.time, p.age",
       fault(emit:format "return math.sin(frame)"))
-    expect("the frame, a point and a vec3 are no numbers", kernel_fault "p.v = vec3(math.sin(p.P), 0, 0)")
+    expect("the frame, a point and a vec3 are not numbers", kernel_fault "p.v = vec3(math.sin(p.P), 0, 0)")
     expect(number, kernel_fault "if frame == 2 then p.v = p.P end")
     expect(number, fault(emit:format "return frame == 2 and 1 or 0"))
     local shown = "the frame (frame.time is a number)"
@@ -107,10 +110,10 @@ describe("a message", function()
   end)
 
   it("says what there is in place of chance, files and clocks", function()
-    expect("p:rand(k) of a point is the same in every run", fault "math.random() return rapid.create {} :solve {}")
+    expect("use p:rand(k), which is the same in every run", fault "math.random() return rapid.create {} :solve {}")
     expect("p:rand(k)", kernel_fault "p.v = vec3(math.random(), 0, 0)")
-    expect("a script has no files: rapid.points.read", fault "io.open 'a' return rapid.create {} :solve {}")
-    expect("frame.time is the time", fault "os.time() return rapid.create {} :solve {}")
+    expect("a script can't open files; rapid.points.read", fault "io.open 'a' return rapid.create {} :solve {}")
+    expect("use frame.time", fault "os.time() return rapid.create {} :solve {}")
   end)
 
   it("shows no address, and names where attributes of the newborn go", function()
@@ -123,6 +126,31 @@ describe("a message", function()
     expect("attributes = { mass = 1 }", fault(emit:format "mass = 2"))
     expect("an attribute of points goes into attributes = { heat = 0 }", fault(emit:format "heat = 2"))
     expect('did you mean "rate"?', fault(emit:format "rat = 1"))
+  end)
+
+  it("knows what other programs call a parameter", function()
+    local emit = "return rapid.create {} :emit { source = {0, 1.5, 0}, %s } :solve {}"
+    expect('unknown parameter "color"; the color of points is Cd: attributes = { Cd = {1, 1, 1} }',
+      fault(emit:format "color = {1, 0, 0}"))
+    expect('unknown parameter "size"; the size of points is pscale: attributes = { pscale = 0 }',
+      fault(emit:format "size = 0.1"))
+    expect('unknown parameter "lifetime"; did you mean "life"?', fault(emit:format "lifetime = 2"))
+    expect('unknown parameter "amount"; give rate (points per second) or count (points per frame)',
+      fault(emit:format "amount = 200"))
+  end)
+
+  it("says what may be missing where a scene can't be read", function()
+    expect("scene.lua:1: '}' expected near 'attributes'; is a comma missing before attributes?",
+      fault "return rapid.create {} :emit { source = POINTS, rate = 9 attributes = {} } :solve {}")
+    expect("scene.lua:2: '}' expected (to close '{' at line 1) near 'life'; is a comma missing before life?",
+      fault "return rapid.create {} :emit { source = POINTS, rate = 9\n life = 2 } :solve {}")
+    expect("a } is missing before the end of the file", fault "return rapid.create { fps = 24")
+    scene.folder:write("forgotten.lua", "return rapid.create {} :solve {}\n")
+    expect([[attempt to index global 'rapid' (a nil value); begin the file with: local rapid = require "rapid"]],
+      scene.error "require 'forgotten'")
+    local wind = "return rapid.create { points = POINTS } :wind { velocity = {%s, 0, 0} } :solve {}"
+    expect("the time is frame.time, in function(frame) ... end", fault(wind:format "math.sin(time)"))
+    expect("the time is frame.time, in function(frame) ... end", fault(wind:format "2 * time"))
   end)
 end)
 
@@ -142,20 +170,20 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {0, 2, 0}} } 
 end)
 
 describe("a warning", function()
-  it("names the first node that acts on nothing, as no :solve comes after it", function()
+  it("names the first node that has no effect, as no :solve comes after it", function()
     local text = warnings "return rapid.create { points = POINTS } :gravity {} :wind {}"
-    expect('node "gravity1": acts on nothing: no :solve comes after it', text)
+    expect('node "gravity1": has no effect, because no :solve comes after it', text)
     assert.falsy(text:find("wind1", 1, true))
     assert.equal("", warnings "return rapid.create { points = POINTS } :gravity {} :solve {}")
     assert.equal("", warnings "return rapid.create { points = POINTS } :attribute { heat = 1 }")
-    expect('node "wind1": acts on nothing', warnings "return rapid.create { points = POINTS } :solve {} :wind {}")
+    expect('node "wind1": has no effect', warnings "return rapid.create { points = POINTS } :solve {} :wind {}")
     assert.equal("", warnings [[return rapid.create {} :emit { source = POINTS, rate = 9 } :wind {}
       :merge(rapid.create { points = POINTS }) :solve {}]])
   end)
 
   it("names a node whose result is dropped", function()
     local dropped = "local c = rapid.create { points = POINTS } :gravity {} c:wind {} %s return c:solve {}"
-    expect('node "wind1": leads to no output, as its result is dropped; keep it: chain = chain:wind { ... }',
+    expect('node "wind1": leads to no output, because its result is not used; assign it: chain = chain:wind { ... }',
       warnings(dropped:format ""))
     expect('node "k": leads to no output', warnings [[local c = rapid.create { points = POINTS } :gravity {} :solve {}
       c:points("k", function(p) p.v = p.P end) return c]])
@@ -172,7 +200,7 @@ describe("a warning", function()
     for name, node in pairs { fade_by_age1 = ":fade_by_age { attribute = 'Alpha' }",
                               ramp1 = ":ramp { from = 'nage', to = 'Alpha', keys = {{0, 1}, {1, 0}} }",
                               k = ":points('k', function(p) p.Alpha = p.nage end)" } do
-      expect(('node "%s": its points live for ever, so their age is no part of a life; give emit a life'):format(name),
+      expect(('node "%s": needs the life of its points, but they live for ever; give emit a life'):format(name),
         warnings(chain:format("", node)))
       assert.equal("", warnings(chain:format("life = 2,", node)))
     end
@@ -181,18 +209,48 @@ describe("a warning", function()
   it("names what makes angular velocities by which nothing turns", function()
     local chain = "return rapid.create {} :emit { source = POINTS, rate = 9, attributes = { w = {0, 1, 0} } } %s "
       .. ":solve {}"
-    expect('node "emit1": makes w, by which nothing turns; add :tumble {}, or give :contact spin = true',
+    expect('node "emit1": makes w, but no node turns points by it; add :tumble {}, or give :contact spin = true',
       warnings(chain:format ""))
     assert.equal("", warnings(chain:format ":tumble {}"))
     assert.equal("", warnings(chain:format ":contact { radius = 0.01, spin = true }"))
+  end)
+
+  it("names a force after a goal that holds its points", function()
+    local chain = "return rapid.create { points = POINTS } %s :goal { to = POINTS %s } %s :solve {}"
+    expect('node "wind1": can\'t move the points that have arrived, as goal1 holds them; to let them go, give goal1 '
+      .. "hold = false", warnings(chain:format("", "", ":wind { velocity = {2, 0, 0} }")))
+    assert.equal("", warnings(chain:format("", ", hold = false", ":wind {}")))
+    assert.equal("", warnings(chain:format(":gravity {}", "", "")))
+  end)
+
+  it("names attributes that other programs call so, and that nothing reads", function()
+    local chain = "return rapid.create {} :emit { source = POINTS, rate = 9, attributes = { %s } } %s :solve {}"
+    for name, known in pairs { color = "Cd", size = "pscale", lifetime = "life" } do
+      local text = chain:format(name .. " = 0.5", "")
+      expect(('node "emit1": gives points "%s", which nothing reads; the %s of points is %s'):format(name, name, known),
+        warnings(text))
+      assert.equal("", warnings(chain:format(name .. " = 0.5", (":points('k', function(p) p.v = p.v * p.%s end)")
+        :format(name))))
+    end
+  end)
+
+  it("names values that look like another unit", function()
+    local chain = "return rapid.create {} :emit { source = rapid.shape.sphere { radius = 0.8 }, rate = 9, %s } " ..
+      ":solve {}"
+    expect("Cd = {255, 80, 20}: colours go from 0 to 1; divide by 255",
+      warnings(chain:format "attributes = { Cd = {255, 80, 20} }"))
+    expect("pscale = 4 is a radius in metres, larger than the source",
+      warnings(chain:format "attributes = { pscale = 4 }"))
+    expect("life = 48 is in seconds; if frames are meant, divide by 24", warnings(chain:format "life = 48"))
+    assert.equal("", warnings(chain:format "life = {1, 20}, attributes = { Cd = {12, 1, 0}, pscale = 0.5 }"))
   end)
 
   it("names a kernel that moves points whose v stays 0", function()
     local chain = "return rapid.create {%s} :emit { source = rapid.mesh.sphere {}, rate = 99, %s } "
       .. ":points('k', function(p, frame) %s end) %s :solve {}"
     local moves = "p.P = vec3(math.sin(frame.time + p.id), 0, 0)"
-    local warning = 'node "k": moves P and leaves v at 0, so that files and motion blur have no velocities; assign '
-      .. "p.v = (place - p.P) / frame.dt instead of p.P, and :solve moves the point there"
+    local warning = 'node "k": moves P but leaves v at 0, so files and motion blur have no velocities; instead '
+      .. "of p.P assign p.v = (position - p.P) / frame.dt, and :solve moves the point there"
     expect(warning, warnings(chain:format("", "", moves, "")))
     expect(warning, warnings(chain:format("points = POINTS", "birth = function(p) p.P = p.P * 2 end", moves, "")))
     for _, text in ipairs {
@@ -219,7 +277,7 @@ describe("a warning", function()
   end)
 
   it("names the emitter whose points are gone after a frame, as no :solve comes after it", function()
-    expect('node "emit1": its points are gone after the frame of their birth: no :solve comes after it',
+    expect('node "emit1": its points exist only in the frame of their birth, because no :solve comes after it',
       warnings "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 100 }")
   end)
 
@@ -227,7 +285,7 @@ describe("a warning", function()
     local chain = "local chain = rapid.create { points = POINTS } :collide { shape = rapid.shape.plane {}%s }"
     local reads = chain .. ":points('k', function(p) if p.hitnum > 0 then p.v = p.v * 2 end end) :solve {} return chain"
     local bears = chain .. ":solve {} return rapid.create {} :spawn { from = chain, on = 'hittotal >= 2' } :solve {}"
-    expect('node "k": reads hitnum, which no collider writes; give a :collide record = true',
+    expect('node "k": reads hitnum, which no collider writes; give :collide record = true',
       warnings(reads:format ""))
     expect('node "emit1": reads hittotal, which no collider writes', warnings(bears:format ""))
     for _, text in ipairs { reads, bears } do assert.equal("", warnings(text:format ", record = true")) end
@@ -237,7 +295,7 @@ describe("a warning", function()
     local scene_text = [[return rapid.create {}
   :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 2000, attributes = { pscale = 0.1 } }
   :collide { shape = rapid.shape.sphere { radius = %s }, response = "die" } :solve {}]]
-    expect('node "collide1": kills all points where they are born', warnings(scene_text:format "1"))
+    expect('node "collide1": kills all points at birth', warnings(scene_text:format "1"))
     assert.equal("", warnings(scene_text:format "0.5"))
     local short = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 2000, life = %g } :solve {}"
     for _, life in ipairs { 0, 1e-6 } do
@@ -253,7 +311,7 @@ describe("a warning", function()
     local function reported(voxel)
       return scene.command("check", (text:format(voxel):gsub("POINTS", points))).stderr
     end
-    expect("a voxel of 0.11 m is half as large as mesh", reported(0.11))
+    expect("a voxel of 0.11 m is at least half as large as mesh", reported(0.11))
     assert.falsy(reported(0.05):find("voxel", 1, true))
   end)
 end)

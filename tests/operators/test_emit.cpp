@@ -369,6 +369,14 @@ TEST_CASE("with a count, source points are taken in order, each once for as many
         CHECK(values_of<Vec3f>(emit(frame), "P") == std::vector<Vec3f>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
 }
 
+TEST_CASE("a source may be a position, at which all points are born", "[emit]")
+{
+    NodeTest emit("emit", {{"source", list({1.0, 2.0, 3.0})}, {"count", 2.0}});
+    CHECK(values_of<Vec3f>(emit(2), "P") == std::vector<Vec3f>{{1, 2, 3}, {1, 2, 3}});
+    NodeTest same("emit", {{"source", Vec3d(1, 2, 3)}, {"count", 2.0}});
+    CHECK(values_of<Vec3f>(same(2), "P") == values_of<Vec3f>(emit(3), "P"));
+}
+
 TEST_CASE("with a rate, each birth takes a source point at random, uniformly", "[emit]")
 {
     std::vector<Vec3f> places;
@@ -560,34 +568,34 @@ TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
         return error_of([&] { NodeTest("emit", arguments)(2); });
     };
     const Value nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK(refusal({}, mesh) == "nothing says how many points are born; give rate, count or impulse");
-    CHECK(refusal({{"rate", 1.0}, {"count", 1.0}}, mesh) == "rate and count are given together; keep one of them");
+    CHECK(refusal({}, mesh) == "the number of points is missing; give rate, count or impulse");
+    CHECK(refusal({{"rate", 1.0}, {"count", 1.0}}, mesh) == "rate and count are given together; remove one of them");
     CHECK(refusal({{"rate", 1.0}, {"count", 1.0}, {"impulse", list({1.0})}}, mesh) ==
-          "rate, count and impulse are given together; keep one of them");
+          "rate, count and impulse are given together; give only one of them");
     CHECK(refusal({{"rate", nan}}, mesh) == "rate = nan is out of range; it must be at least 0");
     CHECK(refusal({{"rate", -1.0}}, mesh) == "rate = -1 is out of range; it must be at least 0");
     CHECK(refusal({{"rate", 1e30}}, mesh) ==
-          "rate = 1e+30 would bear 4.17e+28 points in a frame; at most 2147483647 fit");
+          "rate = 1e+30 would emit 4.17e+28 points in a frame; at most 2147483647 fit");
     CHECK(refusal({{"count", 1.5}}, mesh) == "count = 1.5 is not whole; it must be an integer");
     CHECK(refusal({{"impulse", list({0.5})}}, mesh) == "impulse[1] = 0.5 is not whole; it must be a number of points");
     CHECK(refusal({{"rate", 1.0}, {"birth", "evne"}}, mesh) == "birth = \"evne\" is unknown; did you mean \"even\"?");
     CHECK(refusal({{"rate", 1.0}, {"life", list({2.0, 1.0})}}, mesh) ==
-          "life = {2, 1} is the wrong way round; it must be {min, max}");
+          "life = {2, 1} is in the wrong order; it must be {min, max}");
     CHECK(refusal({{"rate", 1.0}, {"life", "long"}}, mesh) ==
           "life = \"long\" has the wrong type; it must be a number or {min, max}");
     CHECK(refusal({{"rate", 1.0}, {"spread", 200.0}}, mesh) ==
           "spread = 200 is out of range; it must be from 0 to 180");
     CHECK(refusal({{"rate", 1.0}, {"from", "volume"}, {"speed", 2.0}}, mesh) ==
-          "speed = 2 goes along N, which a volume does not have; give velocity instead");
+          "speed = 2 needs a normal N, which a volume does not have; give velocity instead");
     CHECK(refusal({{"rate", 1.0}, {"speed", 2.0}}, one_point()) ==
-          "speed = 2 goes along N, which this set of points does not have; give velocity instead");
+          "speed = 2 needs a normal N, which this set of points does not have; give velocity instead");
     CHECK(refusal({{"rate", 1.0}, {"from", "surface"}}, one_point()) ==
-          "from = \"surface\" needs a mesh or a shape; of points take \"points\"");
+          "from = \"surface\" needs a mesh or a shape; for points give \"points\"");
     CHECK(refusal({{"rate", 1.0}}, 5.0) ==
-          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve or points");
+          "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve, points or vec3");
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"id", 1.0}})}}, mesh).find("\"id\"") != std::string::npos);
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"life", 1.0}})}}, mesh) ==
-          "attributes: \"life\" has its own way; use life");
+          "attributes: \"life\" can't be given; use life");
 }
 
 TEST_CASE("an impulse before the first frame is refused by name", "[emit]")

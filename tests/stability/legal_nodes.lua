@@ -100,7 +100,7 @@ function values.node()
     "life = {0.05, 0.3} } :solve {}"
 end
 function values.mesh() return pick { "sheet", ("sheet:transform(%s)"):format(values.motion()) } end
-values["mesh, level set, shape, fog, curve or points"] = function()
+values["mesh, level set, shape, fog, curve, points or vec3"] = function()
   return pick { "solid", "rapid.mesh.sphere { radius = 0.5 }", "rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}} }",
     ("rapid.mesh.box { size = {1, 0.1, 1} }:transform(%s)"):format(values.motion()) }
 end

@@ -106,7 +106,7 @@ void Newborn::declare_newborn(Declaration<T>& type, const std::string& speed_alo
         .constant()
         .param(&T::attributes, "attributes", Value(), any_number(), "",
                "values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace "
-               "inherited values");
+               "inherited values; between two vectors on a line");
 }
 
 }  // namespace rapid

@@ -34,12 +34,12 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2
     end
   end)
 
-  it("says that what kernels compute is read only, and no attribute of other nodes", function()
+  it("says that what kernels compute is read-only, and no attribute of other nodes", function()
     local chain = "return rapid.create { points = two } :attribute { heat = 0 } %s :solve {}"
     local function fault(node) return scene.error(chain:format(node)) end
-    assert.truthy(fault(":ramp { to = 'nage' }"):find('to = "nage"; that attribute is read only', 1, true))
+    assert.truthy(fault(":ramp { to = 'nage' }"):find('to = "nage": this attribute is read-only', 1, true))
     assert.truthy(fault(":collide { shape = rapid.shape.plane {}, bounce = rapid.attr 'nage' }"):find(
-      '"nage" is no attribute but computed where a kernel asks for p.nage', 1, true))
+      '"nage" is not an attribute; only kernels compute p.nage', 1, true))
   end)
 
   it("refuses keys of another type than the attribute", function()

@@ -16,6 +16,16 @@ describe("randomize", function()
     for i = 1, count do assert.equal(result[2][i].heat, points[i].heat) end
   end)
 
+  it("is refused before the first frame for an attribute of vectors, at the line of the scene", function()
+    local reported = scene.command("check", [[
+return rapid.create { points = two } :attribute { w = {0, 1, 0} }
+  :randomize { attribute = "w" } :tumble {} :solve {}]])
+    assert.equal(2, reported.status)
+    assert.match('scene.lua:%d: node "randomize1": attribute = "w" is a vec3; it must be an attribute with one number '
+      .. "per point\n", reported.stderr)
+    assert.equal(0, scene.command("check", "return rapid.create { points = two } :randomize {} :solve {}").status)
+  end)
+
   it("prefers small ones by its bias: the mean of r^b is 1 / (b + 1)", function()
     local points = run("bias = 3")[3]
     assert.near(1 / 4, points:mean "pscale", 5 * math.sqrt(1 / 7 - 1 / 16) / math.sqrt(#points))

@@ -94,7 +94,7 @@ describe("a mesh as a collider", function()
   it("is refused, with what to take", function()
     local message = scene.error [[
 return rapid.create { fps = 24, points = two } :collide { shape = rapid.mesh.box {} } :solve {}]]
-    assert.truthy(message:find("take rapid.levelset.from_mesh(mesh, {voxel = ...})", 1, true), message)
+    assert.truthy(message:find("use rapid.levelset.from_mesh(mesh, { voxel = 0.02 })", 1, true), message)
   end)
 
   it("that moves makes a level set that moves with it", function()
@@ -118,7 +118,7 @@ describe("a collider that jumps", function()
     local result = run(jump, "P = {{5, 0, 0}, {10.2, 0, 0}}", 9)
     assert.equal(1, #result.warnings)
     assert.truthy(result.warnings[1]:find('node "collide1": the shape jumps by 10 m to frame 7, '
-      .. '1e+03 times as far as in the frames around; nothing is swept along', 1, true), result.warnings[1])
+      .. '1e+03 times as far as in the neighbouring frames; nothing is swept along', 1, true), result.warnings[1])
     local points = result[9]
     assert.near({5, 0, 0}, points[1].P, 0)
     assert.truthy((points[2].P - vec3(10.09, 0, 0)):length() >= 0.5 - 1e-5) -- out of its new position
@@ -129,7 +129,7 @@ describe("a collider that jumps", function()
     assert.truthy(points[1].P.x > 10, points[1].P.x)
     local message = scene.error(("return rapid.create { points = two } :collide { %s, cut = {1.5} } :solve {}")
       :format(jump))
-    assert.truthy(message:find("cut has the frame 1.5; frames are whole", 1, true), message)
+    assert.truthy(message:find("cut has the frame 1.5; frames must be whole numbers", 1, true), message)
   end)
 end)
 

@@ -14,7 +14,7 @@ ViewFilm::ViewFilm(Settings settings, std::function<ViewFramePtr(std::int64_t)> 
     if (settings_.extension != ".mp4" && settings_.extension != ".webm" && settings_.extension != ".gif")
         throw Error(fmt::format("a film can't be a \"{}\"; it must be .mp4, .webm or .gif", settings_.extension));
     if (settings_.last < settings_.first)
-        throw Error(fmt::format("a film of the frames {} to {} has none", settings_.first, settings_.last));
+        throw Error(fmt::format("a film of the frames {} to {} would be empty", settings_.first, settings_.last));
     folder_.emplace("film");
     file_ = folder_->path() / ("film" + settings_.extension);
     drawn_ = SceneFilm::begin(file_, settings_.film).value();
@@ -67,9 +67,9 @@ std::string ViewFilm::draw()
         const ViewFramePtr frame = frame_of_(number);
         if (!frame) throw Error(fmt::format("frame {} is not computed", number));
         if (number == settings_.first) run = frame->run;
-        if (frame->run != run) throw Error("the scene has begun again; make the film when it is computed");
+        if (frame->run != run) throw Error("the scene has started again; make the film when it is complete");
         const Result<SceneFrame> points = frame->points.output(settings_.output);
-        if (!points) throw Error("the scene has no such output");
+        if (!points) throw Error("the scene has no output of this name");
         drawn_->add(*points, frame->shapes).value();
         const std::lock_guard lock(mutex_);
         progress_.done = drawn_->done();

@@ -27,7 +27,7 @@ CheckedJson parse_request(const std::string& message)
 {
     const auto is_shallow = [](int depth, CheckedJson::parse_event_t, CheckedJson&) { return depth <= max_depth; };
     CheckedJson request = CheckedJson::parse(message, is_shallow, false);
-    if (!request.is_object()) throw Error("a request must be an object in JSON");
+    if (!request.is_object()) throw Error("a request must be a JSON object");
     return request;
 }
 

@@ -200,7 +200,7 @@ void ViewRequests::dispatch(const Json& json, const PendingRequest& request)
         const std::uint64_t graph = json.value("graph", std::uint64_t{0});
         if (simulation_.status().version > since) return send_status(request, graph);
         if (waiting_.size() == max_waiting) {
-            waiting_.front().request.fail("too many requests wait for a change");
+            waiting_.front().request.fail("too many requests are waiting for a change");
             waiting_.erase(waiting_.begin());
         }
         waiting_.push_back({since, graph, request});
@@ -313,7 +313,7 @@ void ViewRequests::with_points(const Json& json, const PendingRequest& request, 
     const ViewFramePtr frame = simulation_.frame(json.at("frame").get<std::int64_t>());
     if (!frame) return request.fail("the frame is not computed");
     const Result<SceneFrame> points = chosen_output(*frame, json);
-    if (!points) return request.fail("the scene has no such output");
+    if (!points) return request.fail("the scene has no output of this name");
     use(*points);
 }
 
@@ -553,7 +553,7 @@ void ViewRequests::begin_film(const Json& json, const PendingRequest& request)
 {
     if (simulation_.options().is_confined)
         return request.fail(
-            "films are made by a program of its own, which --untrusted forbids; save pictures of frames (.png)");
+            "films need the program ffmpeg, which --untrusted does not allow; save pictures of frames (.png)");
     const ViewStatus status = simulation_.status();
     ViewFilm::Settings settings;
     settings.extension = json.value("extension", "");

@@ -66,7 +66,7 @@ PointOrigin ViewSimulation::Run::origin(std::int64_t frame, const std::string& o
 {
     const auto& outputs = SceneInside::outputs(*scene_);
     const auto of = std::find_if(outputs.begin(), outputs.end(), [&](const auto& one) { return one.name == output; });
-    if (of == outputs.end()) throw Error("the scene has no such output");
+    if (of == outputs.end()) throw Error("the scene has no output of this name");
     if (of->creates.size() == 1) return {of->creates.front(), id};
     const ViewFramePtr shown = view_.store_.find(frame);
     if (!shown || shown->run != number_) throw Error("the frame is not computed");

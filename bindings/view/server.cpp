@@ -106,7 +106,7 @@ void run_handlers(asio::io_context& context)
             context.run();
             return;
         } catch (const std::exception& error) {
-            fmt::print(stderr, "rapid view: a request is given up: {}\n", printable(error.what()));
+            fmt::print(stderr, "rapid view: a request failed: {}\n", printable(error.what()));
         }
     }
 }
@@ -124,7 +124,7 @@ std::filesystem::path three_file()
          {"/usr/share/javascript/three/build/three.module.js", "/usr/share/javascript/three/three.module.js",
           "/usr/share/nodejs/three/build/three.module.js"})
         if (std::error_code none; std::filesystem::exists(name, none)) return name;
-    throw Error("the viewer draws by three.js, which is not here; install it (apt install libjs-three)");
+    throw Error("the viewer needs three.js; install it (apt install libjs-three)");
 }
 
 }  // namespace
@@ -137,7 +137,7 @@ public:
         std::error_code none;
         for (const auto& entry : std::filesystem::directory_iterator(folder, none))
             if (entry.is_regular_file()) files_["/" + entry.path().filename().string()] = entry.path();
-        if (!files_.contains("/index.html")) throw Error("the files of the viewer's page are not here").at({folder, 0});
+        if (!files_.contains("/index.html")) throw Error("the files of the viewer's page are missing").at({folder, 0});
         files_["/three.module.js"] = three_file();
         acceptor_.assign(Tcp::v4(), socket);
         port_ = acceptor_.local_endpoint().port();
@@ -457,7 +457,7 @@ private:
             response_ = refuse(request, http::status::service_unavailable, "too many pages are open; close one");
         else if (const Token token = server_.token_of(request); token == Token::None)
             response_ = refuse(request, http::status::forbidden,
-                               "the token is missing; open the address that rapid view has printed");
+                               "the token is missing; open the address that rapid view printed");
         else
             return std::make_shared<Socket>(server_, std::move(stream_))
                 ->open(request, token == Token::Once ? server_.lasting_token() : "");

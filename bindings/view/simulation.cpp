@@ -224,14 +224,14 @@ void ViewSimulation::arguments(std::int64_t frame, std::function<void(Arguments,
 void ViewSimulation::origin(std::int64_t frame, std::string output, std::int64_t id,
                             std::function<void(PointOrigin, std::string error)> callback)
 {
-    if (!run_) return callback({}, "a sequence of files has no biographies");
+    if (!run_) return callback({}, "a sequence of files has no lives of points");
     query_run<PointOrigin>([=](Run& run) { return run.origin(frame, output, id); }, std::move(callback));
 }
 
 void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
                            std::function<void(std::string json, std::string error)> callback)
 {
-    if (is_sequence()) return callback("", "a sequence of files has no biographies");
+    if (is_sequence()) return callback("", "a sequence of files has no lives of points");
     tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
     tracer_stop_ = std::stop_source();
@@ -247,7 +247,7 @@ void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
                 if (trace.fault) throw SceneException(*trace.fault);
                 callback(trace.lives.json, "");
             } catch (const std::exception& error) {
-                callback("", stop.stop_requested() ? "another point was asked for" : error_of(error).what());
+                callback("", stop.stop_requested() ? "another point was requested" : error_of(error).what());
             }
         });
     });

@@ -56,11 +56,11 @@ public:
                 },
                 "the port of the page; 0, the default, takes a free one")
             .type_name("N");
-        options.add_flag("--no-open", no_open_, "does not open the page in a browser");
+        options.add_flag("--no-open", no_open_, "doesn't open the page in a browser");
         options
             .add_option("--cache", cache_,
-                        "keeps frames in this folder, too: those that memory has no room for, and for the next view of "
-                        "the same scene")
+                        "also stores frames in this folder: those that exceed the memory, and for the next view of the "
+                        "same scene")
             .type_name("DIR");
         untrusted_.declare(options, "graph");
     }
@@ -72,7 +72,8 @@ public:
             [&] {
                 const int socket = ViewServer::listen(port_);
                 if (socket != inherited_socket && dup2(socket, inherited_socket) < 0)
-                    throw Error(fmt::format("--untrusted: no socket for the page ({})", std::strerror(errno)));
+                    throw Error(
+                        fmt::format("--untrusted: can't make a socket for the page ({})", std::strerror(errno)));
                 fcntl(inherited_socket, F_SETFD, 0);
                 SandboxAccess access{ViewServer::files(page_folder()), {}, inherited_socket + 1};
                 access.readable.push_back(folder_of(graph_.file()));

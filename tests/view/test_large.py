@@ -43,7 +43,7 @@ def a_run_takes_the_pages_of_the_one_before(bench):
             return int(file.read().rsplit(")", 1)[1].split()[7])
 
     bench.open("""local rapid = require "rapid"
-local rate = rapid.param("rate", 1e6, "points a second")
+local rate = rapid.param("rate", 1e6, "points per second")
 return rapid.create { fps = 24, seed = 3 } :emit { source = rapid.mesh.torus {}, rate = rate, life = 0.1 } :gravity {}
   :solve {}""", "-f", "1-40")
     client = Client(bench.view)

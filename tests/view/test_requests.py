@@ -140,7 +140,7 @@ def pictures_that_memory_has_no_room_for_are_refused(bench):
     client = Client(view)
     client.until_done()
     refused = client.ask("picture", frame=2, width=16384, height=16384)
-    assert "pictures of 16384x16384 would take about" in refused["error"], refused
+    assert "pictures of 16384x16384 would need about" in refused["error"], refused
     assert client.ask("picture", frame=2, width=64, height=64)[8:12] == b"\x89PNG"
     client.close()
     assert view.close() == 130

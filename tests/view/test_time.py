@@ -241,7 +241,9 @@ def the_set_options_are_those_of_the_command(bench):
     wait_for_run(browser, run)
     browser.click("#copy-set")
     browser.wait("/height=1.5/.test(document.getElementById('dock-note').textContent)")
-    reported = browser.run("return document.getElementById('dock-note').textContent").removeprefix("copied: ")
+    note = browser.run("return document.getElementById('dock-note').textContent").removeprefix("copied: ")
+    reported, where = note.split("; ")
+    assert where.startswith("paste it after rapid run SCENE in a terminal"), where
     (bench.path / "same.lua").write_text(SCENE, encoding="utf-8")
     subprocess.run(f"'{bench.rapid}' run same.lua -f 7 --quiet -o set.####.csv {reported}", shell=True, cwd=bench.path, check=True)
     with open(bench.path / "set.0007.csv", encoding="ascii") as file:

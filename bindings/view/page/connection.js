@@ -59,8 +59,8 @@ export class Connection {
       else waiting.resolve(answer);
     };
     this.socket.onclose = () => {
-      refuse(new Error("the server has gone"));
-      for (const { reject } of this.waiting.values()) reject(new Error("the server has gone"));
+      refuse(new Error("the server does not answer"));
+      for (const { reject } of this.waiting.values()) reject(new Error("the server does not answer"));
       this.waiting.clear();
       this.lost();
       setTimeout(() => this.open(), 1000);
@@ -69,7 +69,7 @@ export class Connection {
 
   async ask(what, given = {}) {
     await this.ready;
-    if (this.socket.readyState !== WebSocket.OPEN) throw new Error("the server has gone");
+    if (this.socket.readyState !== WebSocket.OPEN) throw new Error("the server does not answer");
     const re = this.next++;
     return new Promise((resolve, reject) => {
       this.waiting.set(re, { resolve, reject });

@@ -170,6 +170,6 @@ function tip(node) {
   const lines = [`${node.name}: ${node.type}, ${node.file}:${node.line}`];
   for (const [name, value] of Object.entries(node.arguments)) lines.push(`  ${name} = ${value}`);
   for (const what of ["makes", "reads", "writes"]) if (node[what].length) lines.push(`${what} ${node[what].join(", ")}`);
-  lines.push(node.kept ? `evaluated ${node.evaluated}${node.changes ? `; ${node.changes}` : ""}` : `left out: ${node.why}`);
+  lines.push(node.kept ? `evaluated ${node.evaluated}${node.changes ? `; ${node.changes}` : ""}` : `pruned: ${node.why}`);
   return lines.join("\n");
 }

@@ -6,9 +6,9 @@ const turnFront = [0, 0], turnRight = [Math.PI / 2, 0], turnTop = [0, 1.55];
 export function bindKeys(does) {
   const keys = [
     ["Space", "play, pause", [" "], does.play],
-    ["← →", "one frame back, on", ["ArrowLeft"], () => does.step(-1)],
+    ["← →", "one frame back, forward", ["ArrowLeft"], () => does.step(-1)],
     [null, "", ["ArrowRight"], () => does.step(1)],
-    ["Shift ← →", "ten frames back, on", ["Shift+ArrowLeft"], () => does.step(-10)],
+    ["Shift ← →", "ten frames back, forward", ["Shift+ArrowLeft"], () => does.step(-10)],
     [null, "", ["Shift+ArrowRight"], () => does.step(10)],
     ["Home End", "first frame, newest frame", ["Home"], does.first],
     [null, "", ["End"], does.last],
@@ -27,14 +27,14 @@ export function bindKeys(does) {
     ["B", "the life of the chosen point", ["b"], does.trace],
     ["K", "the camera, to copy or to set", ["k"], () => does.press("camera")],
     ["P", "this frame as .png", ["p"], does.save],
-    ["O", "pictures and films", ["o"], () => does.press("save")],
+    ["O", "export pictures and films", ["o"], () => does.press("save")],
     ["/", "find a node", ["/"], does.find],
     ["L", "dark, light", ["l"], () => does.press("theme")],
     ["Alt G, F, S", "graph, figures, spreadsheet", ["Alt+g"], () => !by("graph-tab").hidden && does.openTab("graph")],
     [null, "", ["Alt+f"], () => !by("figures-tab").hidden && does.openTab("figures")],
     [null, "", ["Alt+s"], () => does.openTab("sheet")],
     ["↑ ↓", "in the spreadsheet: the point above, below", []],
-    ["Esc", "let go of node, point and region", ["Escape"], does.escape],
+    ["Esc", "clear the selection of node, point and region", ["Escape"], does.escape],
     ["?", "this list", ["?"], () => showKeys()],
   ];
   const actions = new Map(keys.flatMap(([, , names, action]) => names.map((name) => [name, action])));

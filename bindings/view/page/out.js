@@ -21,12 +21,12 @@ export class Out {
     this.still = element("button", { id: "out-picture", title: "this frame, by the renderer of rapid run (P)", onclick: () => this.picture() }, "save .png");
     this.bar = element("progress", { id: "out-progress", max: 1, value: 0, "aria-label": "how far the film is" });
     this.text = element("span", { class: "quiet number", id: "out-text" });
-    this.stop = element("button", { id: "out-cancel", class: "small", title: "gives the film up", onclick: () => this.cancel() }, "cancel");
+    this.stop = element("button", { id: "out-cancel", class: "small", title: "cancels the film", onclick: () => this.cancel() }, "cancel");
     this.running = element("div", { class: "fields", hidden: true }, this.bar, this.text, this.stop);
-    this.why = element("div", { class: "quiet", hidden: true }, "Films are made by a program of its own, which --untrusted forbids.");
+    this.why = element("div", { class: "quiet", hidden: true }, "Films need the program ffmpeg, which --untrusted does not allow.");
     this.films = element("div", { class: "fields" }, element("label", {}, "frames"), this.first, element("span", { class: "quiet" }, "to"), this.last, this.kind, this.make);
     this.root = element("section", { id: "out", hidden: true },
-      element("h2", {}, "Save", element("span", { class: "gap" }), element("button", { title: "close (O)", onclick: close }, "×")),
+      element("h2", {}, "Export", element("span", { class: "gap" }), element("button", { title: "close (O)", onclick: close }, "×")),
       element("div", { class: "fields" }, element("label", {}, "size"), this.width, element("span", { class: "quiet" }, "×"), this.height, this.preset, this.still),
       this.films, this.why, this.running);
     root.append(this.root);
@@ -87,7 +87,7 @@ export class Out {
         this.text.textContent = `${progress.done} of ${progress.of}`;
         if (progress.ended) break;
         await new Promise((resolve) => setTimeout(resolve, 150));
-        if (!this.going) throw new Error("the film is given up");
+        if (!this.going) throw new Error("the film is cancelled");
         progress = await this.ask("film_progress");
       }
       const { data } = await this.ask("film_data");

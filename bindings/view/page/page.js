@@ -23,7 +23,7 @@ const cache = new Map(); // messages of frames, by the request that they answer
 let cached = 0;
 
 const connection = new Connection({
-  lost() { note("The server has gone; waiting for it. Another one has another address, which rapid view prints."); },
+  lost() { note("The server does not answer; waiting for it. A new server has a new address, which rapid view prints."); },
   found() { note(""); },
 });
 history.replaceState(null, "", "/"); // the connection has the token
@@ -35,8 +35,8 @@ function openPicture() {
   try {
     return new Picture(by("canvas"));
   } catch (error) {
-    showProblem("This browser draws no WebGL, which the picture needs.", error.message,
-      "Another browser may, or this one with the driver of its graphics card. Over ssh the browser runs on your own machine.");
+    showProblem("This browser has no WebGL, which the picture needs.", error.message,
+      "Try another browser, or install the driver of the graphics card. Over ssh, run the browser on your own machine.");
     throw error;
   }
 }
@@ -119,15 +119,15 @@ const bar = {
     ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"], ["picture", "in pictures"]])),
   shapes: element("button", { id: "shapes", title: "colliders and emitters (S)", "aria-pressed": true, onclick: () => toggle("shapes") }, "shapes"),
   ground: element("button", { id: "ground", title: "grid and axes (G)", "aria-pressed": true, onclick: () => toggle("ground") }, "grid"),
-  trails: element("select", { id: "trails", title: "where points were in the frames before (T)", onchange: () => { state.trails = Number(bar.trails.value); showTrails(); } },
+  trails: element("select", { id: "trails", title: "positions of the points in earlier frames (T)", onchange: () => { state.trails = Number(bar.trails.value); showTrails(); } },
     ...choices([["0", "no trails"], ["6", "6 frames"], ["12", "12 frames"], ["24", "24 frames"], ["48", "48 frames"], ["1000", "all frames"]])),
 };
 by("bar").append(bar.title, bar.state, element("span", { class: "gap" }), bar.output,
   element("label", { for: "colour" }, "colour"), bar.colour, element("label", { for: "group" }, "group"), bar.group,
   element("label", { for: "style" }, "as"), bar.style, bar.shapes, bar.ground, bar.trails,
   element("button", { id: "fit", title: "show everything (F)", onclick: () => picture.fit() }, "fit"),
-  element("button", { id: "camera", title: "the camera as --camera of pictures has it: to copy, or to be put here (K)", onclick: () => openCamera() }, "camera"),
-  element("button", { id: "save", title: "pictures and films (O)", "aria-pressed": false, onclick: () => openOut(!out.root.hidden ? false : true) }, "save"),
+  element("button", { id: "camera", title: "the camera in the form of --camera, to copy or to paste (K)", onclick: () => openCamera() }, "camera"),
+  element("button", { id: "save", title: "pictures and films (O)", "aria-pressed": false, onclick: () => openOut(!out.root.hidden ? false : true) }, "export"),
   element("button", { id: "theme", title: "dark or light (L)", onclick: () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light") }, "◐"),
   element("button", { id: "help", title: "all keys (?)", onclick: () => showKeys() }, "?"));
 
@@ -148,9 +148,11 @@ function theme(name) {
   if (state.point !== null) showPoint(); // its curves
 }
 
-function copy(text) {
-  navigator.clipboard?.writeText(text).then(() => flash(`copied: ${text}`), () => flash(text));
-  if (!navigator.clipboard) flash(text);
+// where: tells what to do with the text.
+function copy(text, where) {
+  const told = `${text}; ${where}`;
+  navigator.clipboard?.writeText(text).then(() => flash(`copied: ${told}`), () => flash(told));
+  if (!navigator.clipboard) flash(told);
 }
 
 function flash(text) { by("dock-note").textContent = text; }
@@ -432,7 +434,7 @@ function openCamera() {
   const say = element("span", { class: "quiet" });
   const use = () => {
     const all = numbers();
-    if (![6, 7].includes(all.length) || all.some((x) => !Number.isFinite(x))) { say.textContent = "six or seven numbers, with commas between"; return; }
+    if (![6, 7].includes(all.length) || all.some((x) => !Number.isFinite(x))) { say.textContent = "six or seven numbers, separated by commas"; return; }
     picture.setCamera(all);
     dialog.close();
   };
@@ -440,7 +442,7 @@ function openCamera() {
   dialog.replaceChildren(element("h2", {}, "Camera"), field, element("p", { class: "quiet" }, "Position x,y,z, target x,y,z and the vertical angle, as --camera of pictures takes them."),
     element("div", { class: "fields" }, element("button", { id: "camera-use", title: "look from there (Enter)", onclick: use }, "look from there"),
       element("button", { id: "camera-scene", title: "look through the scene's camera (0)", disabled: !picture.sceneCamera, onclick: () => { picture.followScene(); dialog.close(); } }, "the scene's"),
-      element("button", { id: "camera-copy", title: "for rapid run", onclick: () => { copy(`--camera=${field.value}`); dialog.close(); } }, "copy --camera"),
+      element("button", { id: "camera-copy", title: "for rapid run", onclick: () => { copy(`--camera=${field.value}`, "paste it after rapid run SCENE in a terminal"); dialog.close(); } }, "copy --camera"),
       element("button", { title: "close (Esc)", onclick: () => dialog.close() }, "close"), say));
   dialog.showModal();
   field.select();

@@ -11,7 +11,7 @@ export class Inspector {
       root.append(part);
       return [name, part];
     }));
-    this.hint = element("section", { id: "hint", class: "quiet" }, "Click a point for its values and its life, a node for the points as they leave it. Drag with Shift for the ranges in a region. ? has all keys.");
+    this.hint = element("section", { id: "hint", class: "quiet" }, "Click a point for its values and its life, or a node for the points after it. Drag with Shift for the ranges in a region. ? lists all keys.");
     root.append(this.hint);
   }
 
@@ -44,8 +44,8 @@ export class Inspector {
     if (life === "") this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box)); // files: no life
     else this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box),
       element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
-        life ? null : element("button", { id: "trace", title: "computes what happened to the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
-      life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death: computed when asked for."));
+        life ? null : element("button", { id: "trace", title: "computes the life of the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
+      life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death, computed on request."));
     for (const curve of curves) curve?.draw();
   }
 

@@ -5,7 +5,7 @@ export class Timeline {
   // go(frame): the user chose a frame; play(on).
   constructor(root, { go, play, step }) {
     this.go = go;
-    this.canvas = element("canvas", { title: "click or drag: go to a frame. Green: computed; ochre: of the run before; blue: being computed; marks: warnings", "aria-label": "frames" });
+    this.canvas = element("canvas", { title: "click or drag: go to a frame. Green: computed; ochre: from the previous run; blue: being computed; marks: warnings", "aria-label": "frames" });
     this.playing = element("button", { id: "play", title: "play, pause (Space)", onclick: () => play() }, "▶");
     this.field = element("input", { type: "number", id: "frame", title: "the frame shown", onchange: () => go(Number(this.field.value)) });
     this.text = element("span", { class: "number quiet", id: "rate" });
@@ -13,7 +13,7 @@ export class Timeline {
       element("button", { title: "first frame (Home)", onclick: () => go(this.first) }, "|◀"),
       element("button", { title: "one frame back (←)", onclick: () => step(-1) }, "◂"),
       this.playing,
-      element("button", { title: "one frame on (→)", onclick: () => step(1) }, "▸"),
+      element("button", { title: "one frame forward (→)", onclick: () => step(1) }, "▸"),
       element("button", { title: "last frame (End)", onclick: () => go(this.last) }, "▶|"),
       this.field, this.canvas, this.text);
     this.first = this.last = this.frame = 1;

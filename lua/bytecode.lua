@@ -282,7 +282,7 @@ function effects.TSETS(at)
     at:mention(found.writes, key)
     if value and value.kind == "vector" then found.vectors[key] = value.size end
   elseif object == parameters then
-    at:refuse(("params.%s can't be assigned; parameters are the graph's"):format(key))
+    at:refuse(("params.%s can't be assigned; parameters are set by the graph"):format(key))
   elseif object and object.kind == "shared" then
     at:refuse_store(("assigns the field %q of a table that all points share"):format(key))
   else
@@ -360,7 +360,7 @@ local function call_shared(at, called, given, arguments)
       result = shared
     end
   elseif protected.resumes(called, given[0]) or not library[called] and not util.funcinfo(called).bytecodes then
-    at:refuse_store "resumes a coroutine, or an iterator, that was made outside of it"
+    at:refuse_store "resumes a coroutine or an iterator that was made outside it"
   end
   return result
 end
@@ -546,12 +546,13 @@ function analyse_function(f, found, given, outer)
 end
 
 local remedies = {
-  point = "kernels run in parallel, in states of their own: keep it in an attribute of the point, or do it once for " ..
-    "the whole set in :detail",
-  set = "a frame depends on the points that enter it, and nothing else: keep it in a detail value, " ..
+  point = "kernels run in parallel, in several Lua states: store the value in an attribute of the point, or " ..
+    "compute it once for " ..
+    "all points in a :detail",
+  set = "a frame may depend only on the points that enter it: store the value in a detail value, " ..
     "points.detail.NAME = value",
-  frame = "no snapshot of %s can hold what a function of the frame remembers: find it from frame.number, or " ..
-    "keep it in points.detail.NAME, in a :detail",
+  frame = "a snapshot of %s can't store what a function of the frame remembers: compute it from frame.number, or " ..
+    "store it in points.detail.NAME, in a :detail",
 }
 
 -- Returns the advice for a kernel that stores a value where it must not.
@@ -579,7 +580,7 @@ end
 local function analyse(kernel, env, of_a_point, point_names)
   local info = util.funcinfo(kernel)
   if not info.bytecodes or info.source:find "^=%[rapid" then
-    error("the kernel is a function of Lua's own library; it must be one of the scene's, which may call it", 0)
+    error("the kernel is a function of Lua's library; write a function in the scene that calls it", 0)
   end
   local found = nothing_found(env, to_remember(of_a_point), "the kernel", point_names.methods)
   -- The parameters of a Lua node follow the point and the frame. All points share them.

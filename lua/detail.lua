@@ -97,7 +97,7 @@ local function string_type(strings)
   }
 end
 
-local over = "points can't be used outside the :detail function that they were given to"
+local over = "points can't be used outside the :detail function that received them"
 
 -- native: the host's functions, which act on the set that the function runs on; rand: the random function of kernels;
 -- point_names: the host's table of a point's names; strings: the strings of attributes (lua/text.lua). Returns run(f,
@@ -117,7 +117,9 @@ local function make(native, rand, point_names, strings)
   local function column_of(name, writable)
     local column = columns[name]
     if column and (column.writable or not writable) then return column end
-    if type(name) ~= "string" then error(("an attribute has a name, not %s"):format(describe.value(name)), 0) end
+    if type(name) ~= "string" then
+      error(("the name of an attribute must be a string, not %s"):format(describe.value(name)), 0)
+    end
     local data, stride, kind = native.column(name, writable) -- raises an error that lists the attributes
     local about = kind == "string" and of_string_type or types[kind]
     column = {
@@ -128,7 +130,9 @@ local function make(native, rand, point_names, strings)
     return column
   end
   local function group_of(name, writable)
-    if type(name) ~= "string" then error(("a group has a name, not %s"):format(describe.value(name)), 0) end
+    if type(name) ~= "string" then
+      error(("the name of a group must be a string, not %s"):format(describe.value(name)), 0)
+    end
     local group = groups[name]
     if group and (group.writable or not writable) then return group end
     local data, stride = native.group(name, writable)
@@ -147,7 +151,7 @@ local function make(native, rand, point_names, strings)
   -- Checked before any memory is touched, since scripts can call methods with any value.
   local function place_in(p, method)
     if not istype(point_view, p) then
-      error(("p:%s is called on a point: with a colon, not a dot"):format(method), 0)
+      error(("p:%s must be called with a colon, not a dot"):format(method), 0)
     end
     if p.rapid_serial ~= serial[0] then error(over, 0) end
     return p.rapid_place
@@ -173,7 +177,7 @@ local function make(native, rand, point_names, strings)
     local place = place_in(p, "rand")
     if rawequal(when, frame) then when = frame.number end
     if type(use) ~= "number" or (when ~= nil and type(when) ~= "number") then
-      error("p:rand takes a number, which of the point's random numbers, and the frame where they are to be new", 0)
+      error("p:rand needs the index of the random number, and the frame for new numbers in each frame", 0)
     end
     return rand(random, load("id", place), use, when == 0 and 5e-324 or when or 0)
   end
@@ -188,7 +192,7 @@ local function make(native, rand, point_names, strings)
     end,
     __newindex = function(p, name, x)
       if p.rapid_serial ~= serial[0] then error(over, 0) end
-      if read_only[name] then error(("%s is read only"):format(name), 0) end
+      if read_only[name] then error(("%s is read-only"):format(name), 0) end
       local column = column_of(name, true)
       column.check(name, x)
       column.store(column.data, p.rapid_place * column.stride, x)
@@ -198,7 +202,7 @@ local function make(native, rand, point_names, strings)
 
   local function check_set(points, method)
     if not istype(set_view, points) then
-      error(("points:%s is called on the points: with a colon, not a dot"):format(method), 0)
+      error(("points:%s must be called with a colon, not a dot"):format(method), 0)
     end
     if points.rapid_serial ~= serial[0] then error(over, 0) end
   end
@@ -214,7 +218,7 @@ local function make(native, rand, point_names, strings)
   local function fold(name, empty, start, step)
     local column = column_of(name, false)
     if column.kind == "quat" or column.kind == "string" then
-      error(("attribute %q is a %s, which has no order and no sum"):format(name, column.kind), 0)
+      error(("attribute %q is a %s, which can't be sorted or summed"):format(name, column.kind), 0)
     end
     if size == 0 then return empty end
     if column.kind ~= "vec3" then
@@ -270,7 +274,7 @@ local function make(native, rand, point_names, strings)
   end
   local function check_time(dt)
     if type(dt) ~= "number" or not (dt >= 0 and dt <= frame.dt) then
-      error(("points:add: dt = %s; it is the time that the point moves in this frame, from 0 to %.9g s"):format(
+      error(("points:add: dt = %s; it must be from 0 to %.9g s, the time that the point moves in this frame"):format(
         describe.value(dt), frame.dt), 0)
     end
     return dt
@@ -287,11 +291,11 @@ local function make(native, rand, point_names, strings)
 
   function set.add(points, values)
     check_set(points, "add")
-    if type(values) ~= "table" then error("points:add takes the new point's values: { P = vec3(x, y, z) }", 0) end
+    if type(values) ~= "table" then error("points:add needs the values of the new point: { P = vec3(x, y, z) }", 0) end
     local copy, names = {}, {}
     for name in pairs(values) do
       if type(name) ~= "string" then
-        error(("points:add takes values by name, { P = vec3(x, y, z) }, not by %s"):format(describe.value(name)), 0)
+        error(("points:add needs values by name, { P = vec3(x, y, z) }, not by %s"):format(describe.value(name)), 0)
       end
       names[#names + 1] = name
     end
@@ -302,7 +306,7 @@ local function make(native, rand, point_names, strings)
       elseif name == "group" then
         copy.group = list_of_groups(values.group)
       else
-        if read_only[name] then error(("%s is read only"):format(name), 0) end
+        if read_only[name] then error(("%s is read-only"):format(name), 0) end
         local column = column_of(name, false)
         copy[name] = vector_of(column, values[name])
         column.check(name, copy[name])
@@ -313,7 +317,7 @@ local function make(native, rand, point_names, strings)
   function set.neighbours(points, i, radius)
     check_set(points, "neighbours")
     if type(radius) ~= "number" then
-      error(("points:neighbours takes a place and a radius, not %s"):format(describe.value(radius)), 0)
+      error(("points:neighbours needs a position and a radius, not %s"):format(describe.value(radius)), 0)
     end
     return native.neighbours(place_of("points:neighbours", i), radius)
   end
@@ -323,7 +327,7 @@ local function make(native, rand, point_names, strings)
     if type(key) == "string" then
       of = function(p) return p[key] end
     elseif type(key) ~= "function" then
-      error(("points:sort takes the name of an attribute or a function of a point, not %s")
+      error(("points:sort needs the name of an attribute or a function of a point, not %s")
         :format(describe.value(key)), 0)
     end
     local keys, order = {}, {}
@@ -386,7 +390,7 @@ local function make(native, rand, point_names, strings)
       return known
     end,
     __newindex = function(_, key)
-      error(("points[%s] can't be assigned; assign its attributes"):format(describe.value(key)), 0)
+      error(("points[%s] can't be assigned; assign the attributes of a point"):format(describe.value(key)), 0)
     end,
   })
 

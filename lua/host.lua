@@ -39,7 +39,7 @@ local function load_node(name)
   local text, where = native.read_node(name)
   if not text then return nil end
   if loading[name] then
-    error(("%s uses the node %q instead of defining it; rename it: it hides the node of its name")
+    error(("%s uses the node %q instead of defining it; rename the file, because it hides the node")
       :format(where:gsub("^@", ""), name), 0)
   end
   local chunk, message = load_text(text, where)
@@ -120,7 +120,7 @@ local function watched(f, runner, of_a_point)
     local a, b = runner(...)
     local name = shared_state.difference(before, shared_state.walk(f, env))
     if name ~= nil then
-      error(("the kernel changes what all points share (%s); %s"):format(describe.name(name),
+      error(("the kernel changes a value that all points share (%s); %s"):format(describe.name(name),
         bytecode.to_remember(of_a_point)), 0)
     end
     return a, b

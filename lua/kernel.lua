@@ -119,7 +119,7 @@ end
 -- Raises a view's error for a missing attribute.
 local function missing(name, names)
   name = describe.name(name)
-  error(("no attribute %q here; a name that is computed is declared, reads = { %q }, or also named as a constant " ..
+  error(("no attribute %q here; declare a computed name with reads = { %q }, or also write it as a constant " ..
     "(the kernel names %s)"):format(name, name, table.concat(sorted_names(names), ", ")), 0)
 end
 
@@ -149,7 +149,7 @@ local function rand(...)
   local _, use, frame_or_number = ...
   local i = chunk.at
   if i < 0 then dead() end
-  if type(use) ~= "number" then wrong_use("a number, which of the point's random numbers", use) end
+  if type(use) ~= "number" then wrong_use("the index of the random number", use) end
   local frame_number = 0
   if type(frame_or_number) ~= "nil" then -- not by ==, which the frame answers itself
     frame_number = frame_or_number
@@ -158,7 +158,7 @@ local function rand(...)
     elseif istype(step_type, frame_number) then
       frame_number = chunk.times[i]
     end
-    if type(frame_number) ~= "number" then wrong_use("the frame, or a number, behind the comma", frame_number) end
+    if type(frame_number) ~= "number" then wrong_use("the frame or a number as the second argument", frame_number) end
     if frame_number == 0 then frame_number = 5e-324 end -- 0 stands for a number that is the same in every frame
   end
   local drawn = draw(chunk.random, $ID, use, frame_number)
@@ -168,14 +168,14 @@ end
 local function kill(...)
   local i = chunk.at
   if i < 0 then dead() end
-  if chunk.kill == nil then error("kill is out of reach here", 0) end
+  if chunk.kill == nil then error("kill can't be called here", 0) end
   chunk.kill[i] = 1
 end
 ]]
 
 -- An action gets the step instead of the frame: it has the point's own time.
 local text_step = [[
-ffi.metatype(step_type, refuse.operators("the step is no number; compute with what it has, by name: step.dt", {
+ffi.metatype(step_type, refuse.operators("the step is not a number; use one of its fields, such as step.dt", {
   __metatable = false,
   __tostring = function() return "a step" end,
   __newindex = function(_, name) refuse.step(name) end,
@@ -272,7 +272,7 @@ if name == "index" then return (chunk.first + i + 1) end]]
     text[#text + 1] = "refuse.write(name)"
   end)
   text[#text + 1] = [[
-ffi.metatype(point_type, refuse.operators("p is the point; compute with what it has, by name: p.v", {
+ffi.metatype(point_type, refuse.operators("p is the point; use one of its attributes, such as p.v", {
   __index = read, __newindex = write, __metatable = false, __tostring = function() return "a point" end,
 }))
 ]]
@@ -331,23 +331,25 @@ return run, set_params
     not_finite(name, value)
   end
   function refuse.write(name)
-    if layout.predicate then error(("assigns %q; a test must not change its point"):format(describe.name(name)), 0) end
-    if shared.point_names.read_only[name] then error(("%s is read only"):format(name), 0) end
+    if layout.predicate then
+      error(("assigns %q; a condition must not change its point"):format(describe.name(name)), 0)
+    end
+    if shared.point_names.read_only[name] then error(("%s is read-only"):format(name), 0) end
     if names[name] then
-      error(("assigns %q under a computed name; declare it: writes = { %q }"):format(name, name), 0)
+      error(("assigns %q by a computed name; declare it with writes = { %q }"):format(name, name), 0)
     end
     name = describe.name(name)
-    error(("no attribute %q here; add :attribute{ %s } before it, or where its name is computed writes = { %q }")
+    error(("no attribute %q here; add :attribute{ %s } before it, or declare a computed name with writes = { %q }")
       :format(name, conventional[name] or name .. " = 0", name), 0)
   end
   function refuse.param(name, values)
     error(("no parameter %q; the node has %s"):format(describe.name(name), table.concat(sorted_names(values), ", ")), 0)
   end
   function refuse.assign(name)
-    error(("params.%s can't be assigned; parameters are the graph's"):format(describe.name(name)), 0)
+    error(("params.%s can't be assigned; parameters are set by the graph"):format(describe.name(name)), 0)
   end
   function refuse.group(name, what)
-    error(("can't %s the group %s; a kernel names the groups that it joins and leaves as constants: p:%s \"old\"")
+    error(("can't %s the group %s; write the name as a constant: p:%s \"old\"")
       :format(what, describe.value(name), what), 0)
   end
   refuse.operators = refuse_operators
@@ -355,12 +357,12 @@ return run, set_params
     error(("the step has no %q; it has time, dt, index and detail"):format(describe.name(name)), 0)
   end
   function refuse.use(expected, value)
-    error(("p:rand takes %s, not %s"):format(expected, describe.value(value)), 0)
+    error(("p:rand needs %s, not %s"):format(expected, describe.value(value)), 0)
   end
   local make, message = loadstring(table.concat(text, "\n"), "=[rapid runner]")
   if not make then
     if not message:find("constants", 1, true) then error(message, 0) end -- out of memory
-    error(("reads and writes %d attributes and groups; a kernel has at most about %d"):format(
+    error(("reads and writes %d attributes and groups; a kernel can use at most about %d"):format(
       #layout.columns + #layout.groups, max_names), 0)
   end
   local pointer = ffi.cast(("struct { %s }*"):format(table.concat(fields, " ")), memory)
@@ -386,14 +388,14 @@ local function prepare(rand, adopt, point_names, strings)
       local names = sorted_names(shown.details)
       name = describe.name(name)
       error(("no detail value %q; %s"):format(name, #names > 0 and "there are " .. table.concat(names, ", ")
-        or "a :detail node sets one: points.detail." .. name .. " = 0"), 0)
+        or "set it in a :detail: points.detail." .. name .. " = 0"), 0)
     end
     return value
   end
   jit.on(of_view.__index)
   of_view.__newindex = function(_, name)
     name = describe.name(name)
-    error(("detail.%s can't be assigned in a kernel; points.detail.%s can, in :detail"):format(name, name), 0)
+    error(("detail.%s can't be assigned in a kernel; assign points.detail.%s in a :detail"):format(name, name), 0)
   end
 
   local frame_type = ffi.typeof "struct { const double number, time, dt; }"
@@ -403,7 +405,7 @@ local function prepare(rand, adopt, point_names, strings)
     error(("the frame has no %q; it has number, time, dt and detail"):format(describe.name(name)), 2)
   end
   jit.on(field_of_frame)
-  ffi.metatype(frame_type, refuse_operators("the frame is no number; compute with what it has, by name: frame.time", {
+  ffi.metatype(frame_type, refuse_operators("the frame is not a number; use one of its fields, such as frame.time", {
     __tostring = function(frame) return ("frame %g"):format(frame.number) end,
     __index = field_of_frame,
   }))

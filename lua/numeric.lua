@@ -22,7 +22,7 @@ local show = describe.operand
 local function need_numbers(call, ...)
   for place = 1, select("#", ...) do
     local value = select(place, ...)
-    if type(value) ~= "number" then error(("%s takes numbers, not %s"):format(call, show(value)), 0) end
+    if type(value) ~= "number" then error(("%s needs numbers, not %s"):format(call, show(value)), 0) end
   end
 end
 
@@ -63,8 +63,8 @@ function numeric.smoothstep(...)
 end
 
 local function need_direction(call, value)
-  if not istype(vec3, value) then error(("%s takes a vec3, not %s"):format(call, show(value)), 0) end
-  error(("%s: %s is no direction; it must have a length"):format(call, show(value)), 0)
+  if not istype(vec3, value) then error(("%s needs a vec3, not %s"):format(call, show(value)), 0) end
+  error(("%s: %s has no direction; its length must be above 0"):format(call, show(value)), 0)
 end
 
 function numeric.rotation(...)
@@ -97,7 +97,7 @@ end
 
 local function refuse_noise(name, P, time, octaves, seed)
   local call = name .. "(P, time, octaves, seed)"
-  if not istype(vec3, P) then error(("%s takes a vec3 P, not %s"):format(call, show(P)), 0) end
+  if not istype(vec3, P) then error(("%s needs a vec3 P, not %s"):format(call, show(P)), 0) end
   need_numbers(call, time, octaves, seed)
   if not (octaves >= 1 and octaves <= 16 and floor(octaves) == octaves) then
     error(("%s: octaves = %g; it must be a whole number from 1 to 16"):format(call, octaves), 0)

@@ -15,7 +15,7 @@ local nested = 0
 
 local function enter(what)
   if nested == max_nested then
-    error(("stack overflow: %s inside of each other, more than %d deep"):format(what, max_nested), 3)
+    error(("stack overflow: %s nested more than %d deep"):format(what, max_nested), 3)
   end
   nested = nested + 1
 end
@@ -50,7 +50,7 @@ end
 -- Calls the handler after the stack is unwound: scripts have no means to look at it.
 function protected.xpcall(f, handler, ...)
   if type(handler) ~= "function" then
-    error("xpcall takes a function and a handler of errors, not " .. describe.kind(handler), 2)
+    error("xpcall needs a function and an error handler, not " .. describe.kind(handler), 2)
   end
   return handled(handler, caught(pcall(f, ...)))
 end
@@ -72,7 +72,7 @@ function protected.sort(list, before)
 end
 
 function protected.resume(thread, ...)
-  if type(thread) ~= "thread" then error("coroutine.resume takes a coroutine, not " .. describe.kind(thread), 2) end
+  if type(thread) ~= "thread" then error("coroutine.resume needs a coroutine, not " .. describe.kind(thread), 2) end
   enter "coroutines"
   return caught(leave(coroutine.resume(thread, ...)))
 end
@@ -80,7 +80,7 @@ end
 local wrapped = setmetatable({}, { __mode = "k" }) -- coroutines by the function that coroutine.wrap returned
 
 function protected.wrap(f)
-  if type(f) ~= "function" then error("coroutine.wrap takes a function, not " .. describe.kind(f), 2) end
+  if type(f) ~= "function" then error("coroutine.wrap needs a function, not " .. describe.kind(f), 2) end
   local thread = coroutine.create(f)
   local function run(...)
     enter "coroutines"

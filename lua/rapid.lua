@@ -9,7 +9,7 @@ local describe = require "describe"
 local function options_of(what, options)
   if options == nil then return {} end
   if type(options) ~= "table" then
-    error(("%s takes a table of options, not %s"):format(what, describe.operand(options)), 3)
+    error(("%s needs a table of options, not %s"):format(what, describe.operand(options)), 3)
   end
   local copy = {}
   for name, value in pairs(options) do copy[name] = value end
@@ -185,7 +185,7 @@ local function make(native, load_node, numeric, shapes, studies)
     along = along,
     from = function(columns)
       if type(columns) ~= "table" then
-        error("rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }", 2)
+        error("rapid.points.from needs a table of columns: { P = {{x, y, z}, ...} }", 2)
       end
       return native.make("points.from", { columns = columns })
     end,
@@ -195,7 +195,7 @@ local function make(native, load_node, numeric, shapes, studies)
     for k = 1, 3 do
       local part = select(k, x, y, z)
       if type(part) ~= "number" then
-        error(("rapid.translate takes three numbers, rapid.translate(x, y, z); one is %s"):format(
+        error(("rapid.translate needs three numbers, rapid.translate(x, y, z); one is %s"):format(
           describe.value(part)), 2)
       end
     end
@@ -224,7 +224,7 @@ local function make(native, load_node, numeric, shapes, studies)
     return function(input, name, kernel)
       if type(name) == "table" and kernel == nil then return native.node(type_name, name, input) end
       if type(name) ~= "string" or type(kernel) ~= "function" then
-        error((":%s takes a name and a function, or a table { name = ..., kernel = ... }"):format(type_name), 2)
+        error((":%s needs a name and a function, or a table { name = ..., kernel = ... }"):format(type_name), 2)
       end
       return native.node(type_name, { name = name, kernel = kernel }, input)
     end
@@ -238,13 +238,13 @@ local function make(native, load_node, numeric, shapes, studies)
       local other = select(place, ...)
       if type(other) == "table" then options = other else inputs[#inputs + 1] = other end
     end
-    if #inputs < 2 then error(":merge takes another node: a:merge(b)", 2) end
+    if #inputs < 2 then error(":merge needs another node: a:merge(b)", 2) end
     return native.node("merge", options, unpack(inputs))
   end
 
   local function call(type_name, options, ...)
     if options ~= nil and type(options) ~= "table" then
-      error((":%s takes a table of parameters: :%s{ ... }"):format(type_name, type_name), 3)
+      error((":%s needs a table of parameters: :%s{ ... }"):format(type_name, type_name), 3)
     end
     return native.node(type_name, options or {}, ...)
   end
@@ -271,7 +271,7 @@ local function make(native, load_node, numeric, shapes, studies)
       else
         method = function(input, options, ...)
           if select("#", ...) > 0 then
-            error((":%s takes one table of parameters"):format(type_name), 2)
+            error((":%s needs one table of parameters"):format(type_name), 2)
           end
           return call(type_name, options, input)
         end
@@ -287,7 +287,7 @@ local function make(native, load_node, numeric, shapes, studies)
 
   -- Checks and returns the definition of a node written in Lua, for its file to return.
   function rapid.node(definition)
-    if type(definition) ~= "table" then error("rapid.node takes a table", 2) end
+    if type(definition) ~= "table" then error("rapid.node needs a table", 2) end
     native.define(definition)
     if type(definition.name) == "string" then definitions[definition.name] = definition end
     return definition
@@ -317,7 +317,9 @@ local function make(native, load_node, numeric, shapes, studies)
     return function(object, path, options)
       if path == nil then error("grid:write: the path is missing", 2) end
       local name = options_of("grid:write", options).grid or usual
-      if type(name) ~= "string" then error(("grid:write: grid = %s is no name"):format(describe.value(name)), 2) end
+      if type(name) ~= "string" then
+        error(("grid:write: grid = %s; it must be a name"):format(describe.value(name)), 2)
+      end
       native.make("grid.write", { path = path, grids = { [name] = object } })
       return object
     end
@@ -363,7 +365,7 @@ local function make(native, load_node, numeric, shapes, studies)
     end
     local kind = native.kind(object)
     if kind == "node" then
-      if type(name) ~= "string" then error("a node is used as node:type{ ... }", 2) end
+      if type(name) ~= "string" then error("call a node's method with a colon: node:type{ ... }", 2) end
       return method_of(name)
     end
     local known = value_methods[kind] or shapes.pointer_of(object) and value_methods.shape or {}

@@ -67,11 +67,11 @@ local function make(native)
     if type(shape) ~= "userdata" or not pointer_of(shape) then
       local _, moves = native.shape(shape)
       if moves then
-        error(("%s is asked in kernels alone of what moves, and of meshes; it is as in the step there"):format(what), 0)
+        error(("%s of moving shapes and of meshes can only be called in kernels"):format(what), 0)
       end
-      error(("shape:%s(P) is asked of a shape: with a colon, not a dot"):format(what), 0)
+      error(("shape:%s(P) must be called with a colon, not a dot"):format(what), 0)
     end
-    error(("shape:%s(P) takes a vec3, not %s"):format(what, place_shown(P)), 0)
+    error(("shape:%s(P) needs a vec3, not %s"):format(what, place_shown(P)), 0)
   end
 
   local queries = {}
@@ -110,7 +110,7 @@ local function make(native)
     end
     local mesh = mesh_of(shape)
     if not mesh or type(name) ~= "string" then
-      error(("shape:closest(P, NAME) takes the name of an attribute, of a mesh, not %s"):format(
+      error(("shape:closest(P, NAME) needs the name of an attribute of a mesh, not %s"):format(
         describe.value(name)), 0)
     end
     local numbers = query_value(mesh, pointer, name, P.x, P.y, P.z, value)
@@ -125,8 +125,8 @@ local function make(native)
   local function sample(...)
     local grid, P = ...
     local pointer = type(grid) == "userdata" and grid_of(grid)
-    if not pointer then error("grid:sample(P) is asked of a grid of vectors: with a colon, not a dot", 0) end
-    if not istype(vec3, P) then error(("grid:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
+    if not pointer then error("grid:sample(P) must be called with a colon, not a dot", 0) end
+    if not istype(vec3, P) then error(("grid:sample(P) needs a vec3, not %s"):format(place_shown(P)), 0) end
     query_grid(pointer, P.x, P.y, P.z, value)
     return (vec3(value[0], value[1], value[2]))
   end
@@ -134,8 +134,8 @@ local function make(native)
   local function sample_fog(...)
     local fog, P = ...
     local pointer = type(fog) == "userdata" and fog_of(fog)
-    if not pointer then error("fog:sample(P) is asked of a fog: with a colon, not a dot", 0) end
-    if not istype(vec3, P) then error(("fog:sample(P) takes a vec3, not %s"):format(place_shown(P)), 0) end
+    if not pointer then error("fog:sample(P) must be called with a colon, not a dot", 0) end
+    if not istype(vec3, P) then error(("fog:sample(P) needs a vec3, not %s"):format(place_shown(P)), 0) end
     local density = query_fog(pointer, P.x, P.y, P.z)
     return density
   end

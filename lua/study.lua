@@ -32,7 +32,7 @@ local function make(native, vector)
   end
 
   local function check(definition)
-    if type(definition) ~= "table" then wrong("it takes a table, not %s", shown(definition)) end
+    if type(definition) ~= "table" then wrong("it needs a table, not %s", shown(definition)) end
     for name in pairs(definition) do
       if not fields[name] then
         wrong("unknown field %s%s", shown(name), native.did_you_mean(tostring(name), names_of(fields)))
@@ -46,17 +46,17 @@ local function make(native, vector)
     local frames = definition.frames
     expect(type(frames) == "table" and #frames == 2, "frames", "the first and the last: {1, 48}")
     for _, frame in ipairs(frames) do
-      if type(frame) ~= "number" or frame % 1 ~= 0 then wrong("frames: %s is no whole number", shown(frame)) end
+      if type(frame) ~= "number" or frame % 1 ~= 0 then wrong("frames: %s is not a whole number", shown(frame)) end
     end
     if frames[2] <= frames[1] then wrong("frames = {%d, %d}; the last must come after the first", unpack(frames)) end
     expect(type(definition.sweep) == "table" and next(definition.sweep) ~= nil, "sweep",
       "lists of values by knob: { substeps = {1, 2, 4} }")
     for knob, values in pairs(definition.sweep) do
-      if type(knob) ~= "string" then wrong("sweep: the knob %s is no name", shown(knob)) end
+      if type(knob) ~= "string" then wrong("sweep: the knob %s is not a name", shown(knob)) end
       if type(values) ~= "table" or #values == 0 then wrong("sweep: %s must be a list of values", knob) end
       for _, value in ipairs(values) do
         if not is_knob(value) then
-          wrong("sweep: %s holds %s; it must be finite numbers, texts or booleans", knob, shown(value))
+          wrong("sweep: %s contains %s; values must be finite numbers, strings or booleans", knob, shown(value))
         end
       end
     end
@@ -64,14 +64,14 @@ local function make(native, vector)
     expect(norm == nil or type(norm) == "function" or norms[norm], "error",
       '"rms", "max", "p95", "residual" or a function(points, reference)')
     if norm == "residual" then
-      expect(reference == nil, "reference", "left out: a residual is compared with nothing")
+      expect(reference == nil, "reference", "removed: a residual needs no reference")
     else
       expect(type(reference) == "function" or type(reference) == "table" and next(reference) ~= nil, "reference",
         "a function of the frame that returns { P = {...} }, or knobs: { substeps = 512 }")
     end
     if type(reference) == "table" then
       for knob, value in pairs(reference) do
-        if not is_knob(value) then wrong("reference: %s = %s; it must be a number, a text or a boolean", knob,
+        if not is_knob(value) then wrong("reference: %s = %s; it must be a number, a string or a boolean", knob,
           shown(value)) end
       end
     end

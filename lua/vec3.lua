@@ -20,9 +20,9 @@ local remedies = {
   ["+"] = "both must be a vec3",
   ["-"] = "both must be a vec3",
   ["*"] = "the other must be a number or a vec3",
-  ["/"] = "a vec3 is divided by a number or a vec3",
-  ["%"] = "take its components",
-  ["^"] = "take its components",
+  ["/"] = "a vec3 can only be divided by a number or a vec3",
+  ["%"] = "use its components",
+  ["^"] = "use its components",
 }
 
 local function wrong_operand(operator, a, b)
@@ -30,7 +30,7 @@ local function wrong_operand(operator, a, b)
 end
 
 local function need_vec3(what, value)
-  if not istype(vec3, value) then error(("%s takes a vec3, not %s"):format(what, show(value)), 0) end
+  if not istype(vec3, value) then error(("%s needs a vec3, not %s"):format(what, show(value)), 0) end
 end
 
 local function need_two(what, a, b)
@@ -69,7 +69,7 @@ end
 local function lerp(...)
   local a, b, t = ...
   if not (istype(vec3, a) and istype(vec3, b)) then need_two("v:lerp(w, t)", a, b) end
-  if type(t) ~= "number" then error(("v:lerp(w, t) takes a number t, not %s"):format(show(t)), 2) end
+  if type(t) ~= "number" then error(("v:lerp(w, t) needs a number t, not %s"):format(show(t)), 2) end
   return (vec3(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, a.z + (b.z - a.z) * t))
 end
 
@@ -147,7 +147,7 @@ ffi.metatype(vec3, of_vec3)
 
 -- Rotations: (x, y, z) = axis sin(angle / 2), w = cos(angle / 2), as Houdini's orient holds them.
 local function need_quat(what, value)
-  if not istype(quat, value) then error(("%s takes a quat, not %s"):format(what, show(value)), 0) end
+  if not istype(quat, value) then error(("%s needs a quat, not %s"):format(what, show(value)), 0) end
 end
 
 -- Rotates v: v + 2 w (u x v) + 2 u x (u x v) for the unit quaternion (u, w).
@@ -188,7 +188,7 @@ local function slerp(...)
   local q, r, t = ...
   if not istype(quat, q) then need_quat("q:slerp(r, t)", q) end
   if not istype(quat, r) then need_quat("q:slerp(r, t)", r) end
-  if type(t) ~= "number" then error(("q:slerp(r, t) takes a number t, not %s"):format(show(t)), 0) end
+  if type(t) ~= "number" then error(("q:slerp(r, t) needs a number t, not %s"):format(show(t)), 0) end
   local cosine = q.x * r.x + q.y * r.y + q.z * r.z + q.w * r.w
   local sign = cosine < 0 and -1 or 1 -- r and -r are the same rotation
   cosine = cosine * sign
@@ -206,7 +206,7 @@ local of_quat = {
   __mul = function(...)
     local q, r = ...
     if not (istype(quat, q) and istype(quat, r)) then
-      error(("can't compute %s * %s; both must be a quat, and a vec3 is turned by q:rotate(v)"):format(show(q),
+      error(("can't compute %s * %s; both must be a quat; to turn a vec3, use q:rotate(v)"):format(show(q),
         show(r)), 2)
     end
     return (quat(q.w * r.x + q.x * r.w + q.y * r.z - q.z * r.y, q.w * r.y - q.x * r.z + q.y * r.w + q.z * r.x,
@@ -239,7 +239,7 @@ ffi.metatype(quat, of_quat)
 local function make_quat(...)
   local x, y, z, w = ...
   if not (type(x) == "number" and type(y) == "number" and type(z) == "number" and type(w) == "number") then
-    error("quat takes four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis", 2)
+    error("quat needs four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis", 2)
   end
   return (quat(x, y, z, w))
 end
@@ -252,7 +252,7 @@ local function make_vec3(...)
     local wrong = x
     if type(x) == "number" then wrong = y end
     if type(wrong) == "number" then wrong = z end
-    error(("vec3 takes three numbers, vec3(0, 1, 0); one is %s"):format(show(wrong)), 2)
+    error(("vec3 needs three numbers, vec3(0, 1, 0); one is %s"):format(show(wrong)), 2)
   end
   return (vec3(x, y, z))
 end

@@ -42,7 +42,7 @@ install_missing() {
         sh -c "apt-get update && $install" >"$log" 2>&1; then
         cat "$log" >&2
         rm -f "$log"
-        fail "apt-get could not install what is missing; when that is mended, type"$'\n'"    ${as_root[*]} $install"
+        fail "apt-get could not install what is missing; after fixing that, type"$'\n'"    ${as_root[*]} $install"
     fi
     rm -f "$log"
 }

@@ -108,7 +108,9 @@ auto open(const void* handle, const char* what)
 {
     auto object = Table::get(handle);
     if (!object)
-        refuse(handle ? fmt::format("the handle is of no open {}: it was closed, or is of something else", what)
+        refuse(handle ? fmt::format(
+                            "the handle does not belong to an open {}: it was closed, or it belongs to something else",
+                            what)
                       : fmt::format("the {} is NULL", what));
     return object;
 }
@@ -153,8 +155,8 @@ T known_part(const T* given, const char* name, T known = {})
     const char* const bytes = reinterpret_cast<const char*>(given);
     if (size > sizeof known && std::any_of(bytes + sizeof known, bytes + size, [](char byte) { return byte != 0; }))
         refuse(
-            fmt::format("{} asks for what this version of Rapid does not know; build the program for it, or install a "
-                        "newer one",
+            fmt::format("{} requests a feature that this version of Rapid does not know; build the program for this "
+                        "version, or install a newer one",
                         name));
     return known;
 }

@@ -9,7 +9,7 @@ namespace {
 // Throws if a callback's status is not 0.
 void expect_done(int status)
 {
-    if (status != 0) throw std::runtime_error(fmt::format("it returned {}, where 0 says that it is done", status));
+    if (status != 0) throw std::runtime_error(fmt::format("it returned {}; it must return 0 for success", status));
 }
 
 HostShape shape_of(const rapid_shape& given, std::shared_ptr<const OffersEnd> end)
@@ -61,7 +61,7 @@ std::size_t bytes_of(ColumnType type)
 void check_count(std::size_t count, const char* name)
 {
     constexpr std::size_t most = SIZE_MAX / 64;
-    if (count > most) refuse(fmt::format("{} = {}; no memory holds as many", name, count));
+    if (count > most) refuse(fmt::format("{} = {} is more than memory can hold", name, count));
 }
 
 // Returns the values of a column, packed.
@@ -210,7 +210,7 @@ int rapid_call_add_rod(const rapid_call* call, int64_t a, int64_t b, double leng
                        rapid_error** error)
 {
     return guarded(error, [&] {
-        if (!not_null(call, "call").rods) refuse("the call is not of a constraint: it takes no rods");
+        if (!not_null(call, "call").rods) refuse("the call does not belong to a constraint, so it takes no rods");
         static_cast<std::vector<HostRod>*>(call->rods)->push_back({a, b, length, compliance});
     });
 }

@@ -12,15 +12,16 @@ void CacheOptions::declare(Options& options, const std::string& doc_of_folder, c
     options
         .add_option(
             "--cache-every", [this](const std::string& text) { every_ = read_whole("--cache-every", text, 0); },
-            fmt::format("with --cache: a snapshot after every N-th frame, and the last [default {}]; 0: none",
-                        RunCacheOptions().every))
+            fmt::format(
+                "with --cache: writes a snapshot after every Nth frame and after the last [default {}]; 0 writes none",
+                RunCacheOptions().every))
         .type_name("N");
     options.add_flag("--again", again_, doc_of_again);
 }
 
 void CacheOptions::check() const
 {
-    if (!requested() && every_) throw Error("--cache-every says how often a --cache is written; give one");
+    if (!requested() && every_) throw Error("--cache-every sets how often snapshots are written; it needs --cache DIR");
 }
 
 }  // namespace rapid

@@ -16,14 +16,15 @@ namespace {
 class Check : public Command, public Confined {
 public:
     std::string name() const override { return "check"; }
-    std::string doc() const override { return "finds what is wrong with a graph, without running it"; }
+    std::string doc() const override { return "finds mistakes in a graph without running it"; }
 
     void declare(Options& options) override
     {
         graph_.declare(options);
         files_.declare(options);
-        options.add_flag("--races", races_,
-                         "runs frames in other orders of the points and in two states, and compares the bits");
+        options.add_flag(
+            "--races", races_,
+            "runs frames with the points in other orders and in two Lua states, and compares the results bit by bit");
         options
             .add_option("-f,--frames", frames_text_,
                         "with --races: the frames that are compared, 24-26 [default: the two after the first]")
@@ -39,9 +40,8 @@ public:
     int run(const CommonOptions& common) override
     {
         if (races_ && common.threads > 1)
-            throw Error("--races goes over the points in orders of its own, on one thread; leave --threads out");
-        if (!races_ && !frames_text_.empty())
-            throw Error("-f chooses the frames of --races; without it no frame is run: give both, or leave it out");
+            throw Error("--races visits the points in several orders on one thread; remove --threads");
+        if (!races_ && !frames_text_.empty()) throw Error("-f chooses the frames of --races; give both, or neither");
         Threads threads(races_ ? 1 : common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common, SceneArguments::AtLimit::EndsProcess);
@@ -57,8 +57,9 @@ public:
             if (frames.last < first)
                 throw Error(fmt::format("-f {} ends before the scene begins, at frame {}", frames_text_, first));
             if (!is_free_of_races(scene, frames, common.verbose)) return status_failed;
-            print(text + fmt::format("frames {} to {}: the same bits in every order of the points, and in two states\n",
-                                     frames.first, frames.last));
+            print(text +
+                  fmt::format("frames {} to {}: bit-identical in every order of the points, and in two Lua states\n",
+                              frames.first, frames.last));
             return status_done;
         });
     }
@@ -75,8 +76,7 @@ private:
             print_error(*races->found, verbose);
         else if (!races->compared)
             print_warning(
-                fmt::format("there is no point in frames {} to {}, and nothing to compare; choose later "
-                            "frames, as -f {}-{}",
+                fmt::format("frames {} to {} have no points to compare; choose later frames, such as -f {}-{}",
                             frames.first, frames.last, frames.last + 22, frames.last + 24));
         return !races->found;
     }

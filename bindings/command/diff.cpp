@@ -27,7 +27,8 @@ public:
         options
             .add_option(
                 "--tolerance", [this](const std::string& text) { tolerance_ = read_tolerance(text); },
-                fmt::format("of P: times the diagonal of the bounds; of the rest: relative [default {}]",
+                fmt::format("allowed difference: for P times the diagonal of the bounds, for other attributes relative "
+                            "[default {}]",
                             default_tolerance))
             .type_name("X");
         options.add_flag("--json", json_, "as JSON");
@@ -45,8 +46,8 @@ public:
         return threads.run([&] {
             const CacheFiles a = find_cache(a_), b = find_cache(b_);
             if (a.sequence != b.sequence)
-                throw Error(fmt::format("{} is a sequence and {} is a file; name two of a kind", a.sequence ? a_ : b_,
-                                        a.sequence ? b_ : a_));
+                throw Error(fmt::format("{} is a sequence and {} is a file; give two files or two sequences",
+                                        a.sequence ? a_ : b_, a.sequence ? b_ : a_));
             return a.sequence ? compare_sequences(a, b) : compare_files();
         });
     }

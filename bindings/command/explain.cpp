@@ -17,18 +17,18 @@ namespace {
 class Explain : public Command, public Confined {
 public:
     std::string name() const override { return "explain"; }
-    std::string doc() const override { return "tells what a graph's plan keeps and leaves out, and why"; }
+    std::string doc() const override { return "shows what the plan of a graph keeps and prunes, and why"; }
 
     void declare(Options& options) override
     {
         graph_.declare(options);
         files_.declare(options);
-        options.add_option("--against", against_, "tells what one of two graphs needs and the other does not")
+        options.add_option("--against", against_, "shows what one of two graphs needs and the other does not")
             .type_name("GRAPH");
         options
             .add_option(
                 "--state", [this](const std::string& text) { state_after_ = read_frame("--state", text); },
-                "computes the frames up to this one, and tells what each node then keeps, as a snapshot holds it")
+                "computes the frames up to this one, and shows the state of each node as a snapshot stores it")
             .type_name("FRAME");
         options.add_flag("--json", json_, "as JSON");
         untrusted_.declare(options, "graph");
@@ -56,7 +56,7 @@ public:
             std::optional<SceneReport> state;
             if (state_after_) {
                 if (*state_after_ < scene.first_frame())
-                    throw Error(fmt::format("--state {}: it is before the scene's first frame, {}", *state_after_,
+                    throw Error(fmt::format("--state {} is before the scene's first frame, {}", *state_after_,
                                             scene.first_frame()));
                 state = SceneInside::explain_state(scene, files_.files(), *state_after_).value();
             }

@@ -39,7 +39,8 @@ std::int64_t submit(const FarmJob& job, const fs::path& script, std::vector<std:
     const std::string said = standard_output_of(words);  // "17", or "17;CLUSTER"
     std::int64_t id = 0;
     const auto parsed = std::from_chars(said.data(), said.data() + said.size(), id);
-    if (parsed.ec != std::errc() || id <= 0) throw Error(fmt::format("sbatch told no id of a job but \"{}\"", said));
+    if (parsed.ec != std::errc() || id <= 0)
+        throw Error(fmt::format("sbatch printed \"{}\" instead of the id of a job", said));
     return id;
 }
 
@@ -60,8 +61,7 @@ void require_slurm()
         if (program_path(program).empty()) missing.emplace_back(program);
     if (!missing.empty())
         throw Error(
-            fmt::format("--farm slurm: {} {} not on PATH; install slurm-client, or give --dry-run to see the "
-                        "scripts",
+            fmt::format("--farm slurm: {} {} not on the PATH; install slurm-client, or see the scripts with --dry-run",
                         fmt::join(missing, " and "), missing.size() == 1 ? "is" : "are"));
 }
 
@@ -164,8 +164,7 @@ void require_free(const FarmJob& job)
     const SubmittedJob before = SubmittedJob::read(job.file());
     if (const Queue queue = queued(jobs_of(before)); !queue.empty())
         throw Error(
-            fmt::format("{} tasks of the job of {} are queued or run; wait for them, or give `rapid farm cancel "
-                        "{}`",
+            fmt::format("{} tasks of the job in {} are queued or running; wait for them, or run `rapid farm cancel {}`",
                         queue.size(), job.file().string(), job.file().string()));
 }
 
@@ -196,7 +195,7 @@ TaskState state_of(const Queue& queue, std::int64_t job, std::size_t number, con
 class Farm : public Command {
 public:
     std::string name() const override { return "farm"; }
-    std::string doc() const override { return "tells of jobs on a farm, cancels them, and runs again what is missing"; }
+    std::string doc() const override { return "reports on jobs on a farm, cancels them, and repeats failed tasks"; }
 
     void declare(Options& options) override
     {
@@ -204,7 +203,7 @@ public:
             .type_name("")
             .required()
             .one_of({"status", "cancel", "retry"});
-        options.add_option("FILE", file_, "FARM.json, which --farm has written beside the outputs")
+        options.add_option("FILE", file_, "FARM.json, which --farm has written next to the outputs")
             .type_name("")
             .required();
         options.add_flag("--json", json_, "with status: as JSON");
@@ -212,7 +211,7 @@ public:
 
     int run(const CommonOptions&) override
     {
-        if (json_ && action_ != "status") throw Error("--json is for status; leave it out");
+        if (json_ && action_ != "status") throw Error("--json belongs to status; remove it");
         SubmittedJob submitted = SubmittedJob::read(file_);
         require_slurm();
         const std::vector<TaskState> states = states_of(submitted);
@@ -298,14 +297,14 @@ private:
             for (const std::size_t task : again) submitted.arrays[task - 1] = array;
             submitted.write();
             waits_for.push_back(fmt::format("{}", array));
-            print(fmt::format("job {}: {} tasks again: {}\n", array, again.size(), ranges_of(again)));
+            print(fmt::format("job {}: {} tasks repeated: {}\n", array, again.size(), ranges_of(again)));
         }
         if (!has_last) return status_done;
         if (is_open(last)) cancel({submitted.last});  // it waits for tasks that have failed
         fs::remove(submitted.job.status_file(0));
         submitted.last = submit_last(submitted.job, waits_for);
         submitted.write();
-        print(fmt::format("job {}: {}, when they are done\n", submitted.last, submitted.job.name_of_last()));
+        print(fmt::format("job {}: {}, after the others\n", submitted.last, submitted.job.name_of_last()));
         return status_done;
     }
 
@@ -325,7 +324,7 @@ void FarmOptions::declare(Options& options)
                 if (text != "slurm") throw Error(fmt::format("--farm = \"{}\"; it must be slurm", text));
                 farm_ = text;
             },
-            "submits to a farm in place of running here: slurm")
+            "submits to a farm instead of running here: slurm")
         .type_name("slurm");
     options
         .add_repeated(
@@ -334,17 +333,17 @@ void FarmOptions::declare(Options& options)
                 for (const std::string& text : strings)
                     for (std::string& word : split_words(text)) options_.push_back(std::move(word));
             },
-            "options of sbatch, untouched: \"-p fx -t 2:00:00\"")
+            "options that are passed to sbatch: \"-p fx -t 2:00:00\"")
         .type_name("OPTIONS")
         .one_value();
-    options.add_flag("--dry-run", dry_run_, "with --farm: prints the scripts, and submits nothing");
+    options.add_flag("--dry-run", dry_run_, "with --farm: prints the scripts and submits nothing");
 }
 
 void FarmOptions::check() const
 {
     if (requested()) return;
-    if (!options_.empty()) throw Error("--farm-options are for --farm; give --farm slurm, too");
-    if (dry_run_) throw Error("--dry-run is for --farm; give --farm slurm, too");
+    if (!options_.empty()) throw Error("--farm-options needs --farm slurm");
+    if (dry_run_) throw Error("--dry-run needs --farm slurm");
 }
 
 std::vector<std::string> FarmOptions::words(const Options& options, const std::vector<std::string>& others) const
@@ -385,7 +384,7 @@ int FarmOptions::submit(FarmJob job) const
     if (!last.empty()) {
         submitted.last = submit_last(submitted.job, {fmt::format("{}", array)});
         submitted.write();
-        print(fmt::format("job {}: {}, when they are done\n", submitted.last, submitted.job.name_of_last()));
+        print(fmt::format("job {}: {}, after the others\n", submitted.last, submitted.job.name_of_last()));
     }
     print(fmt::format("rapid farm status {}\n", submitted.job.file().string()));
     return status_done;

@@ -134,7 +134,7 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
     try {
         const CheckedJson json = CheckedJson::parse(InputFile(file).text());
         if (const int version = json.at("rapid_farm").get<int>(); version != job_version)
-            throw Error(fmt::format("is of version {}; it must be {}", version, job_version));
+            throw Error(fmt::format("has version {}; it must be {}", version, job_version));
         SubmittedJob submitted;
         FarmJob& job = submitted.job;
         job.name = json.at("name");
@@ -154,9 +154,9 @@ SubmittedJob SubmittedJob::read(const fs::path& file)
     } catch (Error& error) {
         throw error.at({file.string(), 0});
     } catch (const CheckedJson::parse_error& error) {  // its text holds all of the unparsable input
-        throw Error(fmt::format("is no FARM.json: byte {} is none of JSON", error.byte)).at({file.string(), 0});
+        throw Error(fmt::format("is not a FARM.json: byte {} is not valid JSON", error.byte)).at({file.string(), 0});
     } catch (const CheckedJson::exception& error) {
-        throw Error(fmt::format("is no FARM.json: {}", error.what())).at({file.string(), 0});
+        throw Error(fmt::format("is not a FARM.json: {}", error.what())).at({file.string(), 0});
     }
 }
 

@@ -43,8 +43,8 @@ void read_camera(const std::string& text, PictureSettings& pictures)
     const bool right = (n.size() == 6 || n.size() == 7) && (n.size() == 6 || (n[6] > 0 && n[6] < 180));
     if (!right || std::equal(n.begin(), n.begin() + 3, n.begin() + 3))
         throw Error(
-            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its place, "
-                        "another that it looks at, and its vertical angle of view, in degrees",
+            fmt::format("--camera = \"{}\"; it must be PX,PY,PZ,TX,TY,TZ or PX,PY,PZ,TX,TY,TZ,FOV: its position, its "
+                        "target, which must differ, and its vertical angle of view in degrees",
                         text));
     pictures.camera.position = {n[0], n[1], n[2]};
     pictures.camera.target = {n[3], n[4], n[5]};
@@ -76,15 +76,16 @@ void FileOptions::declare(Options& options)
                 for (const std::string& text : strings) parse_output_target(text);
                 files_.outputs = strings;
             },
-            fmt::format("writes each frame: #### is its number, the extension chooses the format ({}, films: {}); "
-                        "attributes behind a colon are written besides P, v and id, without them all are",
-                        extensions(/*of_films=*/false), extensions(/*of_films=*/true)))
+            fmt::format(
+                "writes each frame: #### is its number, and the extension selects the format ({}; films: {}). After a "
+                "colon, names of attributes to write in addition to P, v and id; without names all are written",
+                extensions(/*of_films=*/false), extensions(/*of_films=*/true)))
         .type_name("PATTERN[:ATTR,ATTR]")
         .one_value();
     options
         .add_option(
             "--camera", [this](const std::string& text) { read_camera(text, files_.pictures); },
-            "for pictures: the camera's place, what it looks at, and its vertical angle of view in degrees")
+            "for pictures: the position of the camera, its target, and its vertical angle of view in degrees")
         .type_name("PX,PY,PZ,TX,TY,TZ[,FOV]");
     options
         .add_option(

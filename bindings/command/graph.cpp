@@ -13,15 +13,15 @@ namespace {
 class GraphCommand : public Command, public Confined {
 public:
     std::string name() const override { return "graph"; }
-    std::string doc() const override { return "draws a graph: its nodes, from Create to Solve and back"; }
+    std::string doc() const override { return "draws the nodes of a graph and their connections"; }
 
     void declare(Options& options) override
     {
         graph_.declare(options);
         options
             .add_option("-o,--output", file_,
-                        "the file: .svg, .dot (Graphviz's language) or .json (nodes, edges and their places) [default: "
-                        ".dot to standard output]")
+                        "the file: .svg, .dot (Graphviz's language) or .json (nodes, edges and their positions) "
+                        "[default: .dot to standard output]")
             .type_name("FILE");
         untrusted_.declare(options, "graph");
     }
@@ -37,10 +37,10 @@ public:
     {
         const std::string extension = std::filesystem::path(file_).extension();
         if (!file_.empty() && extension != ".svg" && extension != ".dot" && extension != ".json")
-            throw Error(fmt::format("-o {}: it must be a file of .svg, .dot or .json", file_));
+            throw Error(fmt::format("-o {}: the file must be .svg, .dot or .json", file_));
         if (untrusted_.requested() && !file_.empty() && extension != ".dot")
-            throw Error(fmt::format(
-                "-o {}: dot, a program of its own, lays it out, which --untrusted forbids; write .dot", file_));
+            throw Error(fmt::format("-o {} needs the program dot, which --untrusted does not allow; write .dot instead",
+                                    file_));
         Threads threads(common.threads);
         return threads.run([&] {
             Scene scene = graph_.open(common);

@@ -17,7 +17,7 @@ constexpr std::size_t max_warning_bytes = 4000;  // bytes printed at most
 class Info : public Command, public Confined {
 public:
     std::string name() const override { return "info"; }
-    std::string doc() const override { return "tells what a cache file or sequence holds"; }
+    std::string doc() const override { return "describes a cache file or sequence"; }
 
     void declare(Options& options) override
     {
@@ -50,7 +50,7 @@ public:
                 if (!json_ && cache.sequence) print(path.string() + '\n');
                 if (!json_) print(report.text);
                 for (const std::string& what : points.warnings())
-                    if (!json_) print(fmt::format("left out    {}\n", shortened(what, max_warning_bytes)));
+                    if (!json_) print(fmt::format("skipped     {}\n", shortened(what, max_warning_bytes)));
                 if (cache.sequence) json.member("frame", frame);
                 json.add_members(CheckedJson::parse(report.json));
                 json.member("left_out", points.warnings());

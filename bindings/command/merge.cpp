@@ -14,17 +14,21 @@ namespace {
 class Merge : public Command, public Confined {
 public:
     std::string name() const override { return "merge"; }
-    std::string doc() const override { return "puts the parts of a run together, bit for bit as the whole run"; }
+    std::string doc() const override
+    {
+        return "merges the parts of a run; the result is bit-identical to the whole run";
+    }
 
     void declare(Options& options) override
     {
-        options.add_option("-o,--output", output_, "the files of the whole: #### is the frame's number")
+        options.add_option("-o,--output", output_, "the merged files: #### is the frame number")
             .type_name("WHOLE")
             .required();
-        options.add_option("PART", parts_, "the files of each part, as -o of run had them; {part} stands for all parts")
+        options
+            .add_option("PART", parts_, "the files of the parts, as -o of run named them; {part} stands for all parts")
             .type_name("")
             .required();
-        options.add_flag("--quiet", quiet_, "says nothing but errors");
+        options.add_flag("--quiet", quiet_, "prints only errors");
         untrusted_.declare(options, "file");
     }
 
@@ -52,7 +56,7 @@ public:
                 return status_failed;
             }
             if (!quiet_)
-                print(fmt::format("{} frames of {} parts, {} points: {}\n", merged->frames, merged->parts,
+                print(fmt::format("merged {} frames of {} parts, {} points: {}\n", merged->frames, merged->parts,
                                   merged->points, output_));
             return status_done;
         });

@@ -22,15 +22,15 @@ std::string list_of(const std::vector<NodeDocument>& types)
 class Nodes : public Command {
 public:
     std::string name() const override { return "nodes"; }
-    std::string doc() const override { return "lists the nodes, or tells all about one"; }
+    std::string doc() const override { return "lists the nodes, or documents one"; }
 
     void declare(Options& options) override
     {
-        options.add_option("NAME", name_, "tells of this node alone").type_name("");
+        options.add_option("NAME", name_, "documents this node").type_name("");
         const Option json = options.add_flag("--json", json_, "as JSON");
         options
             .add_flag("--annotations", annotations_,
-                      "as the Lua language server reads them: the text of lua/rapid.d.lua")
+                      "as annotations for the Lua language server: the text of lua/rapid.d.lua")
             .excludes(json);
     }
 
@@ -39,7 +39,7 @@ public:
         const NodeDocuments documents = SceneInside::documents().value();
         for (const std::string& warning : documents.warnings) print_warning(warning);
         if (annotations_) {
-            if (!name_.empty()) throw Error("rapid nodes: --annotations is of all nodes; leave out " + name_);
+            if (!name_.empty()) throw Error("rapid nodes: --annotations describes all nodes; remove " + name_);
             print(documents.annotations);
         } else if (!name_.empty()) {
             const SceneReport& page = found_in(documents.types).page;
@@ -65,8 +65,8 @@ private:
         std::vector<std::string> names;
         for (const NodeDocument& type : types) names.push_back(type.name);
         const std::string nearest = did_you_mean(name_, names);
-        throw Error(fmt::format("unknown node \"{}\"{}", name_,
-                                nearest.empty() ? "; `rapid nodes` lists those that there are" : nearest));
+        throw Error(
+            fmt::format("unknown node \"{}\"{}", name_, nearest.empty() ? "; `rapid nodes` lists all nodes" : nearest));
     }
 
     std::string name_;

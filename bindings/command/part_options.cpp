@@ -32,7 +32,7 @@ double read_sample(const std::string& text)
 {
     const double fraction = read_positive("--sample", text);
     if (fraction > 1)
-        throw Error(fmt::format("--sample = \"{}\"; it must be a part of all points, above 0 and at most 1", text));
+        throw Error(fmt::format("--sample = \"{}\"; it must be a fraction of all points, above 0 and at most 1", text));
     return fraction;
 }
 
@@ -43,13 +43,13 @@ void PartOptions::declare(Options& options)
     options
         .add_option(
             "--part", [this](const std::string& text) { part_ = read_part(text); },
-            "simulates one of N subsets of the points, which `rapid merge` puts together; file names get _part03of16 "
-            "before the frame's number, or in place of {part}")
+            "simulates one of N subsets of the points, which `rapid merge` joins; file names get _part03of16 before "
+            "the frame number, or 03of16 instead of {part}")
         .type_name("K/N");
     options
         .add_option(
             "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
-            "simulates this part of the points, 0.01 for a hundredth: a preview with the same ids and paths")
+            "simulates this fraction of the points, 0.01 for a hundredth: a preview with the same ids and paths")
         .type_name("FRACTION");
 }
 

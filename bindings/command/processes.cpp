@@ -50,7 +50,7 @@ void signal_at_end_of(int parent, int signal)
 pid_t checked_fork()
 {
     const pid_t child = fork();
-    if (child < 0) throw file_error("no process", errno);
+    if (child < 0) throw file_error("can't start a process", errno);
     return child;
 }
 
@@ -76,7 +76,7 @@ class Capture {
 public:
     Capture() : file_(memfd_create("output", MFD_CLOEXEC))
     {
-        if (!file_) throw file_error("no memory for what a process says", errno);
+        if (!file_) throw file_error("not enough memory for the output of a process", errno);
     }
     int descriptor() const { return file_.number(); }
     // Returns the last bytes, without trailing newlines.
@@ -172,7 +172,7 @@ std::string run_in_child(const std::function<void(const ReportToParent& report)>
                          const std::function<void(const json& event)>& on_event)
 {
     int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw file_error("no pipe", errno);
+    if (pipe2(ends, O_CLOEXEC) != 0) throw file_error("can't make a pipe", errno);
     std::fflush(nullptr);
     const pid_t parent = getpid(), child = checked_fork();
     if (child == 0) {

@@ -36,41 +36,38 @@ public:
     {
         given_ = &options;
         graph_.declare(options);
-        declare_frames(
-            options, frames_,
-            fmt::format("the frames to write: 1-48, 1-48x2 (every second), or 12; all before them are computed too "
-                        "[default: {} from the first]",
-                        default_frames));
+        declare_frames(options, frames_,
+                       fmt::format("the frames to write: 1-48, 1-48x2 (every second) or 12; all frames before them are "
+                                   "computed too [default: {} from the first]",
+                                   default_frames));
         files_.declare(options);
         part_.declare(options);
-        options.add_option("--stats", options_.statistics, "writes points and seconds of each frame as JSON")
+        options.add_option("--stats", options_.statistics, "writes counts, times and errors of each frame as JSON")
             .type_name("FILE");
         options
             .add_option("--profile", options_.profile,
-                        "writes what each node, frame and file took as a trace, which Chrome and Perfetto open")
+                        "writes the time of each node, frame and file as a trace for Chrome and Perfetto")
             .type_name("FILE");
         options
             .add_option("--events", options_.events,
-                        "writes births, contacts and deaths with their places and times as points (any format that can "
-                        "be read: .csv, .bgeo, .npz, ...)")
+                        "writes births, contacts and deaths with their positions and times as points (any format that "
+                        "can be read: .csv, .bgeo, .npz, ...)")
             .type_name("FILE");
         declare_cache(options);
         options.add_flag("--durable", durable_,
-                         "a frame has its name when it is on the disk, and outlasts a power cut");
+                         "waits for the disk before a frame gets its name, so that it survives a power cut");
         options.add_flag(
             "--keep-all", keep_all_,
-            "leaves nothing out: every attribute is there, everything is evaluated each frame; the files are "
-            "the same");
+            "prunes nothing: keeps every attribute and evaluates every node in every frame; the files are the same");
         options.add_flag("--quiet", quiet_, "no progress and no summary; without --stats, no errors are estimated");
         untrusted_.declare(options, "graph");
         options.add_option("--claims", options_.claims).internal();  // where rows of a wedge claim their output files
-        options.add_flag("--watch", watch_,
-                         "runs again when the graph, or a file that it read, changes; Ctrl-C ends it");
+        options.add_flag("--watch", watch_, "runs again when the graph or a file that it read changes; Ctrl-C ends it");
         farm_.declare(options);
         options
             .add_option(
                 "--parts", [this](const std::string& text) { parts_ = read_whole("--parts", text, 1); },
-                "with --farm: tasks, each of one part of the points, which are then merged [default 1]")
+                "with --farm: number of parts of the points, each a task; they are merged at the end [default 1]")
             .type_name("N");
         options.add_flag(Watch::report_option, reports_files_).internal();  // a run of --watch
     }
@@ -78,14 +75,14 @@ public:
     void confine(const CommonOptions& common) override
     {
         if (watch_ && untrusted_.requested())
-            throw Error("--watch starts processes, which --untrusted forbids; give one of them");
+            throw Error("--watch starts processes, which --untrusted does not allow; remove one of them");
         if (watch_ && cache_.requested())
-            throw Error("--watch runs a graph that changes, of which --cache holds nothing; give one of them");
+            throw Error("--watch runs a changing graph, which --cache can't resume; remove one of them");
         if (!farm_.requested()) cache_.check();  // on a farm each task has its own
         if (cache_.again() && !cache_.requested())
-            throw Error("--again says what to do with a --cache; give one, or leave it out");
+            throw Error("--again replaces the contents of a cache; add --cache DIR, or remove --again");
         if (untrusted_.requested() && files_.makes_films())
-            throw Error("films are made by a program of its own, which --untrusted forbids; write pictures (.png)");
+            throw Error("films need the program ffmpeg, which --untrusted does not allow; write pictures (.png)");
         check_farm();
         options_.frames = frames_;
         options_.cache.folder = cache_.folder();
@@ -113,7 +110,7 @@ public:
             _exit(status);
         };
         GracefulEnd end(grace_, [&](int signal) {
-            abandon(128 + signal, "interrupted; the frame took longer than the --grace, and is dropped");
+            abandon(128 + signal, "interrupted; the frame took longer than --grace allows and is dropped");
         });
         const SignalThread signals([&](int signal) {
             if (end.request(signal))
@@ -142,13 +139,13 @@ private:
     void declare_cache(Options& options)
     {
         cache_.declare(options,
-                       "keeps snapshots in this folder, and goes on behind the one that is nearest to the first frame "
-                       "that is still to be computed; frames that are there already are left as they are",
-                       "computes and writes all frames, whatever the cache holds");
+                       "stores snapshots in this folder and resumes from the last one before the first missing frame; "
+                       "existing frames are not computed again",
+                       "computes and writes all frames, even if the cache has them");
         options
             .add_option(
                 "--grace", [this](const std::string& text) { grace_ = read_positive("--grace", text); },
-                "with --cache: the time after SIGTERM or Ctrl-C for the frame to end and a snapshot [default 20]")
+                "with --cache: time after SIGTERM or Ctrl-C to finish the frame and write a snapshot [default 20]")
             .type_name("SECONDS");
         // For wedge: a cache of another run is not an error.
         options.add_flag("--cache-replace", options_.cache.replace).internal();
@@ -170,12 +167,15 @@ private:
     void check_farm() const
     {
         farm_.check();
-        if (!farm_.requested() && parts_ > 1) throw Error("--parts is for --farm; give --farm slurm, or --part K/N");
+        if (!farm_.requested() && parts_ > 1)
+            throw Error("--parts needs --farm slurm; to run one part here, give --part K/N");
         if (parts_ > max_parts) throw Error(fmt::format("--parts = {}; it must be at most {}", parts_, max_parts));
         if (!farm_.requested()) return;
-        if (watch_) throw Error("--watch runs here, and --farm elsewhere; give one of them");
+        if (watch_) throw Error("--watch runs here and --farm elsewhere; remove one of them");
         if (untrusted_.requested())
-            throw Error("--farm starts programs, which --untrusted forbids; submit `rapid run --untrusted` by sbatch");
+            throw Error(
+                "--farm starts programs, which --untrusted does not allow; submit `rapid run --untrusted` with sbatch "
+                "yourself");
         if (parts_ > 1 && part_.part()) throw Error("--parts and --part are given together; keep one of them");
     }
 
@@ -209,7 +209,7 @@ private:
         }
         for (const auto& [whole, pattern] : merges)
             job.last.push_back({"merge", "--quiet", "--output=" + whole, pattern});
-        if (job.last.empty()) throw Error("--parts: nothing is written that could be put together; give -o");
+        if (job.last.empty()) throw Error("--parts: no output files to merge; give -o");
         return farm_.submit(std::move(job));
     }
 

@@ -50,7 +50,7 @@ int RunTerminal::end(const RunOutcome& outcome, int signal)
         print_error(*outcome.error, verbose_);
     else
         print_error(
-            Error(fmt::format("interrupted after frame {}; the same command goes on behind it", outcome.last_frame)),
+            Error(fmt::format("interrupted after frame {}; the same command continues from there", outcome.last_frame)),
             verbose_);
     print_unwritten(outcome.unwritten);
     return has_failed ? status_failed : 128 + signal;

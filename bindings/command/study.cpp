@@ -222,7 +222,7 @@ void do_work(StudySource source, int threads, const ChildWork& work, const Repor
 class StudyCommand : public Command, public Confined {
 public:
     std::string name() const override { return "study"; }
-    std::string doc() const override { return "shows the error of a scene against its run time, at many settings"; }
+    std::string doc() const override { return "measures the error of a scene against its run time at many settings"; }
 
     void declare(Options& options) override
     {
@@ -232,33 +232,37 @@ public:
             options.add_option(option, strings, doc).type_name(type).one_value();
         };
         list("--sweep", sweep_, "NODE.PARAM=A,B,...",
-             "of a graph: the values that a node's parameter takes; NODE is its name, or its type where one node has "
-             "it");
+             "for a graph: the values of a parameter; NODE is a node's name, or its type if only one node has it");
         list("--reference", reference_, "VALUE",
-             "of a graph: the value that is taken for right (of several swept parameters: NODE.PARAM=VALUE)");
-        list("--lines", lines_, "NODE.PARAM", "of a graph: a swept parameter that tells the lines of the plot apart");
-        declare_frames(
-            options, frames_,
-            fmt::format("of a graph: the first frame and the last: 1-48 [default: {} from the first]", default_frames));
+             "for a graph: the value to compare with (with several swept parameters: NODE.PARAM=VALUE)");
+        list("--lines", lines_, "NODE.PARAM",
+             "for a graph: a swept parameter with one line in the plot for each value");
+        declare_frames(options, frames_,
+                       fmt::format("for a graph: the first and the last frame: 1-48 [default: {} from the first]",
+                                   default_frames));
         const Study defaults;
         options
-            .add_option("--error", error_,
-                        fmt::format("of a graph: rms, max or p95; or residual, of its constraints [default {}]",
-                                    defaults.error))
+            .add_option(
+                "--error", error_,
+                fmt::format(
+                    "for a graph: rms, max or p95 of the positions, or residual of the constraints [default {}]",
+                    defaults.error))
             .one_of({"rms", "max", "p95", "residual"})
             .type_name("NORM");
-        options.add_option("--error-frames", error_frames_, "of a graph: all but the first, or the last [default all]")
+        options
+            .add_option("--error-frames", error_frames_,
+                        "for a graph: all frames but the first, or the last [default all]")
             .one_of({"all", "last"})
             .type_name("all|last");
         options
             .add_option(
                 "--repeat", [this](const std::string& text) { repeat_ = read_repeat(text); },
-                fmt::format("timed runs of each row, of which the median is shown [default {}, or what the study says]",
+                fmt::format("timed runs of each row; the median is shown [default {}, or as the study says]",
                             defaults.repeat_runs))
             .type_name("N");
-        options.add_option("-o,--output", folder_, "where study.json and study.svg are written [default: here]")
+        options.add_option("-o,--output", folder_, "folder for study.json and study.svg [default: the current one]")
             .type_name("DIR");
-        options.add_flag("--json", json_, "prints what study.json holds, in place of the table");
+        options.add_flag("--json", json_, "prints study.json instead of the table");
         options.add_flag("--quiet", quiet_, "no progress");
         untrusted_.declare(options, "graph");
     }
@@ -313,9 +317,9 @@ private:
         }
         if (error_) study.error = *error_;
         if (!study.compares() && !reference_.empty())
-            throw Error("--reference: a residual is compared with nothing; leave it out");
+            throw Error("--reference: a residual needs no reference; remove it");
         if (study.compares() && reference_.empty())
-            throw Error("--reference is missing; give the value that is taken for right, such as --reference 64");
+            throw Error("--reference is missing; give the value to compare with, such as --reference 64");
         if (study.compares()) study.reference.emplace();
         for (const std::string& text : reference_) {
             if (study.sweep.size() == 1 && text.find('=') == std::string::npos) {
@@ -329,8 +333,9 @@ private:
         study.lines = lines_;
         study.last_frame_only = error_frames_ == "last";
         if (frames_) {
-            if (frames_->step != 1) throw Error("-f: a study compares every frame; leave out the step");
-            if (frames_->last == frames_->first) throw Error("-f: a study needs a first frame and a last: 1-48");
+            if (frames_->step != 1) throw Error("-f: a study compares every frame; remove the step");
+            if (frames_->last == frames_->first)
+                throw Error("-f: a study needs a first and a last frame, such as 1-48");
             study.first = frames_->first;
             study.last = frames_->last;
         } else {
@@ -376,7 +381,7 @@ private:
                                                 {frames_.has_value(), "-f"},
                                                 {error_.has_value(), "--error"},
                                                 {error_frames_.has_value(), "--error-frames"}})
-                if (given) throw Error(fmt::format("{} goes with --sweep; a study file says it itself", option));
+                if (given) throw Error(fmt::format("{} needs --sweep; a study file contains it", option));
         const Study study = is_scene() ? requested() : Study();
         const Outcome outcome = in_child([&](const StudySource& source, const StudyScene::Progress&) -> json {
             if (!source.is_scene) return json_of(read_study(source));

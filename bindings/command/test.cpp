@@ -30,7 +30,7 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
         if (!fs::exists(argument, none)) throw Error("no such file or folder").at({argument, 0});
         if (!fs::is_directory(argument)) {
             // Each process of a file reads it again, and a pipe would block.
-            if (!fs::is_regular_file(argument)) throw Error("it is not a regular file").at({argument, 0});
+            if (!fs::is_regular_file(argument)) throw Error("is not a regular file").at({argument, 0});
             files.emplace_back(argument);
             continue;
         }
@@ -50,7 +50,7 @@ std::vector<fs::path> find_tests(const std::vector<std::string>& arguments)
 class Test : public Command, public Confined {
 public:
     std::string name() const override { return "test"; }
-    std::string doc() const override { return "runs script-level tests"; }
+    std::string doc() const override { return "runs tests written in Lua"; }
 
     void declare(Options& options) override
     {
@@ -59,15 +59,15 @@ public:
         options
             .add_option(
                 "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
-                "files that run at a time [default: the number of processors]")
+                "number of files that run at the same time [default: the number of processors]")
             .type_name("N");
-        options.add_option("--format", format_, "what is printed: text, tap or junit")
+        options.add_option("--format", format_, "format of the report: text, tap or junit")
             .type_name("")
             .one_of({std::begin(TestReport::formats), std::end(TestReport::formats)});
         options
             .add_option(
                 "--slowest", [this](const std::string& text) { slowest_ = read_whole("--slowest", text, 1); },
-                "lists the N slowest tests with their seconds; text only")
+                "lists the N slowest tests with their seconds (text only)")
             .type_name("N");
         untrusted_.declare(options, "test");
         // Internal options, for the process of one file.
@@ -95,7 +95,7 @@ public:
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         setenv("RAPID_BIN", program.c_str(), 0);  // for tests of the command itself
         if (slowest_ > 0 && format_ != "text")
-            throw Error(fmt::format("--slowest does not go with --format {}; use --format text", format_));
+            throw Error(fmt::format("--slowest needs --format text, not {}", format_));
         report_ = TestReport::make(format_, common.verbose, static_cast<std::size_t>(slowest_));
         run_files(find_tests(files_), common);
         const TestCounts& counts = counts_;

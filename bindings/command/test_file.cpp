@@ -45,7 +45,7 @@ void run_tests_as_child(const std::string& file, const SceneTestOptions& options
 void TestFile::Capture::open()
 {
     file_ = Descriptor(memfd_create("output", MFD_CLOEXEC));
-    if (!file_) throw file_error("no memory for what a test prints", errno);
+    if (!file_) throw file_error("not enough memory for the output of a test", errno);
 }
 
 std::string TestFile::Capture::take(off_t end)
@@ -79,7 +79,7 @@ TestFile::TestFile(std::filesystem::path file, std::vector<std::string> words, b
 void TestFile::start()
 {
     int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw file_error("no pipe", errno);
+    if (pipe2(ends, O_CLOEXEC) != 0) throw file_error("can't make a pipe", errno);
     reports_ = Descriptor(ends[0]);
     const Descriptor childs_end(ends[1]);
 
@@ -99,7 +99,7 @@ void TestFile::start()
     std::fflush(stdout);
     const int error = posix_spawn(&child_, "/proc/self/exe", &actions, nullptr, arguments.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw file_error("no process", error);
+    if (error != 0) throw file_error("can't start a process", error);
     unread_.clear();
     running_.clear();
     all_reported_ = false;

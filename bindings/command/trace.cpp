@@ -15,7 +15,7 @@ namespace {
 class Trace : public Command, public Confined {
 public:
     std::string name() const override { return "trace"; }
-    std::string doc() const override { return "tells the lives of single points"; }
+    std::string doc() const override { return "reports the lives of single points"; }
 
     void declare(Options& options) override
     {
@@ -27,13 +27,13 @@ public:
                     std::istringstream words(text);
                     for (std::string word; std::getline(words, word, ',');) ids_.push_back(read_whole("--id", word, 0));
                 },
-                "the points, by their ids: 17 or 17,40")
+                "the ids of the points: 17 or 17,40")
             .type_name("N[,M...]")
             .required();
-        options.add_option("--of", create_, "the create whose points they are [default: every one]").type_name("NAME");
+        options.add_option("--of", create_, "the create node of the points [default: all]").type_name("NAME");
         declare_frames(
             options, frames_,
-            fmt::format("the frames that are told; all before them are computed too [default: {} from the first]",
+            fmt::format("the frames to report; all frames before them are computed too [default: {} from the first]",
                         default_frames));
         options.add_flag("--json", json_, "as JSON");
         untrusted_.declare(options, "graph");
@@ -56,7 +56,7 @@ public:
             const SceneTrace trace = scene.trace({ids_, create_, frames.first, frames.last, frames.step}).value();
             if (trace.fault) print_error(*trace.fault, common.verbose);
             for (const std::int64_t id : trace.unborn)
-                print_warning(fmt::format("no point has the id {} up to frame {}", id, frames.last));
+                print_warning(fmt::format("no point up to frame {1} has the id {0}", id, frames.last));
             print(json_ ? trace.lives.json + '\n' : trace.lives.text);
             return trace.fault || trace.lives.text.empty() ? status_failed : status_done;
         });

@@ -36,7 +36,7 @@ sigset_t watched_signals()
 
 int checked(int descriptor, const char* what)
 {
-    if (descriptor < 0) throw Error(fmt::format("--watch: no {}: {}", what, std::strerror(errno)));
+    if (descriptor < 0) throw Error(fmt::format("--watch: can't make {}: {}", what, std::strerror(errno)));
     return descriptor;
 }
 

@@ -77,10 +77,10 @@ void check_settings(const std::vector<SweptSetting>& settings, bool zip)
 {
     std::set<std::string> names;
     for (const SweptSetting& setting : settings) {
-        if (!names.insert(setting.name).second) throw Error(fmt::format("--vary: {} is varied twice", setting.name));
+        if (!names.insert(setting.name).second) throw Error(fmt::format("--vary: {} is given twice", setting.name));
         const std::size_t count = setting.values.size(), first = settings.front().values.size();
         if (zip && count != first)
-            throw Error(fmt::format("--zip: {} has {} values and {} has {}; they must have as many",
+            throw Error(fmt::format("--zip: {} has {} values and {} has {}; give all the same number",
                                     settings.front().name, first, setting.name, count));
     }
 }
@@ -91,7 +91,8 @@ std::vector<Settings> combinations(const std::vector<SweptSetting>& settings, bo
     std::size_t count = 1;
     for (const SweptSetting& setting : settings) {
         count = zip ? setting.values.size() : count * setting.values.size();
-        if (count > most) throw Error(fmt::format("--vary: there are more than {} rows; vary less at a time", most));
+        if (count > most)
+            throw Error(fmt::format("--vary: there are more than {} combinations; give fewer values", most));
     }
     std::vector<Settings> rows(count);
     for (std::size_t row = 0; row < count; ++row) {
@@ -141,14 +142,15 @@ std::string with_values(const std::string& pattern, const Settings& row,
         if (found == names.end()) {
             std::vector<std::string> known;
             for (const auto& [other, place] : names) known.push_back(other);
-            throw Error(fmt::format("-o {}: {{{}}} is not varied{}", pattern, name, did_you_mean(name, known)));
+            throw Error(fmt::format("-o {}: {{{}}} is not the name of a varied parameter{}", pattern, name,
+                                    did_you_mean(name, known)));
         }
         std::string value = row[found->second].second;
         std::erase_if(value, [](char c) { return c == '{' || c == '}' || c == ' '; });  // of a vec3
         if (value.empty() || value.find_first_of("/#$%:") != std::string::npos || value.front() == '.')
             throw Error(
-                fmt::format("-o {}: the value {} of {} can't be a part of a file's name; leave it out of the "
-                            "pattern, or vary a parameter with plain values",
+                fmt::format("-o {}: the value {} of {} can't be part of a file name; remove it from the pattern, or "
+                            "vary a parameter with plain values",
                             pattern, value, name));
         result += value;
     }
@@ -175,10 +177,10 @@ std::string missing_names(const std::string& pattern, const std::vector<SweptSet
 [[noreturn]] void refuse_same_files(const std::string& pattern, const std::vector<SweptSetting>& settings,
                                     const std::string& row, const std::string& other)
 {
-    if (row == other) throw Error(fmt::format("--vary: {} is there twice; leave one out", row));
+    if (row == other) throw Error(fmt::format("--vary: {} appears twice; remove one", row));
     const std::string missing = missing_names(pattern, settings);
     throw Error(fmt::format("-o {}: {} and {} write the same files; {}", pattern, row, other,
-                            missing.empty() ? "leave one out" : fmt::format("put {} into the pattern", missing)));
+                            missing.empty() ? "remove one" : fmt::format("put {} into the pattern", missing)));
 }
 
 // Returns all combinations, with the last setting changing fastest; with zip, the n-th values together. In a pattern
@@ -228,7 +230,7 @@ void read_statistics(const fs::path& file, WedgeResult& result)
                 result.error = {error.at("position_p50"), p95, error.at("position_max"), frame.at("frame")};
         }
     } catch (const CheckedJson::exception&) {
-        result.failure = fmt::format("{}: it does not hold the statistics of a run", file.string());
+        result.failure = fmt::format("{}: does not contain the statistics of a run", file.string());
     }
 }
 
@@ -260,7 +262,7 @@ std::string table_of(const std::vector<SweptSetting>& varied, const std::vector<
                                        result.error ? fmt::format("{:.2g}", result.error->p95) : "not estimated",
                                        with_separators(result.contacts)});
     }
-    return table_text(table) + "error: since birth, estimated; 95 % of the points are within it in every frame\n";
+    return table_text(table) + "error: estimated, since birth; in every frame 95 % of the points are within it\n";
 }
 
 void add_row(JsonText& json, const WedgeRow& row)
@@ -309,7 +311,7 @@ bool write_sheet(const fs::path& file, const std::vector<SweptSetting>& varied, 
 class WedgeCommand : public Command, public Confined {
 public:
     std::string name() const override { return "wedge"; }
-    std::string doc() const override { return "runs a graph at many settings"; }
+    std::string doc() const override { return "runs a graph with many settings"; }
 
     void declare(Options& options) override
     {
@@ -322,22 +324,22 @@ public:
                     for (const std::string& text : strings)
                         settings_.push_back(read_swept_setting("--vary", text, "NAME"));
                 },
-                "the values of a rapid.param, or of a node's parameter: solve.substeps=1,4")
+                "values of a rapid.param or of a node's parameter: solve.substeps=1,4")
             .type_name("NAME=A,B,...")
             .one_value()
             .required();
         options.add_flag("--zip", zip_,
-                         "the n-th values of all that is varied go together, in place of all combinations");
+                         "combines the nth values of all varied parameters, instead of running all combinations");
         declare_frames(options, frames_,
-                       fmt::format("the frames to write, as of run [default: {} from the first]", default_frames));
+                       fmt::format("the frames to write, as for run [default: {} from the first]", default_frames));
         files_.declare(options);
         options
             .add_option(
                 "--jobs", [this](const std::string& text) { jobs_ = read_whole("--jobs", text, 1); },
-                "rows that run at a time, which share the threads [default 1]")
+                "number of runs at the same time; they share the threads [default 1]")
             .type_name("N");
-        cache_.declare(options, "rows keep snapshots too, in folders below this one, as of run",
-                       "computes rows that are done, too");
+        cache_.declare(options, "also stores snapshots, in folders below this one, as for run",
+                       "also computes runs that are complete");
         options.add_flag("--quiet", quiet_, "no progress and no table");
         farm_.declare(options);
         options.add_option(collect_option, collect_).internal();  // the last job on a farm
@@ -408,7 +410,7 @@ private:
             const std::optional<int> status = read_status(fs::path(collect_) / fmt::format("{}.status", row + 1));
             std::string failure;
             if (!status)
-                failure = "it did not run to its end";
+                failure = "did not finish";
             else if (*status != status_done)
                 failure = fmt::format("ended with status {}; see {}", *status,
                                       (fs::path(collect_) / fmt::format("{}.log", row + 1)).string());
@@ -450,7 +452,7 @@ private:
             print('\n' + table_of(settings_, rows_));
             print(fmt::format(
                 "wrote {}{}\n", (folder_ / "wedge.json").string(),
-                drawn ? " and " + (folder_ / "wedge.png").string() : "; no contact sheet, as no -o is a .png"));
+                drawn ? " and " + (folder_ / "wedge.png").string() : "; no contact sheet, because no -o is a .png"));
         }
         const bool all_done =
             std::all_of(rows_.begin(), rows_.end(), [](const WedgeRow& row) { return row.result.failure.empty(); });

@@ -18,7 +18,7 @@ CacheFiles find_cache(const std::string& text)
     if (!pattern.has_frame()) throw Error("no such file").at({text, 0});
     CacheFiles found{text, true, pattern.existing()};
     if (found.frames.empty())
-        throw Error(fmt::format("no frame of this sequence is there; the first would be {}", pattern.expand(1)))
+        throw Error(fmt::format("no frame of this sequence exists; the first would be {}", pattern.expand(1)))
             .at({text, 0});
     return found;
 }

@@ -35,7 +35,7 @@ RunFrames read_frames(const std::string& text)
     if (*at++ != 'x') throw wrong("an x is missing");
     range.step = number();
     if (range.step < 1) throw wrong("the step must be at least 1");
-    if (at != end) throw wrong("there is more behind it");
+    if (at != end) throw wrong("there is more text after it");
     return range;
 }
 
@@ -44,7 +44,7 @@ std::int64_t read_frame(const std::string& option, const std::string& text)
     std::int32_t frame = 0;
     const char* const end = text.data() + text.size();
     if (const auto parsed = std::from_chars(text.data(), end, frame); parsed.ec != std::errc() || parsed.ptr != end)
-        throw Error(fmt::format("{} {}: it must be the number of a frame, such as 12", option, text));
+        throw Error(fmt::format("{} {}: it must be a frame number, such as 12", option, text));
     return frame;
 }
 

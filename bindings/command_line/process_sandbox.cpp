@@ -95,7 +95,8 @@ void restrict_files(const SandboxAccess& access)
 {
     const auto version =
         static_cast<int>(syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION));
-    if (version < 1) throw refused("this system has no Landlock (Linux 5.13 has, where it is switched on)", errno);
+    if (version < 1)
+        throw refused("this system has no Landlock (it needs Linux 5.13 or later, with Landlock enabled)", errno);
     landlock_ruleset_attr attributes{};
     attributes.handled_access_fs = handled_rights(version);
     const File ruleset(static_cast<int>(syscall(SYS_landlock_create_ruleset, &attributes, sizeof attributes, 0)));
@@ -132,7 +133,7 @@ void give_up_privileges()
 {
     __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
     __user_cap_data_struct own[_LINUX_CAPABILITY_U32S_3];
-    if (syscall(SYS_capget, &header, own) != 0) throw refused("privileges can't be asked for", errno);
+    if (syscall(SYS_capget, &header, own) != 0) throw refused("privileges can't be read", errno);
     for (__user_cap_data_struct& word : own) word.inheritable = 0;
     if (syscall(SYS_capset, &header, own) != 0) throw refused("privileges can't be given up", errno);
     if (getuid() != 0 && geteuid() != 0) return;  // others have none after the process has restarted
@@ -186,7 +187,7 @@ void enter_sandbox(const SandboxAccess& access)
 void complete_sandbox(Processes processes, Connections connections)
 {
     const File root(open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (root >= 0) throw Error("--untrusted: the process is not inside of Landlock; nothing was run");
+    if (root >= 0) throw Error("--untrusted: the process is not inside Landlock; nothing was run");
     limit(RLIMIT_CORE, 0);
 #ifndef RAPID_ADDRESS_SANITIZER  // its mappings exceed the limit
     limit(RLIMIT_DATA, static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)));

@@ -44,7 +44,7 @@ void become_program(const Program& program, std::vector<std::string> arguments)
     words.push_back(nullptr);
     execv(file.c_str(), words.data());
     const int error = errno;
-    throw Error(fmt::format("{} can't be started ({}); it belongs beside {}, and is built by `ninja rapid_{}`",
+    throw Error(fmt::format("{} can't be started ({}); it belongs next to {}, and `ninja rapid_{}` builds it",
                             file.string(), std::strerror(error), this_file().string(), program.name));
 }
 

@@ -34,7 +34,7 @@ void SceneArguments::declare(Options& options)
                     settings_[text.substr(0, equals)] = text.substr(equals + 1);
                 }
             },
-            "gives a rapid.param of the graph a value, or a node's parameter: solve.substeps=4")
+            "sets a rapid.param of the graph, or a parameter of a node: solve.substeps=4")
         .type_name("NAME=VALUE")
         .one_value();
     options
@@ -46,19 +46,18 @@ void SceneArguments::declare(Options& options)
         .add_option(
             "--script-timeout",
             [this](const std::string& text) { options_.script_seconds = read_positive("--script-timeout", text); },
-            fmt::format("time that scripts may take, a frame [default {:g}]", options_.script_seconds))
+            fmt::format("limit of each stretch of script [default {:g}]", options_.script_seconds))
         .type_name("SECONDS");
     options
         .add_option(
             "--script-memory",
             [this](const std::string& text) { options_.script_memory = read_bytes("--script-memory", text); },
-            fmt::format("memory that a script's state may take: bytes, or 512M, 1G [default {}G]",
-                        options_.script_memory >> 30))
+            fmt::format("limit of Lua's memory: bytes, 512M or 1G [default {}G]", options_.script_memory >> 30))
         .type_name("BYTES");
     options
         .add_option(
             "--memory", [](const std::string& text) { set_memory_budget(read_bytes("--memory", text)); },
-            "memory that the run may take: bytes, or 512M, 16G [default: what is free]")
+            "memory budget of the run: bytes, 512M or 16G [default: the free memory]")
         .type_name("BYTES");
 }
 

@@ -22,14 +22,12 @@ void add_own_paths(SandboxAccess& access, const CommonOptions& common)
 
 void UntrustedOptions::declare(Options& options, const std::string& whose)
 {
-    options.add_flag(
-        "--untrusted", untrusted_,
-        "keeps the process from all files but those that it is asked to read and write, from sockets and from "
-        "other processes");
+    options.add_flag("--untrusted", untrusted_,
+                     "runs in a sandbox: no files except those named, no sockets, no other processes");
     options.add_flag(sandboxed_option, sandboxed_).internal();  // set in the restarted process
     options
         .add_option("--allow-read", allowed_,
-                    fmt::format("a file or folder that an --untrusted {} may read, too", whose))
+                    fmt::format("a further file or folder that an --untrusted {} may read", whose))
         .type_name("PATH")
         .one_value();
 }
@@ -37,7 +35,8 @@ void UntrustedOptions::declare(Options& options, const std::string& whose)
 void UntrustedOptions::confine(const std::function<SandboxAccess()>& access, const CommonOptions& common,
                                Processes processes, Connections connections) const
 {
-    if (!allowed_.empty() && !untrusted_) throw Error("--allow-read is for --untrusted; a graph reads what it names");
+    if (!allowed_.empty() && !untrusted_)
+        throw Error("--allow-read needs --untrusted; otherwise a graph may read any file");
     if (!untrusted_) return;
     if (!sandboxed_) {
         SandboxAccess all = access();

@@ -31,7 +31,7 @@ int make_object(State& state)
 {
     const Maker& maker = find_maker(text_at(state.lua(), 1));
     const auto options = table_at(state, 2);
-    refuse_in_kernels(state, shown_name(maker, *options), "make it outside, once");
+    refuse_in_kernels(state, shown_name(maker, *options), "make it once outside");
     return construct(state, [&] {
         ScriptHost& host = state.host();
         MakeContext context{host.folder(), host.warnings, host.options().may_write, host.options().on_read,
@@ -50,16 +50,16 @@ int make_object(State& state)
 int make_attribute(State& state)
 {
     if (lua_type(state.lua(), 1) != LUA_TSTRING)
-        throw Error("rapid.attr takes the name of an attribute: rapid.attr \"bounce\"");
+        throw Error("rapid.attr needs the name of an attribute: rapid.attr \"bounce\"");
     push_object(state, std::make_shared<AttributeName>(text_at(state.lua(), 1)));
     return 1;
 }
 
 int take_offer(State& state)
 {
-    refuse_in_kernels(state, "rapid.host", "take it outside, once");
+    refuse_in_kernels(state, "rapid.host", "get it once outside");
     if (lua_type(state.lua(), 1) != LUA_TSTRING)
-        throw Error("rapid.host takes the name of what the program offers: rapid.host \"floor\"");
+        throw Error("rapid.host needs the name of an object that the program offers: rapid.host \"floor\"");
     return construct(state, [&] {
         const auto& offers = state.host().options().offers;
         return (offers ? *offers : Offers()).object(text_at(state.lua(), 1));
@@ -70,7 +70,7 @@ std::shared_ptr<const Table> table_at(State& state, int index)
 {
     const Value value = to_value(state, index);
     const auto* table = value.get<std::shared_ptr<const Table>>();
-    if (!table) throw Error(fmt::format("a table is expected, not {}", describe(value)));
+    if (!table) throw Error(fmt::format("expected a table, not {}", describe(value)));
     return *table;
 }
 

@@ -49,7 +49,8 @@ int construct(State& state, const F& make)
         return 1;
     }
     if (call >= host.made.size())
-        throw Error("the graph file made more in a worker than at first; it must do the same each time it is run");
+        throw Error(
+            "the graph file made more objects in a worker than in the first run; it must do the same each time");
     if (const auto* failed = std::get_if<Error>(&host.made[call])) throw Error(*failed);
     push_object(state, std::get<ObjectPtr>(host.made[call]));
     return 1;

@@ -21,7 +21,7 @@ DetailRun& detail_run_of(State& state)
     lua_getfield(L, LUA_REGISTRYINDEX, run_in_registry);
     auto* run = static_cast<DetailRun*>(lua_touserdata(L, -1));
     lua_pop(L, 1);
-    if (!run) throw Error("points can't be used outside the :detail function that they were given to");
+    if (!run) throw Error("points can't be used outside the :detail function that received them");
     return *run;
 }
 
@@ -152,7 +152,7 @@ std::vector<Value> deaths_in(const PointSet& dead, const std::vector<double>& ti
 int events(State& state)
 {
     const StepRecord* record = detail_run_of(state).record;
-    if (!record) throw Error("points.events is kept where a :solve ends the chain; end it with :solve {}");
+    if (!record) throw Error("points.events needs a :solve at the end of the chain; end it with :solve {}");
     const PointSet& before = record->before;
     std::vector<Value> hits, births;
     for (const LoggedHit& hit : record->hits)

@@ -55,7 +55,8 @@ std::map<std::string, ObjectPtr> take_kernels(State& state, const NodeType& type
         if (state.is_main()) {
             kernels[param.name] = host.kernels.emplace_back(std::make_shared<Kernel>(host, source));
         } else if (source.number >= host.kernels.size()) {
-            throw Error("the graph file made more kernels in a worker than at first; it must do the same each time");
+            throw Error(
+                "the graph file made more kernels in a worker than in the first run; it must do the same each time");
         }
         if (!param.internal) {
             lua_pushnil(L);
@@ -146,7 +147,7 @@ void refuse_former_names(State& state)
     strings.erase("source");
     std::string call = fmt::format(":spawn {{ from = {}", chain.empty() ? "chain" : chain);
     for (const auto& [name, text] : strings) call += fmt::format(", {} = {}", name, text);
-    Error error(fmt::format("source is a node, whose points :spawn takes; write {} }}", call));
+    Error error(fmt::format("source is a node; :spawn emits from the points of a node: write {} }}", call));
     lua_getfield(L, 2, "name");
     if (lua_type(L, -1) == LUA_TSTRING) error.in_node(text_at(L, -1));
     throw error;
@@ -176,7 +177,7 @@ void take_inputs(State& state, Node& node)
     for (int i = 3; i <= lua_gettop(state.lua()); ++i) {
         const auto input = std::dynamic_pointer_cast<const NodeHandle>(to_object(state, i));
         if (!input)
-            throw Error(fmt::format("input {} is {}; it must be a node: call it as node:{}{{ ... }}", i - 2,
+            throw Error(fmt::format("input {} is {}; it must be a node: write node:{}{{ ... }}", i - 2,
                                     describe(to_value(state, i)), node.type->name));
         node.inputs.push_back(input->node);
     }
@@ -189,7 +190,7 @@ int make_node(State& state)
     ScriptHost& host = state.host();
     const NodeType& type = host.registry.at(text_at(state.lua(), 1));
     if (state.is_loaded())
-        throw Error(fmt::format(":{} is called while a frame runs; the graph's body makes the nodes", type.name));
+        throw Error(fmt::format(":{} is called while a frame runs; make nodes in the graph's body", type.name));
 
     const std::string& stem = type.counted_as.empty() ? type.name : type.counted_as;
     const std::string number_name = fmt::format("{}{}", stem, count_nodes(state.lua(), stem, 0) + 1);

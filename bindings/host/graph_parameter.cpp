@@ -34,7 +34,7 @@ std::vector<double> numbers_in(std::string text)
 Value parse_setting(const std::string& name, const std::string& text, const Value& fallback)
 {
     const auto refuse = [&](const char* expected) -> Value {
-        throw Error(fmt::format("{} {}={}: the parameter is {}, as its default {} is", name_of(Setting::Value), name,
+        throw Error(fmt::format("{} {}={}: the value must be {}, like the default {}", name_of(Setting::Value), name,
                                 text, expected, describe(fallback)));
     };
     if (fallback.get<std::string>()) return Value(text);
@@ -61,10 +61,10 @@ Value read_argument(const std::string& text)
 
 int declare_parameter(State& state)
 {
-    refuse_in_kernels(state, "rapid.param", "call it outside, once");
+    refuse_in_kernels(state, "rapid.param", "call it once outside");
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
-    if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param takes a name, a default and a line of documentation");
+    if (lua_type(L, 1) != LUA_TSTRING) throw Error("rapid.param needs a name, a default and a line of documentation");
     const std::string name = text_at(state.lua(), 1);
     const auto index = host.parameter_indices.find(name);
     const Session::Parameter* const known =

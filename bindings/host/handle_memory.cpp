@@ -85,8 +85,7 @@ void hold(lua_State* L, const Object& object)
     if (!full) return;
     malloc_trim(0);  // memory released by the collector
     if (!fits_in_memory(piece))
-        throw memory_exceeded("a further 64 MiB of nodes, level sets, meshes and points", piece,
-                              "let the scene make fewer");
+        throw memory_exceeded("a further 64 MiB of nodes, level sets, meshes and points", piece, "make fewer of them");
 }
 
 void release(lua_State* L, const Object& object)

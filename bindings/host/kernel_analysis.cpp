@@ -62,8 +62,8 @@ void check_calls(lua_State* L, const Location& location)
     for (const std::string& name : keys_of(L, "calls")) {
         if (name == "neighbours")
             throw Error(
-                "p has no method \"neighbours\", as a kernel sees one point; a :detail sees all of them: "
-                "points:neighbours(i, radius)")
+                "p has no method \"neighbours\", because a kernel sees only one point; use points:neighbours(i, "
+                "radius) in a :detail, which sees all points")
                 .at({location.file, number_under(L, "calls", name)});
         const std::string near = did_you_mean(name, methods);
         const std::string remedy =
@@ -78,7 +78,7 @@ void check_assignments(lua_State* L, const Location& location)
     for (const PointName& known : point_names) {
         const int line = known.read_only ? number_under(L, "writes", std::string(known.name)) : 0;
         if (line > 0)
-            throw Error(fmt::format("the kernel assigns p.{}, which is read only", known.name))
+            throw Error(fmt::format("the kernel assigns p.{}, which is read-only", known.name))
                 .at({location.file, line});
     }
 }
@@ -87,7 +87,8 @@ void check_groups(lua_State* L, const KernelSource& kernel)
 {
     const int line = number_of(L, "computed_group");
     if (line > 0 && !kernel.may_compute_groups)
-        throw Error("the kernel joins or leaves a group under a computed name; name it as a constant: p:join \"old\"")
+        throw Error(
+            "the kernel joins or leaves a group with a computed name; write the name as a constant: p:join \"old\"")
             .at({kernel.location.file, line});
 }
 

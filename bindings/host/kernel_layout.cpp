@@ -77,7 +77,7 @@ void KernelLayout::make_writable(PointSet& points) const
         if (entry.writable) add(points.group(entry.name));
     if (!fits_in_memory(bytes))
         throw memory_exceeded(fmt::format("{} attributes and groups of {} points", expanded, points.size()), bytes,
-                              "let the kernel write fewer");
+                              "write fewer in the kernel");
     for (const Entry& entry : columns)
         if (entry.writable) std::visit([](auto& column) { column.write(); }, *points.find(entry.name));
     for (const Entry& entry : groups)

@@ -27,7 +27,7 @@ void check_writable(const std::vector<std::string>& writes)
 {
     for (const PointName& known : point_names)
         if (known.read_only && std::find(writes.begin(), writes.end(), known.name) != writes.end())
-            throw Error(fmt::format("writes: {} is read only", known.name));
+            throw Error(fmt::format("writes: {} is read-only", known.name));
 }
 
 // points: edits the points one by one with a Lua function.

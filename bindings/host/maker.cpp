@@ -33,7 +33,7 @@ MakerRegistration::MakerRegistration(Declare declare) { declarations().push_back
 const Maker& find_maker(std::string_view name)
 {
     const auto found = std::find_if(makers().begin(), makers().end(), [&](const Maker& m) { return m.name == name; });
-    if (found == makers().end()) throw Error(fmt::format("rapid.{} is not there", name));
+    if (found == makers().end()) throw Error(fmt::format("rapid.{} does not exist", name));
     return *found;
 }
 

@@ -23,7 +23,7 @@ constexpr std::size_t max_text_bytes = std::size_t{64} << 20;  // bytes; more is
 
 Error too_long(const std::filesystem::path& path)
 {
-    return Error("it has more than 64 MiB, which is no scene and no module").at({shown(path), 0});
+    return Error("the file has more than 64 MiB, too much for a scene or a module").at({shown(path), 0});
 }
 
 // Reads a module, which others may have put next to the scene. Only regular files are read: a pipe would block.
@@ -68,9 +68,8 @@ std::filesystem::path lua_folder()
             if (std::filesystem::exists(installed / "host.lua", ignored)) return std::filesystem::canonical(installed);
             if (above.filename() == "bin" || above.filename().string().starts_with("lib")) break;
         }
-        throw Error(
-            fmt::format("{}: Rapid's Lua files are missing; they belong into share/rapid/lua, beside its folder",
-                        shown(own_file())));
+        throw Error(fmt::format("{}: Rapid's Lua files are missing; they belong in share/rapid/lua, next to its folder",
+                                shown(own_file())));
     }();
     return folder;
 }
@@ -101,7 +100,7 @@ std::optional<Modules::Source> Modules::find(std::string_view name, bool node, s
         return std::isalnum(c) || c == '_' || c == '-' || c == '.';
     });
     if (!words || relative.find("..") != std::string::npos) {
-        looked_in = "nothing: a module's name is made of letters, digits, _ and dots";
+        looked_in = "nothing, because the name of a module must consist of letters, digits, _ and dots";
         return std::nullopt;
     }
     std::replace(relative.begin(), relative.end(), '.', '/');

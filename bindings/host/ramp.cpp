@@ -8,8 +8,8 @@ std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value)
 {
     const auto refuse = [&](const std::string& what) {
         throw Error(
-            fmt::format("{} {}; it must be a list of keys with rising positions and values of one type, such "
-                        "as {{ {{0, 1}}, {{0.5, 4}} }} or {{ {{0, {{1, 0, 0}}}} }}",
+            fmt::format("{} {}; it must be a list of keys with increasing positions and values of one type, such as {{ "
+                        "{{0, 1}}, {{0.5, 4}} }} or {{ {{0, {{1, 0, 0}}}} }}",
                         param.name, what));
     };
     const Table* table = value.table();
@@ -22,7 +22,7 @@ std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value)
         const double* position = pair && pair->list.size() == 2 ? pair->list[0].get<double>() : nullptr;
         if (!position || !std::isfinite(*position)) refuse("has the key " + describe(key));
         if (!ramp->keys.empty() && !(*position > ramp->keys.back().first))
-            refuse(fmt::format("has the position {:g} behind {:g}", *position, ramp->keys.back().first));
+            refuse(fmt::format("has the position {:g} after {:g}", *position, ramp->keys.back().first));
         Value kept;
         if (pair->list[1].get<double>()) {
             double number = 0;
@@ -34,7 +34,7 @@ std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value)
             kept = Value(vector);
         }
         if (!ramp->keys.empty() && ramp->keys.back().second.index() != kept.index())
-            refuse("has numbers and vec3s for values");
+            refuse("has both numbers and vec3s as values");
         ramp->keys.emplace_back(*position, std::move(kept));
     }
     return ramp;

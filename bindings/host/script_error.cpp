@@ -72,8 +72,8 @@ std::string remedy_of(lua_State* L, const std::string& message)
 std::string message_of(lua_State* L, int index)
 {
     if (lua_type(L, index) == LUA_TSTRING || lua_type(L, index) == LUA_TNUMBER) return text_at(L, index);
-    if (lua_isnil(L, index)) return "error raised without a message";
-    return fmt::format("error raised with a {} instead of a message", luaL_typename(L, index));
+    if (lua_isnil(L, index)) return "the script raised an error without a message";
+    return fmt::format("the script raised an error with a {} instead of a message", luaL_typename(L, index));
 }
 
 std::string shown(const Location& location) { return fmt::format("{}:{}", location.file, location.line); }
@@ -168,7 +168,7 @@ Error take_error(lua_State* L, int status)
         lua_rawgeti(L, top, is_memory_field);
         is_memory = is_memory || lua_toboolean(L, -1) != 0;
     } else {  // no handler was called, or it failed: memory or stack ran out while describing the error
-        message = lua_isstring(L, top) ? text_at(L, top) : "an error that could not be described";
+        message = lua_isstring(L, top) ? text_at(L, top) : "an unknown error";
         if (const auto of_engine = engine_error(L, message)) {
             message = of_engine->message;
             is_memory = is_memory || of_engine->is_memory;

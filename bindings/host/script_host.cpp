@@ -54,7 +54,7 @@ std::string ScriptHost::read_graph() const
     if (options_.on_read) options_.on_read(file_);
     std::error_code ignored;
     if (std::filesystem::is_directory(file_, ignored))
-        throw Error("this is a folder; give a graph file").at({file_.string(), 0});
+        throw Error("is a folder; give a graph file").at({file_.string(), 0});
     std::optional<std::string> text = read_lua_file(file_);
     if (!text) throw Error(std::strerror(errno)).at({file_.string(), 0});
     return std::move(*text);
@@ -95,10 +95,9 @@ void check_output_name(const std::string& name, const std::string& file)
     const bool plain =
         std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f || c == '/'; });
     if (name.empty() || name.size() > most || name.front() == '.' || !plain)
-        throw Error(
-            fmt::format("the graph returns an output \"{}\"; its name, which goes into names of files, must have "
-                        "from 1 to {} bytes, no / and no control characters, and not begin with a dot",
-                        name, most))
+        throw Error(fmt::format("the graph returns an output \"{}\"; the name becomes part of file names, so it must "
+                                "have 1 to {} bytes, no / and no control characters, and must not begin with a dot",
+                                name, most))
             .at({file, 0});
 }
 
@@ -194,7 +193,9 @@ void ScriptHost::collect_outputs(State& state)
         while (lua_next(L, -2)) {
             const NodePtr output = node_at_top();
             if (lua_type(L, -2) != LUA_TSTRING || !output)
-                throw Error("the graph returns a table that holds more than nodes by name; return { main = node, ... }")
+                throw Error(
+                    "the graph returns a table that contains other things than nodes by name; return { main = node, "
+                    "... }")
                     .at({graph.file, 0});
             const std::string name = text_at(L, -2);
             check_output_name(name, graph.file);
@@ -237,9 +238,9 @@ std::unique_ptr<State> ScriptHost::make_worker()
     run_file(*state, 0);
     if (state->kernel_count() != kernels.size())
         throw Error(
-            fmt::format("the graph file made {} kernels at first and {} in a worker; it must do the same each time it "
-                        "is run",
-                        kernels.size(), state->kernel_count()))
+            fmt::format(
+                "the graph file made {} kernels in the first run and {} in a worker; it must do the same each time",
+                kernels.size(), state->kernel_count()))
             .at({graph.file, 0});
     check_kernels(*state);
     state->set_loaded();
@@ -251,7 +252,7 @@ void ScriptHost::check_kernels(State& worker) const
 {
     for (const std::shared_ptr<Kernel>& kernel : kernels)
         if (kernel->fingerprint != fingerprint_of(worker, kernel->source.number))
-            throw Error("the kernel is another one when the graph file is run again; it must do the same each time")
+            throw Error("the kernel differs when the graph file runs again; the file must do the same each time")
                 .at(kernel->source.location);
 }
 

@@ -92,23 +92,23 @@ NodeType read_type(const Table& definition, std::string_view role)
     if (type.name.empty()) throw Error("rapid.node: the name is missing");
     const std::string what = fmt::format("rapid.node \"{}\"", type.name);
     type.doc = text_field(definition, "doc", what);
-    if (type.doc.empty()) throw Error(what + ": say what it does, doc = \"...\"");
+    if (type.doc.empty()) throw Error(what + ": the documentation is missing; add doc = \"...\"");
     check_type_fields(definition, what);
     if (role.empty())
         throw Error(what +
-                    ": give it one of points = function(p, frame, params), action = function(p, step, params), "
-                    "detail = function(points, frame, params) and expand = function(input, params)");
+                    ": the function is missing; add one of points = function(p, frame, params), action = function(p, "
+                    "step, params), detail = function(points, frame, params) and expand = function(input, params)");
     type.varies = true;
     if (role == "action") type.kind = NodeKind::Dynamic;
     if (const Value* params = find_field(definition, "params")) {
         const Table* table = params->table();
-        if (!table || !table->list.empty()) throw Error(what + ": params is a table of declarations by name");
+        if (!table || !table->list.empty()) throw Error(what + ": params must be a table of declarations by name");
         for (const auto& [name, declared] : table->named) type.params.push_back(read_param(name, declared, type.name));
     }
     if (role == "points" || role == "action") type.params.push_back(group_param());
     if (role != "expand") type.params.push_back(kernel_param(role));
     if (const Value* makes = find_field(definition, "makes")) {
-        if (role == "expand") throw Error(what + ": makes belongs to points, action and detail");
+        if (role == "expand") throw Error(what + ": makes is only for points, action and detail");
         type.uses.makes = read_makes(*makes, what);
     }
     type.make = [edits = role == "points", kind = type.kind, made = type.uses.makes] {
@@ -125,7 +125,7 @@ int define_node_type(State& state)
 {
     lua_State* L = state.lua();
     ScriptHost& host = state.host();
-    if (state.is_loaded()) throw Error("rapid.node is called while a frame runs; a node's file defines it");
+    if (state.is_loaded()) throw Error("rapid.node is called while a frame runs; call it in the file of the node");
 
     const std::string_view role = role_of(L, 1);
     lua_getfield(L, 1, "name");
@@ -166,7 +166,7 @@ int complete_arguments(State& state)
     const NodeType& type = state.host().registry.at(text_at(state.lua(), 1));
     const Value given = to_value(state, 2);
     const Table* table = given.table();
-    if (!table) throw Error(fmt::format(":{} takes a table of parameters", type.name));
+    if (!table) throw Error(fmt::format(":{} needs a table of parameters", type.name));
     ScriptFields fields;
     try {
         assign_arguments(type.params, table->named, &fields);

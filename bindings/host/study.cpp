@@ -118,7 +118,8 @@ PointSet Session::study_reference(const Frame& frame, const Knobs& knobs) const
     lua_pop(L, 1);
     try {
         if (!found.table())
-            throw Error(fmt::format("it returns {}; it must return {{ P = {{{{x, y, z}}, ...}} }}", describe(found)));
+            throw Error(
+                fmt::format("the function returns {}; it must return {{ P = {{{{x, y, z}}, ...}} }}", describe(found)));
         const Maker& maker = find_maker("points.from");
         MakeContext context{host_->folder(), host_->warnings, false, {}, {}};
         const Table arguments{{}, {}, {{"columns", found}}};

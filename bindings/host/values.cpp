@@ -31,11 +31,11 @@ void read_entries(State& state, int index, Table& table)
             const double key = lua_tonumber(L, -2);
             const auto whole = static_cast<std::int64_t>(key);
             if (static_cast<double>(whole) != key)
-                throw Error(fmt::format("a table has the key {}; numbered keys are whole", key));
+                throw Error(fmt::format("a table has the key {}; numeric keys must be whole numbers", key));
             if (whole < 1 || whole > length) table.numbered.emplace(whole, to_value(state, -1));
         } else {
             throw Error(
-                fmt::format("a table has a {} as a key; keys are names or whole numbers", luaL_typename(L, -2)));
+                fmt::format("a table has a {} as a key; keys must be names or whole numbers", luaL_typename(L, -2)));
         }
         lua_pop(L, 1);
     }
@@ -132,7 +132,7 @@ Value to_value(State& state, int index)
 {
     lua_State* L = state.lua();
     if (index < 0) index = lua_gettop(L) + index + 1;
-    if (!lua_checkstack(L, 8)) throw Error("a table is nested too deep");
+    if (!lua_checkstack(L, 8)) throw Error("a table is nested too deeply");
     Value value;
     switch (lua_type(L, index)) {
         case LUA_TNIL:
@@ -169,7 +169,7 @@ ObjectPtr to_object(State& state, int index)
     lua_pop(L, 2);
     if (!ours) return nullptr;
     const ObjectPtr& object = *static_cast<ObjectPtr*>(lua_touserdata(L, index));
-    if (!object) throw Error("the object is gone: the collector has been through with it");
+    if (!object) throw Error("the object was already collected as garbage");
     return object;
 }
 

@@ -66,7 +66,7 @@ void Watchdog::watch()
                 deadline_ += overslept;
             continue;
         }
-        const std::string message = fmt::format("{}: the script runs for more than {:g} s; {} sets the limit",
+        const std::string message = fmt::format("{}: the script ran for more than {:g} s; {} sets the limit",
                                                 fmt::join(running_, ", "), limit_, name_of(Setting::ScriptSeconds));
         if (on_timeout_(message) == EndProcess) {
             std::fprintf(stderr, "%s\n", message.c_str());

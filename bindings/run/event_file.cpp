@@ -93,7 +93,7 @@ PointSet points_of_record(std::string_view record)
 {
     std::int64_t frame = 0;
     if (record.size() < sizeof frame || (record.size() - sizeof frame) % sizeof(Event) != 0)
-        throw Error("it is no log of events");
+        throw Error("it is not a log of events");
     std::memcpy(&frame, record.data(), sizeof frame);
     record.remove_prefix(sizeof frame);
     std::vector<Event> events(record.size() / sizeof(Event));
@@ -121,7 +121,7 @@ void EventFile::check() const
     const auto fits = [&](const Format& format) { return holds_events(format) && format.extension == extension; };
     if (std::none_of(formats().begin(), formats().end(), fits))
         throw Error(
-            fmt::format("{} {}: the events are points; give a file of {}", name_of(Setting::Events), path_, known));
+            fmt::format("{} {}: events are written as points; use one of {}", name_of(Setting::Events), path_, known));
 }
 
 void EventFile::add(const FrameResult& result)
@@ -141,7 +141,7 @@ void EventFile::add(const FrameResult& result)
             log_->append(record_of(result.frame, events));
         } catch (const std::exception& error) {
             log_.reset();
-            failure_ = fmt::format("{}: {}; no further snapshots are kept", log_path_.string(), error.what());
+            failure_ = fmt::format("{}: {}; no further snapshots are stored", log_path_.string(), error.what());
         }
 }
 
@@ -151,7 +151,7 @@ void EventFile::log_to(const std::filesystem::path& log)
     try {
         log_.emplace(log);
     } catch (const Error& error) {
-        failure_ = fmt::format("{}: {}; no snapshots are kept", log.string(), error.what());
+        failure_ = fmt::format("{}: {}; no snapshots are stored", log.string(), error.what());
     }
 }
 

@@ -70,7 +70,7 @@ void add_node(Fingerprint& fingerprint, const PlannedNode& planned, const Plan& 
     const Node& node = *planned.node;
     std::string inputs;
     for (const std::size_t input : planned.inputs)
-        inputs += fmt::format("{}{}", inputs.empty() ? " behind " : ", ", plan.nodes[input].node->name);
+        inputs += fmt::format("{}{}", inputs.empty() ? " after " : ", ", plan.nodes[input].node->name);
     fingerprint[node.name] = node.type->name + inputs;
     for (const auto& [name, value] : node.arguments) fingerprint[node.name + "." + name] = fingerprint_text(value);
 }
@@ -102,13 +102,12 @@ std::string difference_of_code(const std::string& file, const std::string& was, 
 {
     const std::vector<std::string> before = words_of(was), now = words_of(is);
     const auto hash = [](const std::string& word) { return word.substr(word.find(':') + 1); };
-    if (before.size() != now.size()) return fmt::format("{} has other functions", file);
+    if (before.size() != now.size()) return fmt::format("the functions of {} changed", file);
     for (std::size_t k = 1; k < now.size(); ++k)
         if (hash(before[k]) != hash(now[k]))
-            return fmt::format("the function in line {} of {} is another one", now[k].substr(0, now[k].find(':')),
-                               file);
+            return fmt::format("the function in line {} of {} changed", now[k].substr(0, now[k].find(':')), file);
     if (!of_body || hash(before[0]) == hash(now[0])) return "";
-    return fmt::format("{} is another one, outside of its functions", file);
+    return fmt::format("{} changed outside its functions", file);
 }
 
 }  // namespace
@@ -160,12 +159,12 @@ std::vector<std::string> differences(const Fingerprint& was, const Fingerprint& 
         if (name.starts_with(code) && before && now)
             files.push_back(name);
         else if (name.starts_with(content) && before && now)
-            list.push_back(fmt::format("the {} is another one", name));
+            list.push_back(fmt::format("the {} changed", name));
         else if (name.starts_with(content) || name.starts_with(code))
             list.push_back(fmt::format("{} was {}read", name.substr(name.find(" of ") + 4), now ? "not " : ""));
         else
-            list.push_back(fmt::format("{} was {}, is {}", name_in_message(name), before ? *before : "not there",
-                                       now ? *now : std::string("not there")));
+            list.push_back(fmt::format("{} was {}, is {}", name_in_message(name), before ? *before : "missing",
+                                       now ? *now : std::string("missing")));
     }
     const bool explained = !list.empty();
     for (const std::string& name : files)

@@ -20,7 +20,7 @@ namespace {
 int frame_number(std::int64_t number)
 {
     if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
-        throw Error(fmt::format("frame {} can't be written; numbers must fit 32 bits", number));
+        throw Error(fmt::format("frame {} can't be written; frame numbers must fit into 32 bits", number));
     return static_cast<int>(number);
 }
 
@@ -70,8 +70,7 @@ std::string FrameFiles::name_in_part(const std::string& pattern) const
 void FrameFiles::check_part(const std::string& pattern) const
 {
     if (!part_ && has_part(pattern))
-        throw Error(
-            fmt::format("{{part}} stands for a part of the points; give {}, or leave it out", name_of(Setting::Part)));
+        throw Error(fmt::format("{{part}} is the name of a part; give {}, or remove {{part}}", name_of(Setting::Part)));
 }
 
 std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
@@ -80,10 +79,10 @@ std::vector<std::pair<std::string, std::string>> FrameFiles::merges() const
     for (const Target& target : targets_) {
         const std::string& pattern = target.to.pattern;
         if (has_part(pattern))
-            throw Error(fmt::format("{} {}: names the whole, where {} is given; leave {{part}} out",
+            throw Error(fmt::format("{} {}: with {} this is the name of the merged files; remove {{part}}",
                                     name_of(Setting::Output), target.text, name_of(Setting::Parts)));
         if (const Format& format = format_of(pattern); !format.read || format.film || format.positions_only)
-            throw Error(fmt::format("{} {}: a {} file of parts can't be put together; write points, or leave {} out",
+            throw Error(fmt::format("{} {}: {} files of parts can't be merged; write points, or remove {}",
                                     name_of(Setting::Output), target.text, format.extension, name_of(Setting::Parts)));
         for (const std::string& output : target.outputs) {
             const std::string whole = FramePattern(pattern).for_output(output);
@@ -147,9 +146,9 @@ PlanOptions FrameFiles::plan_options(std::optional<std::uint64_t> seed) const
 void FrameFiles::check_film(const Format& format, const std::string& pattern) const
 {
     if (FramePattern(pattern).has_frame())
-        throw Error("a film is one file of all frames; leave the frame's number out of its name");
+        throw Error("a film is one file for all frames; remove the frame number from its name");
     if (needs_even_edges(format.extension) && (picture_->width % 2 != 0 || picture_->height % 2 != 0))
-        throw Error(fmt::format("a {} film has even edges; give a {} other than {}x{}", format.extension,
+        throw Error(fmt::format("a {} film needs even edges; give another {} than {}x{}", format.extension,
                                 name_of(Setting::PictureSize), picture_->width, picture_->height));
     require_ffmpeg();
 }
@@ -171,9 +170,9 @@ void FrameFiles::resolve(const Plan& plan, bool several_frames)
         if (format.film)
             check_film(format, pattern);
         else if (several_frames && !FramePattern(pattern).has_frame())
-            throw Error("several frames go to one file; put the frame's number into its name, as ####");
+            throw Error("several frames would go into one file; put #### into the name for the frame number");
         if (!patterns.insert(pattern).second)
-            throw Error("the same files are written twice; give each its own pattern");
+            throw Error("the same files would be written twice; give each a different pattern");
     };
     for (const PlannedNode& planned : plan.nodes) {
         const auto file = planned.node->arguments.find("file");
@@ -249,8 +248,7 @@ void FrameFiles::resolve(Target& target, const Plan& plan) const
         target.outputs = {"main"};
     else
         throw Error(
-            fmt::format("the graph has several outputs and none is called main ({}); put {{output}} into the "
-                        "pattern",
+            fmt::format("the graph has several outputs, and none is called main ({}); put {{output}} into the pattern",
                         fmt::join(outputs, ", ")));
 
     const std::set<std::string> in_scene = plan.names_of_scene();
@@ -350,8 +348,8 @@ void FrameFiles::warn_of_strings(const OutputTarget& to, const PointSet& points)
         for (const Format& other : formats())
             if (other.read && other.holds_strings && !other.positions_only)
                 others += (others.empty() ? "" : ", ") + other.extension;
-        warnings_.push_back(fmt::format("{}: {} holds no texts, and leaves out \"{}\"; these do: {}", to.pattern,
-                                        format.extension, name, others));
+        warnings_.push_back(fmt::format("{}: {} can't store strings, so \"{}\" is not written; use one of {}",
+                                        to.pattern, format.extension, name, others));
     }
 }
 

@@ -31,9 +31,9 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
     try {
         const CheckedJson json = CheckedJson::parse(InputFile(file).text());
         if (const int version = json.at("rapid_part").get<int>(); version != record_version)
-            throw Error(fmt::format("is a record of version {}; it must be {}", version, record_version));
+            throw Error(fmt::format("has version {}; it must be {}", version, record_version));
         const auto number = json.at("part").get<std::int64_t>(), count = json.at("parts").get<std::int64_t>();
-        if (number < 1 || number > count || count > max_parts) throw Error("is no record of a part");
+        if (number < 1 || number > count || count > max_parts) throw Error("is not the record of a part");
         record.part = {static_cast<int>(number), static_cast<int>(count)};
         if (!json.at("sample").is_null()) record.sample = json.at("sample").get<double>();
         record.frames.first = json.at("frames").at("first");
@@ -44,7 +44,7 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
         const auto [first, last, step] = record.frames;
         if (first < least || last < first || last > most || step < 1 || step > most) throw Error("has no frames");
         record.fps = json.at("fps");
-        if (!(record.fps > 0)) throw Error("has no frames a second");
+        if (!(record.fps > 0)) throw Error("has no frames per second");
         record.start = json.at("start");
         for (const CheckedJson& written : json.at("files"))
             record.files[written.at("frame").get<std::int64_t>()] = {written.at("points").get<std::uint64_t>(),
@@ -54,9 +54,10 @@ PartRecord PartRecord::read(const std::filesystem::path& file)
     } catch (Error& error) {
         throw error.at({file.string(), 0});
     } catch (const CheckedJson::parse_error& error) {  // its text holds all of the unparsable input
-        throw Error(fmt::format("is no record of a part: byte {} is none of JSON", error.byte)).at({file.string(), 0});
+        throw Error(fmt::format("is not the record of a part: byte {} is not valid JSON", error.byte))
+            .at({file.string(), 0});
     } catch (const CheckedJson::exception& error) {
-        throw Error(fmt::format("is no record of a part: {}", error.what())).at({file.string(), 0});
+        throw Error(fmt::format("is not the record of a part: {}", error.what())).at({file.string(), 0});
     }
 }
 

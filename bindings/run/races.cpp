@@ -88,7 +88,7 @@ std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
 {
     for (const auto& [name, value] : a.details) {
         const auto other = b.details.find(name);
-        const std::string there = other == b.details.end() ? "not there" : shown(other->second);
+        const std::string there = other == b.details.end() ? "missing" : shown(other->second);
         if (shown(value) != there)
             return Difference{nullptr, fmt::format("the detail value {}", name), shown(value), there};
     }
@@ -191,11 +191,11 @@ Races races_in(const LoadInOrder& load, const Plan& plan, const PlanOptions& opt
         const std::string after =
             culprit->name == found.result->node ? "" : fmt::format(" after node \"{}\"", found.result->node);
         Error error(fmt::format(
-            "frame {}: {}{} is {} in the order of the points, and {} {}; a kernel must not remember other points: keep "
-            "what it needs in an attribute of the point, or find it once for the whole set in :detail",
+            "frame {}: {}{} is {} in the order of the points, and {} {}; a kernel must not remember other points: "
+            "store values in an attribute of the point, or compute them once for all points in a :detail",
             found.result->frame, found.what, after, found.here, found.there,
             sequence == KernelOrder::Reversed ? "in reverse order"
-                                              : "where every other point is worked on in another state"));
+                                              : "if every other point is processed by a second Lua state"));
         error.at(culprit->location).in_node(culprit->name);
         races.found = std::move(error);
         return races;

@@ -90,9 +90,9 @@ void RunCache::was_read(const fs::path& file)
 void RunCache::refuse(const std::vector<std::string>& differences)
 {
     if (!replaces_)
-        throw Error(fmt::format("{} {}: it is of another run: {}; give another folder, or {} to begin anew",
-                                name_of(Setting::Cache), folder().string(), list_of(differences),
-                                name_of(Setting::CacheAgain)));
+        throw Error(fmt::format(
+            "{} {}: the cache belongs to another run: {}; give another folder, or {} to start again",
+            name_of(Setting::Cache), folder().string(), list_of(differences), name_of(Setting::CacheAgain)));
     again_ = true;
 }
 
@@ -143,9 +143,9 @@ void RunCache::read_journal()
         if (k == 0 && !is_of_run(known_.fingerprint)) break;  // the others may be of another version
     }
     if (!records && !archive_.files(snapshot).empty())
-        failures_.push_back(name + ": it is missing; the cache begins anew");
+        failures_.push_back(name + " is missing; the cache starts again");
     else if (records && known_.fingerprint.empty())
-        failures_.push_back(name + ": it is damaged; the cache begins anew");
+        failures_.push_back(name + " is damaged; the cache starts again");
     else if (damaged > 0)
         failures_.push_back(fmt::format("{}: {} damaged; frames without a record are computed again", name,
                                         damaged == 1 ? "an entry is" : "some entries are"));
@@ -164,9 +164,9 @@ void RunCache::check_contents()
             contents_[name] = hash;
             const std::string now = read_->content_of(name);
             if (now.empty())
-                changed.push_back(fmt::format("{} is not there any more", name.substr(name.find(" of ") + 4)));
+                changed.push_back(fmt::format("{} no longer exists", name.substr(name.find(" of ") + 4)));
             else if (now != hash)
-                changed.push_back(fmt::format("the {} is another one", name));
+                changed.push_back(fmt::format("the {} changed", name));
         }
     if (!changed.empty()) refuse(changed);
 }
@@ -189,8 +189,8 @@ void RunCache::continue_previous()
     const bool requested = std::exchange(estimates_errors_, fingerprint_.at(errors_estimated) == "yes");
     if (requested && !estimates_errors_)
         failures_.push_back(
-            fmt::format("{} {}: no errors are estimated, as the run that began it has estimated none ({}); "
-                        "give {} to estimate them",
+            fmt::format("{} {}: errors are not estimated, because the run that began the cache did not ({}); give {} "
+                        "to estimate them",
                         name_of(Setting::Cache), folder().string(), name_of(Setting::EstimateErrors),
                         name_of(Setting::CacheAgain)));
 }
@@ -293,11 +293,11 @@ bool RunCache::load(std::int64_t frame, const fs::path& path, Evaluator& evaluat
             return InputContents::is_content(one.first) && !fingerprint_.contains(one.first);
         });
         if (file.header().at("frame") != frame || hash_of(of_graph) != hash_of(fingerprint_))
-            throw Error(fmt::format("it is of another run: {}", list_of(differences(of_graph, fingerprint_))));
+            throw Error(fmt::format("it belongs to another run: {}", list_of(differences(of_graph, fingerprint_))));
         rapid::restore(kept, file.state());
         if (!events.path().empty()) events.check_log(kept.events);
     } catch (const std::exception& error) {
-        failures_.push_back(shown_error(path.string(), error) + "; it is left out");
+        failures_.push_back(shown_error(path.string(), error) + "; it is skipped");
         return false;
     }
     evaluator.load(kept.snapshot);
@@ -361,7 +361,7 @@ void RunCache::complete_before(std::optional<std::int64_t> frame, double seconds
         FrameRecord& record = open_.begin()->second;
         record.seconds = seconds;
         record.peak_bytes = peak_bytes;
-        add(record_of(RecordKind::Frame, record), "; the run goes on, and will compute this frame again");
+        add(record_of(RecordKind::Frame, record), "; the run continues and computes this frame again");
         open_.erase(open_.begin());
     }
 }

@@ -52,7 +52,7 @@ std::vector<std::string> found_parts(const std::string& pattern)
     const std::string name = record.filename().string();
     const std::size_t at = name.find(variable);
     if (at == std::string::npos)
-        throw Error("{part} must be in the name of the files, not of their folder").at({pattern, 0});
+        throw Error("{part} must be in the name of the files, not in the name of their folder").at({pattern, 0});
     const std::string prefix = name.substr(0, at), suffix = name.substr(at + variable.size());
     std::vector<std::string> found;
     std::error_code none;
@@ -65,7 +65,7 @@ std::vector<std::string> found_parts(const std::string& pattern)
     }
     std::sort(found.begin(), found.end());
     if (found.empty())
-        throw Error(fmt::format("no complete part of this name is there; each has a file such as {}",
+        throw Error(fmt::format("there is no complete part with this name; each has a file such as {}",
                                 part_record_file(with_part(pattern, "1of2")).string()))
             .at({pattern, 0});
     return found;
@@ -77,9 +77,9 @@ PointSet read_part(const std::string& file, const PartRecord::File& written)
 {
     PointSet points = read_points(file);
     if (hash_text(file_hash(file)) != written.hash)
-        throw Error(fmt::format("is not the file that the part has written, which had {} points; this one has {}. "
-                                "Run the part again",
-                                written.points, points.size()))
+        throw Error(
+            fmt::format("was changed after the part wrote it: it had {} points then and has {} now. Run the part again",
+                        written.points, points.size()))
             .at({file, 0});
     return points;
 }
@@ -122,25 +122,25 @@ RunParts::RunParts(const std::vector<std::string>& given)
         const fs::path file = part_record_file(pattern);
         std::error_code none;
         if (!fs::exists(file, none)) {
-            problems.push_back(fmt::format("{} is no complete part: {} is not there, which run {} writes at its end",
+            problems.push_back(fmt::format("{} is not a complete part: {} is missing, which run {} writes at the end",
                                            pattern, file.string(), name_of(Setting::Part)));
             continue;
         }
         PartFiles part{pattern, PartRecord::read(file), {}};
         if (with)
             if (const std::string found = difference(*with, part.record); !found.empty())
-                problems.push_back(fmt::format("{} is of another run than {}: {}", pattern, first, found));
+                problems.push_back(fmt::format("{} belongs to another run than {}: {}", pattern, first, found));
         const auto [number, count] = part.record.part;
         const auto [place, is_new] = parts.emplace(number, std::move(part));
         if (!is_new)
-            problems.push_back(fmt::format("part {} is there twice: {} and {}",
+            problems.push_back(fmt::format("part {} appears twice: {} and {}",
                                            part_name(number, place->second.record.part.count), place->second.text,
                                            pattern));
         if (!with) with = &place->second.record, first = pattern;
     }
     if (with) find_missing(parts, with->part.count, problems);
     for (auto& [number, part] : parts) find_frames(part, problems);
-    if (!problems.empty()) throw Error(fmt::format("the parts are no whole: {}", fmt::join(problems, "; ")));
+    if (!problems.empty()) throw Error(fmt::format("the parts are incomplete: {}", fmt::join(problems, "; ")));
     for (auto& [number, part] : parts) parts_.push_back(std::move(part));
 }
 
@@ -187,20 +187,21 @@ void RunParts::check_output(const std::string& output) const
 {
     const Format& format = format_of(output);
     if (!format.read || format.film || format.positions_only)
-        throw Error(fmt::format("{} {}: a {} file holds no points; merge to a format that does",
+        throw Error(fmt::format("{} {}: a {} file can't store points; merge into another format",
                                 name_of(Setting::Output), output, format.extension));
     for (const PartFiles& part : parts_)
         if (const Format& own = format_of(part.text); !own.read || own.positions_only)
-            throw Error(fmt::format("{}: a {} file holds no points that could be read", part.text, own.extension));
+            throw Error(fmt::format("{}: points can't be read from a {} file", part.text, own.extension));
     const FramePattern pattern(output);
     if (parts_.front().frames.size() > 1 && !pattern.has_frame())
-        throw Error(fmt::format("{} {}: several frames go to one file; put the frame's number into its name, as ####",
-                                name_of(Setting::Output), output));
+        throw Error(
+            fmt::format("{} {}: several frames would go into one file; put #### into the name for the frame number",
+                        name_of(Setting::Output), output));
     std::error_code none;
     for (const PartFiles& part : parts_)
         for (const auto& [frame, path] : part.frames)
             if (fs::equivalent(pattern.expand(frame), path, none))
-                throw Error(fmt::format("{} {}: would replace {}, a part; give the whole another name",
+                throw Error(fmt::format("{} {}: would replace the part {}; give the merged files another name",
                                         name_of(Setting::Output), output, path.string()));
 }
 

@@ -21,7 +21,7 @@ namespace {
 std::string compared_output(const Plan& plan)
 {
     if (plan.outputs.size() > 1 && !plan.outputs.count("main"))
-        throw Error("the scene has several outputs and none is called main; call the one to compare main");
+        throw Error("the scene has several outputs, and none is called main; name the one to compare main");
     return plan.outputs.count("main") ? "main" : plan.outputs.begin()->first;
 }
 
@@ -77,13 +77,13 @@ public:
     StudyRow row() const
     {
         if (!study_.compares() && !constrained_)
-            throw Error("no constraint acts in the frames that are looked at, so that none has a residual");
+            throw Error("no constraint acts in the compared frames, so there is no residual");
         if (study_.compares() && row_.compared == 0)
             throw Error(
-                fmt::format("no point is both in the run and in its reference ({} are in one of them)", row_.missing));
+                fmt::format("the run and its reference have no point in common ({} are in one of them)", row_.missing));
         StudyRow row = row_;
         row.error = norm();
-        if (!std::isfinite(row.error)) throw Error(fmt::format("the error is {}, no finite number", row.error));
+        if (!std::isfinite(row.error)) throw Error(fmt::format("the error is {}; it must be finite", row.error));
         return row;
     }
 

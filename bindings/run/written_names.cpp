@@ -100,10 +100,10 @@ void WrittenNames::check(const Writer& writer) const
 {
     for (const Writer& other : writers_)
         if (const auto name = common_name(writer, other))
-            throw Error(fmt::format("{} writes {}, too; give each a name of its own", other.who, *name));
+            throw Error(fmt::format("{} writes {} too; give each a different name", other.who, *name));
     for (const fs::path& file : read_)
         if (const auto name = name_of_file(writer, file))
-            throw Error(fmt::format("the run reads {}; write to another name", *name));
+            throw Error(fmt::format("the run reads {}; write to another file", *name));
 }
 
 // A note is a file that only one process can make.
@@ -116,7 +116,7 @@ void claim_among_processes(const fs::path& folder, const std::string& who, const
         if (::write(made.number(), who.data(), who.size()) != static_cast<ssize_t>(who.size()))
             throw file_error(fmt::format("can't write {}", note.string()), errno);
     } else if (InputFile(note).text() != who) {
-        throw Error("another row of the wedge writes it, too; put a parameter that is varied into its name");
+        throw Error("another run of the wedge writes this file too; put a varied parameter into the name");
     }
 }
 

@@ -32,7 +32,7 @@ public:
     {
         for (std::size_t i = size_; i < values_.size(); ++i)
             if (values_[i] != pattern)
-                throw Error(fmt::format("{} was written past the end of its array, at {} of {} points", who,
+                throw Error(fmt::format("{} was written beyond the end of its array, at point {} of {}", who,
                                         i / components, size_ / components));
         for (std::size_t i = 0; i < size_; ++i)
             if (!std::isfinite(static_cast<double>(values_[i])))

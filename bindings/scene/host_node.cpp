@@ -266,14 +266,14 @@ bool is_name(const std::string& text)
 void declare_column(NodeType& type, const HostNode& node, const std::string& name, ColumnType of, bool written)
 {
     if (of != ColumnType::Float && of != ColumnType::Vec3)
-        throw Error(fmt::format("{}: columns of callbacks are of Float or Vec3", name));
+        throw Error(fmt::format("{}: columns of callbacks must be Float or Vec3", name));
     if (node.kind == HostNode::Force && (name == "P" || name == "v"))
-        throw Error(fmt::format("{}: a force has P and v without reading them", name));
+        throw Error(fmt::format("{}: a force always has P and v; remove it from the columns", name));
     const AttributeSpec* known = known_attribute(name);
     const AttributeValue zero = of == ColumnType::Float ? AttributeValue(0.0f) : AttributeValue(Vec3f(Vec3f::Zero()));
     const bool own = name == "P" || name == "v";
     if ((own && of != ColumnType::Vec3) || (known && known->fallback.index() != zero.index()) || name == "id")
-        throw Error(fmt::format("{} is of another type", name));
+        throw Error(fmt::format("{} has another type", name));
     if (!own && !known) type.uses.makes.push_back({name, zero});
     (written ? type.uses.writes : type.uses.reads).push_back(name);
     if (written && !own) type.uses.reads.push_back(name);
@@ -286,9 +286,9 @@ try {
     if (!is_name(node.name)) throw Error("its name must be a word of letters, digits and _");
     if (!node.call) throw Error("it has no function to call");
     if (node.kind == HostNode::Force && !node.writes.empty())
-        throw Error("a force writes no columns; it gives accelerations");
+        throw Error("a force can't write columns; it returns accelerations");
     if (node.kind == HostNode::Constraint && !(node.reads.empty() && node.writes.empty()))
-        throw Error("a constraint reads and writes no columns; it gives rods");
+        throw Error("a constraint can't read or write columns; it returns rods");
     NodeType type;
     type.name = node.name;
     type.doc = node.doc;
@@ -304,8 +304,9 @@ try {
     std::size_t slot = 0;
     for (const HostParameter& parameter : node.parameters) {
         if (!is_name(parameter.name) || type.find(parameter.name) || parameter.name == "name")
-            throw Error(fmt::format(
-                "parameter \"{}\": its name must be a word of letters, digits and _, and no other's", parameter.name));
+            throw Error(
+                fmt::format("parameter \"{}\": the name must consist of letters, digits and _, and must be unique",
+                            parameter.name));
         type.params.push_back(param_of(parameter, slot));
         slot += parameter.fallback.index() == 0 ? 1 : 3;
     }

@@ -52,7 +52,7 @@ AnyColumn copied_column(const HostPoints::Column& from, std::size_t count)
         case ColumnType::UInt8:
             break;
     }
-    throw Error(fmt::format("{} is of bytes; columns are Float, Vec3, Int32, Int64, Quat or String", from.name));
+    throw Error(fmt::format("{} has bytes; a column must be Float, Vec3, Int32, Int64, Quat or String", from.name));
 }
 
 }  // namespace
@@ -83,13 +83,13 @@ ObjectPtr make_points(const HostPoints& points)
     made->points.append(points.count);
     bool has_positions = false;
     for (const HostPoints::Column& column : points.columns) {
-        if (!column.data && points.count > 0) throw Error(fmt::format("the data of {} are null", column.name));
-        if (column.name == "id") throw Error("id can't be given; ids count from 0 in order");
+        if (!column.data && points.count > 0) throw Error(fmt::format("the data of {} is null", column.name));
+        if (column.name == "id") throw Error("id can't be given; ids count from 0");
         AnyColumn values = copied_column(column, points.count);
         const AnyColumn* known = made->points.find(column.name);
         const AttributeSpec* spec = known_attribute(column.name);
         if ((known && known->index() != values.index()) || (spec && spec->fallback.index() != values.index()))
-            throw Error(fmt::format("{} is of {}; it must be of {}", column.name, type_name(type_of(values)),
+            throw Error(fmt::format("{} has the type {}; it must be {}", column.name, type_name(type_of(values)),
                                     type_name(known ? type_of(*known) : type_of(spec->fallback))));
         has_positions = has_positions || column.name == "P";
         made->points.set(column.name, std::move(values));

@@ -39,13 +39,13 @@ void check(const HostRod& rod, const std::vector<std::int64_t>& ids, const std::
 {
     const auto is_there = [&](std::int64_t id) { return std::binary_search(ids.begin(), ids.end(), id); };
     if (!is_there(rod.a) || !is_there(rod.b) || rod.a == rod.b)
-        throw Error(
-            fmt::format("the program's node \"{}\" gives a rod between the ids {} and {}; they must be of two points",
-                        node, rod.a, rod.b));
+        throw Error(fmt::format(
+            "the program's node \"{}\" returns a rod between the ids {} and {}; they must belong to two points", node,
+            rod.a, rod.b));
     if (!(rod.length >= 0 && std::isfinite(rod.length) && rod.compliance >= 0 && std::isfinite(rod.compliance)))
         throw Error(
-            fmt::format("the program's node \"{}\" gives a rod of length {} and compliance {}; both must be at "
-                        "least 0 and finite",
+            fmt::format("the program's node \"{}\" returns a rod of length {} and compliance {}; both must be finite "
+                        "and at least 0",
                         node, rod.length, rod.compliance));
 }
 

@@ -145,7 +145,7 @@ private:
 
 ObjectPtr make_shape(const std::string& name, const HostShape& shape, bool guarded)
 {
-    if (!shape.distance) throw Error("it has no function of the distance");
+    if (!shape.distance) throw Error("the function of the distance is missing");
     for (int axis = 0; axis < 3; ++axis)
         if (!(shape.lower[axis] <= shape.upper[axis]))
             throw Error(fmt::format("its bounds go from {} to {} along axis {}; the lower one must come first",

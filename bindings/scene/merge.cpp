@@ -19,7 +19,7 @@ Result<MergedFiles> merge_files(const std::vector<std::string>& patterns, const 
     } const ended;
     SceneError::Kind kind = SceneError::WrongCall;
     try {
-        if (patterns.empty()) refuse("no parts are named; give the patterns of their files");
+        if (patterns.empty()) refuse("no parts are given; give the patterns of their files");
         const RunParts parts(patterns);
         parts.check_output(output);
         kind = SceneError::FailedFrame;

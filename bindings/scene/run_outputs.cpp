@@ -82,8 +82,8 @@ void check_frames(const RunFrames& frames)
     constexpr std::int64_t least = std::numeric_limits<std::int32_t>::min();
     constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
     if (frames.step < 1 || frames.last < frames.first || frames.first < least || frames.last > most)
-        refuse(fmt::format("frames {}-{}x{}; they must go up, by a step of at least 1, and fit 32 bits", frames.first,
-                           frames.last, frames.step));
+        refuse(fmt::format("frames {}-{}x{}: they must increase by a step of at least 1 and fit into 32 bits",
+                           frames.first, frames.last, frames.step));
 }
 
 FrameFiles frame_files(const FileOutputs& files)
@@ -92,8 +92,8 @@ FrameFiles frame_files(const FileOutputs& files)
     const PictureSettings& requested = files.pictures;
     if (std::min(requested.size.width, requested.size.height) < 1 ||
         std::max(requested.size.width, requested.size.height) > max_pixels)
-        refuse(fmt::format("a picture of {}x{}; each must be from 1 to {}", requested.size.width, requested.size.height,
-                           max_pixels));
+        refuse(fmt::format("a picture of {}x{}: each side must be from 1 to {}", requested.size.width,
+                           requested.size.height, max_pixels));
     return FrameFiles(files.outputs, picture_options(requested.camera, requested.size));
 }
 
@@ -186,7 +186,7 @@ Result<std::string> SceneInside::check_outputs(Scene& scene, const FileOutputs& 
         }
         std::vector<std::string> outputs;
         for (const auto& [name, place] : output.plan.outputs) outputs.push_back(name);
-        text += fmt::format("{}: OK, {} of {} nodes reached from {} {}\n", impl.file, output.plan.nodes.size(),
+        text += fmt::format("{}: OK, {} of {} nodes lead to {} {}\n", impl.file, output.plan.nodes.size(),
                             impl.session->graph().nodes.size(), outputs.size() == 1 ? "output" : "outputs",
                             fmt::join(outputs, ", "));
         return text;

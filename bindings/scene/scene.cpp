@@ -81,7 +81,7 @@ Result<Scene> Scene::open(const std::string& file, SceneOptions options)
 
 Result<Scene> Scene::open_text(const std::string& name, const std::string& text, SceneOptions options)
 {
-    if (name.empty()) return wrong_call("the scene has no name; give one for its messages, such as scene.lua");
+    if (name.empty()) return wrong_call("the scene has no name; give one for messages, such as scene.lua");
     auto impl = opened(name, text, std::move(options), {});
     if (!impl) return impl.error();
     return Scene(std::move(*impl));
@@ -89,7 +89,7 @@ Result<Scene> Scene::open_text(const std::string& name, const std::string& text,
 
 Result<Scene> SceneInside::open(const std::string& file, SceneOptions options, SceneHooks hooks)
 {
-    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
+    if (file.empty()) return wrong_call("no file is given; give the path of a scene, such as graphs/first.lua");
     auto impl = opened(file, std::nullopt, std::move(options), std::move(hooks));
     if (!impl) return impl.error();
     return Scene(std::move(*impl));
@@ -159,7 +159,7 @@ Result<SceneFrame> Scene::advance_to(std::int64_t frame)
     return impl_->call(SceneError::FailedFrame, [&] {
         impl_->refuse_unless_ready();
         if (frame < impl_->next)
-            refuse(fmt::format("frame {} {}; the next one is {}: restart() or restore() to go back", frame,
+            refuse(fmt::format("frame {} {}; the next frame is {}; call restart() or restore() to go back", frame,
                                frame < first_frame() ? "is before the scene's first" : "has been computed",
                                impl_->next));
         for (;;) {
@@ -182,7 +182,7 @@ Result<SceneSnapshot> Scene::save()
 {
     return impl_->call(SceneError::FailedFrame, [&] {
         impl_->refuse_unless_ready();
-        if (!impl_->has_advanced) refuse("no frame has been computed; advance() first");
+        if (!impl_->has_advanced) refuse("no frame has been computed; call advance() first");
         auto data = std::make_shared<SceneSnapshot::Data>();
         data->snapshot = impl_->evaluator->save();
         data->file = impl_->file;

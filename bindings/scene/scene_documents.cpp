@@ -34,7 +34,7 @@ Result<Done> SceneInside::keep_spare_columns(std::size_t columns)
 {
     try {
         constexpr std::size_t most = 4096;  // each release iterates over them
-        if (columns > most) refuse(fmt::format("{} columns are to be kept; it must be at most {}", columns, most));
+        if (columns > most) refuse(fmt::format("{} columns should be kept; at most {} are possible", columns, most));
         SparePages::all().keep(columns);
         return Done();
     } catch (...) {

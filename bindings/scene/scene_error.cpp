@@ -51,9 +51,8 @@ SceneError wrong_call(std::string message) { return error_of(SceneError::WrongCa
 
 SceneError busy()
 {
-    return error_of(
-        SceneError::Busy,
-        "the scene is in another call: of another thread, or the one that has called back; wait for its end");
+    return error_of(SceneError::Busy,
+                    "the scene is in another call, of another thread or of the current callback; wait for its end");
 }
 
 SceneError caught_error(SceneError::Kind fault)
@@ -69,7 +68,7 @@ SceneError caught_error(SceneError::Kind fault)
     } catch (const std::exception& error) {
         return error_of(SceneError::Unexpected, error.what());
     } catch (...) {
-        return error_of(SceneError::Unexpected, "an exception that is no std::exception");
+        return error_of(SceneError::Unexpected, "an exception that is not a std::exception");
     }
 }
 

@@ -41,7 +41,7 @@ auto call_program(const char* name, const F& f, Arguments&&... arguments)
     } catch (const std::exception& error) {
         throw Error(std::string("the program's ") + name + " threw: " + error.what());
     } catch (...) {
-        throw Error(std::string("the program's ") + name + " threw what is no std::exception");
+        throw Error(std::string("the program's ") + name + " threw something that is not a std::exception");
     }
 }
 

@@ -42,7 +42,7 @@ Result<SceneFilm> SceneFilm::begin(const std::string& path, const FilmOptions& o
         if (extension != ".mp4" && extension != ".webm" && extension != ".gif")
             refuse(fmt::format("a film can't be a \"{}\"; it must be .mp4, .webm or .gif", extension));
         if (!(options.fps >= 1 && options.fps <= 1000))
-            refuse(fmt::format("{} frames a second; a film has from 1 to 1000", options.fps));
+            refuse(fmt::format("{} frames per second; a film can have from 1 to 1000", options.fps));
         const auto [width, height] = options.size;
         if (std::min(width, height) < 1 || std::max(width, height) > 16384)
             refuse(fmt::format("a film of {} x {} can't be made; each side must be from 1 to 16384 pixels", width,
@@ -52,7 +52,7 @@ Result<SceneFilm> SceneFilm::begin(const std::string& path, const FilmOptions& o
                 fmt::format("a {} film of {} x {} can't be made; both edges must be even", extension, width, height));
         const FramePattern pattern(path);
         if (pattern.has_frame() || pattern.has_output() || has_part(path))
-            refuse(fmt::format("a film is one file; \"{}\" is a pattern of several", path));
+            refuse(fmt::format("a film is one file, but \"{}\" is a pattern for several", path));
         constexpr bool may_have_colliders = true;
         require_picture_memory(width, height, may_have_colliders, 1, "give a smaller size");
         require_ffmpeg();
@@ -65,7 +65,7 @@ Result<SceneFilm> SceneFilm::begin(const std::string& path, const FilmOptions& o
 Result<Done> SceneFilm::add(const SceneFrame& frame, const SceneShapes& shapes)
 {
     try {
-        if (impl_->is_finished) refuse("the film is finished; begin another one");
+        if (impl_->is_finished) refuse("the film is finished; begin a new one");
         FrameInfo info;
         info.number = static_cast<int>(frame.number());
         info.time = static_cast<double>(impl_->added++) / impl_->options.fps;
@@ -85,8 +85,8 @@ std::int64_t SceneFilm::done() const { return impl_->written; }
 Result<Done> SceneFilm::finish()
 {
     try {
-        if (impl_->is_finished) refuse("the film is finished; begin another one");
-        if (impl_->added == 0) refuse("the film has no pictures; add() some first");
+        if (impl_->is_finished) refuse("the film is finished; begin a new one");
+        if (impl_->added == 0) refuse("the film has no pictures; call add() first");
         impl_->is_finished = true;
         impl_->writer.finish();
         impl_->written = impl_->added;

@@ -44,7 +44,7 @@ std::optional<SceneError> fault_of(const SceneOptions& options)
         return wrong_call(fmt::format("threads = {}; it must be from 0 to {}", options.threads, max_threads));
     if (!(options.script_seconds > 0))
         return wrong_call(fmt::format("script_seconds = {}; it must be above 0", options.script_seconds));
-    if (options.script_memory == 0) return wrong_call("script_memory = 0; it must be bytes above 0");
+    if (options.script_memory == 0) return wrong_call("script_memory = 0; it must be above 0");
     return std::nullopt;
 }
 
@@ -268,7 +268,7 @@ void Scene::Impl::refuse_unless_ready() const
 void Scene::Impl::refuse_unless_of_this_graph(const SceneSnapshot& snapshot) const
 {
     if (snapshot.data_->nodes != hash_of_nodes())
-        refuse("the snapshot is of another graph; restore it in a scene with the same nodes");
+        refuse("the snapshot belongs to another graph; restore it in a scene with the same nodes");
 }
 
 }  // namespace rapid

@@ -7,7 +7,7 @@ namespace rapid {
 
 void Scene::Impl::require_keep_state() const
 {
-    if (!inputs) refuse("nothing is kept of what the scene reads; open it with SceneHooks::keep_state");
+    if (!inputs) refuse("the scene does not record what it reads; open it with SceneHooks::keep_state");
 }
 
 Result<SceneFingerprint> SceneInside::fingerprint(Scene& scene)

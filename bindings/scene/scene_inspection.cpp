@@ -25,7 +25,7 @@ const PlannedNode& planned_node(const Plan& plan, const std::string& name, const
     std::vector<std::string> names;
     for (const SceneNode& one : all) names.push_back(one.name);
     const bool is_left_out = std::find(names.begin(), names.end(), name) != names.end();
-    refuse(is_left_out ? fmt::format("node \"{}\" is left out: no output comes from it", name)
+    refuse(is_left_out ? fmt::format("node \"{}\" is pruned: it leads to no output", name)
                        : fmt::format("the scene has no node \"{}\"{}", name, did_you_mean(name, names)));
 }
 
@@ -117,8 +117,7 @@ const std::map<std::string, SceneFrame>& Scene::Impl::points_after_nodes(std::in
     if (from) {
         refuse_unless_of_this_graph(*from);
         if (from->frame() >= frame)
-            refuse(fmt::format("the snapshot is behind frame {}; frame {} takes one from before it", from->frame(),
-                               frame));
+            refuse(fmt::format("the snapshot is after frame {}; frame {} needs an earlier one", from->frame(), frame));
     }
     if (node_results_frame == frame) return node_results;
     const Plan watched(session->graph(), plan_options());
@@ -140,7 +139,7 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
 {
     const auto output = plan->outputs.find(frame.output_);
     if (output == plan->outputs.end())
-        refuse(fmt::format("the scene has no output \"{}\", which the frame has", frame.output_));
+        refuse(fmt::format("the frame has an output \"{}\" that the scene does not have", frame.output_));
     const PointSet& points = frame.data_->result.outputs.at(frame.output_);
     const std::uint32_t index = IdIndex(points.id())[id];
     if (index == IdIndex::none) refuse("the point is not in this frame");
@@ -160,8 +159,8 @@ PointOrigin Scene::Impl::origin(const SceneFrame& frame, std::int64_t id, const 
                 found.push_back({simulation.create->name, chain.id()[i]});
     }
     if (found.size() == 1) return found.front();
-    refuse(found.empty() ? "the chain of the point is not known: nodes behind its Solve have moved it"
-                         : "several points are at this place with this velocity; choose another frame");
+    refuse(found.empty() ? "the chain of the point is unknown, because nodes after its Solve have moved it"
+                         : "several points have this position and velocity; choose another frame");
 }
 
 Result<SceneFrame> Scene::points_after(const std::string& node, std::int64_t frame)

@@ -94,7 +94,7 @@ SceneTrace Scene::Impl::trace(const TraceOptions& requested)
 Result<SceneTrace> Scene::trace(const TraceOptions& options)
 {
     return impl_->call(SceneError::WrongCall, [&] {
-        if (options.ids.empty()) refuse("there are no ids; give those of the points that are to be told of");
+        if (options.ids.empty()) refuse("there are no ids; give the ids of the points to report");
         if (options.last < options.first)
             refuse(fmt::format("frames {} to {} end before they begin", options.first, options.last));
         if (options.step < 1) refuse(fmt::format("step = {}; it must be at least 1", options.step));

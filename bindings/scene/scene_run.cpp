@@ -39,21 +39,18 @@ void check_options(const SceneOptions& scene, const RunOptions& options)
 {
     if (const auto& part = options.part;
         part && (part->count < 1 || part->count > max_parts || part->number < 1 || part->number > part->count))
-        refuse(fmt::format("part {} of {}; it must be from 1 to their number, which is at most {}", part->number,
-                           part->count, max_parts));
+        refuse(fmt::format("part {} of {}: the part must be from 1 to the number of parts, which is at most {}",
+                           part->number, part->count, max_parts));
     if (options.sample && !(*options.sample > 0 && *options.sample <= 1))
         refuse(fmt::format("sample = {}; it must be above 0 and at most 1", *options.sample));
     if (options.frames) check_frames(*options.frames);
     if (options.cache.every < 0) refuse(fmt::format("every = {}; it must be at least 0", options.cache.every));
     if (options.cache.again && options.cache.folder.empty())
-        refuse("again says what to do with a cache; give its folder");
-    if (!options.claims.empty() && options.statistics.empty())
-        refuse("claims are known by the file of statistics; give one");
+        refuse("again replaces the contents of a cache; give its folder");
+    if (!options.claims.empty() && options.statistics.empty()) refuse("claims need a statistics file; give one");
     // A fingerprint does not cover these.
     if (!options.cache.folder.empty() && (!scene.objects.empty() || !scene.nodes.empty()))
-        refuse(
-            "a cache does not know when what the program offers has changed; leave objects and nodes out, or the "
-            "cache");
+        refuse("a cache can't see changes of the objects and nodes that the program offers; remove them, or the cache");
 }
 
 template <class F>
@@ -157,8 +154,8 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
 
     void prepare()
     {
-        if (is_ready) refuse("the run is prepared; call run()");
-        if (has_opened) refuse("the run could not be prepared; make another one");
+        if (is_ready) refuse("the run is already prepared; call run()");
+        if (has_opened) refuse("the run could not be prepared; make a new one");
         has_opened = true;
         claim_own_files();
         std::map<std::string, std::string> set;
@@ -224,7 +221,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
     RunOutcome run()
     {
         if (!is_ready) refuse("the run is not prepared; call prepare() first");
-        if (has_begun) refuse("the run has been computed; make another one");
+        if (has_begun) refuse("the run is already complete; make a new one");
         has_begun = true;
         events.begin();
         if (cache.requested()) {
@@ -338,7 +335,7 @@ Result<SceneRun> SceneRun::make(std::string file, SceneOptions scene, RunOptions
 Result<SceneRun> SceneInside::make(std::string file, SceneOptions scene, SceneHooks hooks, RunOptions options,
                                    RunListener listener)
 {
-    if (file.empty()) return wrong_call("no file is named; give the path of a scene, such as graphs/first.lua");
+    if (file.empty()) return wrong_call("no file is given; give the path of a scene, such as graphs/first.lua");
     if (std::optional<SceneError> fault = fault_of(scene)) return std::move(*fault);
     try {
         check_options(scene, options);
@@ -366,7 +363,7 @@ Result<std::vector<std::pair<std::string, std::string>>> SceneInside::merges(Sce
         if (!run.impl_->is_ready) refuse("the run is not prepared; call prepare() first");
         if (parts < 1 || parts > max_parts)
             refuse(fmt::format("parts = {}; it must be from 1 to {}", parts, max_parts));
-        if (run.impl_->options.part) refuse("the run is a part itself");
+        if (run.impl_->options.part) refuse("the run is itself a part");
         if (parts > 1) refuse_coupled(*run.impl_->scene.plan);
         return run.impl_->files.merges();
     });

@@ -42,7 +42,7 @@ std::string members_as_text(const std::string& path, const CheckedJson& members)
         text += fmt::format("of {} after frame {}\n", word(members.at("graph")), word(members.at("frame")));
     text += "simulations\n";
     add("simulations", " bytes");
-    text += "nodes that keep something\n";
+    text += "nodes with state\n";
     add("nodes", " bytes");
     text += "fingerprint\n";
     add("fingerprint", "");
@@ -74,7 +74,7 @@ Result<Done> SceneInside::save(const SceneSnapshot& saved, const std::string& pa
 SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
 {
     if (file.header().at("what") != snapshot_file_type)
-        throw Error("it is of a run, which goes on from it by itself where it has its cache");
+        throw Error("it belongs to the cache of a run, which resumes from it by itself");
     const CheckedJson& fingerprint = file.header().at("fingerprint");
     require_this_build(fingerprint.at("Rapid").get<std::string>());
     auto data = std::make_shared<Data>();

@@ -23,7 +23,7 @@ auto with_file_name(const std::string& path, const F& f) -> Result<decltype(f())
         } catch (Error& error) {
             throw error.at({path, 0});
         } catch (const nlohmann::json::exception&) {
-            throw Error("its header is not one that Rapid writes").at({path, 0});
+            throw Error("its header was not written by Rapid").at({path, 0});
         }
     } catch (...) {
         return caught_error(SceneError::WrongCall);
@@ -34,13 +34,13 @@ auto with_file_name(const std::string& path, const F& f) -> Result<decltype(f())
 inline void require_this_build(const std::string& build)
 {
     if (build != RAPID_ABI)
-        throw Error(fmt::format("it is of Rapid {}, and this is {}; write it anew", build, RAPID_ABI));
+        throw Error(fmt::format("it was written by Rapid {}, but this is {}; write it again", build, RAPID_ABI));
 }
 
 // Throws Error if the file has another key.
 inline void require_key(const CheckedJson& header, const std::string& key)
 {
-    if (header.value("key", "") != key) throw Error("it is of another run");
+    if (header.value("key", "") != key) throw Error("it belongs to another run");
 }
 
 template <class T>
@@ -55,7 +55,7 @@ T read_state_file(const std::string& path, const char* what, const std::string& 
     const StateFile file(path);
     const CheckedJson& header = file.header();
     if (header.at("what") != what)
-        throw Error(fmt::format("it is a {}, and no {}", header.at("what").get<std::string>(), what));
+        throw Error(fmt::format("it is a {}, not a {}", header.at("what").get<std::string>(), what));
     require_this_build(header.at("build").get<std::string>());
     require_key(header, key);
     T value;

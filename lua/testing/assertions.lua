@@ -40,13 +40,15 @@ end
 return function(native)
   register("near", function(_, arguments)
     local expected, actual, tolerance = arguments[1], arguments[2], arguments[3]
-    if type(tolerance) ~= "number" then return "assert.near takes what is expected, what is, and a tolerance" end
+    if type(tolerance) ~= "number" then
+      return "assert.near needs an expected value, an actual value and a tolerance"
+    end
     -- Equal infinities have no difference.
     if expected == actual then return nil end
     local distance = distance_between(expected, actual)
     if not distance then return ("%s and %s can't be compared"):format(show(expected), show(actual)) end
     if distance <= tolerance then return nil end
-    return ("%s is not within %s of %s; it is off by %s"):format(show(actual), show(tolerance), show(expected),
+    return ("%s is not within %s of %s; the difference is %s"):format(show(actual), show(tolerance), show(expected),
       show(distance))
   end)
 
@@ -58,7 +60,7 @@ return function(native)
   local function points_of(state)
     local points = rawget(state, "points")
     if type(points) ~= "userdata" then
-      error("assert.points takes the points of a frame: assert.points(result[48]).finite()", 0)
+      error("assert.points needs the points of a frame: assert.points(result[48]).finite()", 0)
     end
     return points
   end
@@ -101,7 +103,7 @@ return function(native)
 
   -- Returns the point whose quantity differs most between two frames.
   local function most_changed(before, after, points)
-    local most, what = -1, "no point is left"
+    local most, what = -1, "there are no points"
     for i = 1, #points do
       local id = points[i].id
       local change = before[id] and distance_between(before[id], after[id]) or math.huge
@@ -117,7 +119,7 @@ return function(native)
   register("conserved", function(_, arguments)
     local result, quantity, tolerance = arguments[1], arguments[2], arguments[3]
     if type(quantity) ~= "function" or type(tolerance) ~= "number" then
-      return "assert.conserved takes the result of rapid.run, a function of a point, and a tolerance"
+      return "assert.conserved needs the result of rapid.run, a function of a point and a tolerance"
     end
     local first, of_points
     for frame, points in result:frames() do
@@ -128,7 +130,8 @@ return function(native)
         local off = distance_between(first, sum)
         if not off then return ("%s and %s can't be compared"):format(show(first), show(sum)) end
         if off > tolerance or off ~= off then
-          return ("frame %d: the sum is %s, and %s at the first frame; it is off by %s; most of all %s"):format(frame,
+          return ("frame %d: the sum is %s, and %s in the first frame; the difference is %s; the largest change " ..
+            "has %s"):format(frame,
             show(sum), show(first), show(off), most_changed(of_points, by_id, points))
         end
       end

@@ -63,7 +63,7 @@ return function(native)
     if type(key) ~= "number" then return result_methods[key] end
     local run = rawget(self, "run")
     if not self.output_name then
-      error(("the scene has several outputs and none is called main; take one: result:output %q")
+      error(("the scene has several outputs, and none is called main; choose one: result:output %q")
         :format(self.outputs[1]), 2)
     end
     local points = run.frames[self.output_name][key]
@@ -119,7 +119,7 @@ return function(native)
   -- `rapid run` would print.
   function rapid.run(path, options)
     options = options or {}
-    if type(path) ~= "string" then error("rapid.run takes the path of a graph", 2) end
+    if type(path) ~= "string" then error("rapid.run needs the path of a graph", 2) end
     for name in pairs(options) do
       if not known_options[name] then
         error(("rapid.run: unknown option %q; it must be frames, set, seed, threads, script_timeout, "

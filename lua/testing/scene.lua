@@ -30,7 +30,7 @@ end
 -- Returns the message of a run that must fail.
 function scene.error(text, options)
   local ok, message = pcall(scene.run, text, options)
-  if ok then error("the scene ran, where an error was due:\n" .. text, 2) end
+  if ok then error("the scene ran, but an error was expected:\n" .. text, 2) end
   return (message:gsub(scene.folder.path:gsub("%W", "%%%0") .. "/", ""))
 end
 

@@ -62,7 +62,7 @@ DeferredFunctions::Any DeferredFunctions::find(const char* name)
     if (Any function = defined(name)) return function;
     load_deferred();
     if (Any function = defined(name)) return function;
-    throw Error(fmt::format("\"{}\" is of another version of Rapid: it has no {}", library().string(), name));
+    throw Error(fmt::format("\"{}\" belongs to another version of Rapid: it has no {}", library().string(), name));
 }
 
 }  // namespace rapid

@@ -114,8 +114,8 @@ std::uint64_t free_memory()
 
 Error memory_exceeded(const std::string& what, double bytes, const std::string& remedy)
 {
-    return Error(fmt::format("{} would take about {}, and {} are free of {}; {}, or set {}", what, memory_text(bytes),
-                             memory_text(static_cast<double>(free_memory())),
+    return Error(fmt::format("{} would need about {}, but only {} of {} are free; {}, or set {}", what,
+                             memory_text(bytes), memory_text(static_cast<double>(free_memory())),
                              memory_text(static_cast<double>(memory_budget())), remedy, name_of(Setting::Memory)),
                  ErrorKind::OutOfMemory);
 }

@@ -89,7 +89,7 @@ void MemoryWatch::watch(std::uint64_t most)
     Error error("out of memory", ErrorKind::OutOfMemory);
     try {
         error = error.reworded(fmt::format(
-            "the run takes {} of memory, and may take {}; let it have fewer points, pairs, voxels or texts, or set {}",
+            "the run uses {} of memory, and the limit is {}; use fewer points, pairs, voxels or strings, or set {}",
             memory_text(static_cast<double>(bytes)), memory_text(static_cast<double>(most)), name_of(Setting::Memory)));
         on_exceeded_(error);
     } catch (const std::exception&) {  // this thread has no caller

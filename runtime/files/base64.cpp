@@ -27,7 +27,7 @@ std::vector<unsigned char> from_base64(std::string_view text, std::size_t bytes,
         for (std::size_t c = 0; c < 4; ++c) {
             const std::int8_t value = values[static_cast<unsigned char>(text[at + c])];
             const bool padding = text[at + c] == '=' && at + 4 == length && c >= 2;
-            if (value < 0 && !padding) throw Error("the array is no base64");
+            if (value < 0 && !padding) throw Error("the array is not valid base64");
             word = word << 6 | static_cast<std::uint32_t>(padding ? 0 : value);
         }
         for (int shift = 16; shift >= 0; shift -= 8) result.push_back(static_cast<unsigned char>(word >> shift));

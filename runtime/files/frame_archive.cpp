@@ -64,7 +64,7 @@ RecordLog::RecordLog(const fs::path& path)
 RecordLog RecordLog::in_memory()
 {
     RecordLog log(Descriptor(::memfd_create("rapid records", MFD_CLOEXEC)));
-    if (!log.file_) throw file_error("no memory for records", errno);
+    if (!log.file_) throw file_error("not enough memory for records", errno);
     return log;
 }
 
@@ -89,7 +89,7 @@ void RecordLog::append(std::string_view record)
         if (count <= 0) {
             const int reason = count < 0 ? errno : ENOSPC;
             if (::ftruncate(file_.number(), static_cast<off_t>(size_before)) != 0)
-                throw file_error("can't be written, nor made shorter", errno);
+                throw file_error("can't be written or truncated", errno);
             throw file_error("can't be written", reason);
         }
         at += static_cast<std::uint64_t>(count);
@@ -110,7 +110,7 @@ bool RecordLog::read(std::uint64_t& position, std::string& record) const
         head.bytes > end - position - sizeof head)
         return false;
     if (!fits_in_memory(static_cast<double>(head.bytes)))
-        throw memory_exceeded("a record of it", static_cast<double>(head.bytes), "give another folder");
+        throw memory_exceeded("a record of it", static_cast<double>(head.bytes), "choose another folder");
     record.resize(head.bytes);
     if (!read_at(file_.number(), position + sizeof head, record.data(), record.size()) ||
         content_hash(record) != head.hash)
@@ -135,13 +135,13 @@ Descriptor FrameArchive::lock(const fs::path& folder, const fs::path& shown_as, 
     if (error) refuse("can't be made: " + error.message());
     // Following a link would create a file elsewhere.
     Descriptor lock(::open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
-    if (!lock && errno == ELOOP) refuse("its .lock is a link; give another folder");
+    if (!lock && errno == ELOOP) refuse("its .lock is a link; choose another folder");
     const Stopwatch waited;
     while (lock && ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
         if (errno == EINTR) continue;
         if (errno != EWOULDBLOCK) break;  // the file system has no locks
         if (waited.seconds() > longest_wait)
-            refuse(fmt::format("another {} has it; wait for its end, or give another folder", who));
+            refuse(fmt::format("another {} is using it; wait for its end, or choose another folder", who));
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     return lock;
@@ -215,7 +215,7 @@ void FrameArchive::write_files()
             job->write(job->path);
         } catch (const std::exception& error) {
             const std::string name = job->path.filename().string();
-            failure = fmt::format("{}: {}; the run goes on without this {}", job->path.string(), error.what(),
+            failure = fmt::format("{}: {}; the run continues without this {}", job->path.string(), error.what(),
                                   name.substr(0, name.find('.')));
         }
         job.reset();  // releases its columns, which the next frame would otherwise have to copy
@@ -275,7 +275,7 @@ void FrameArchive::begin_journal(const std::vector<std::string>& records)
     } catch (const std::exception& error) {
         const std::lock_guard lock(mutex_);
         failures_.push_back(
-            fmt::format("{}: {}; the run goes on, and what it computes is not kept", journal().string(), error.what()));
+            fmt::format("{}: {}; the run continues, but its results are not stored", journal().string(), error.what()));
     }
 }
 

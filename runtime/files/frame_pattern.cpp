@@ -66,7 +66,8 @@ FramePattern::FramePattern(std::string text) : text_(std::move(text)), before_(t
         at = number->end - 1;
     }
     if (digits_ && after_.find('/') != std::string::npos)
-        throw Error(fmt::format("\"{}\": the frame number must be in the name of the file, not of its folder", text_));
+        throw Error(fmt::format(
+            "\"{}\": the frame number must be in the name of the file, not in the name of its folder", text_));
 }
 
 namespace {

@@ -34,7 +34,7 @@ struct OpenFile {
 
 OpenFile open_regular(const std::filesystem::path& path)
 {
-    if (path.native().find('\0') != std::string::npos) throw Error("can't be read: its name holds a byte 0");
+    if (path.native().find('\0') != std::string::npos) throw Error("can't be read: its name contains a zero byte");
     // O_NONBLOCK keeps the opening of a pipe from waiting for its writer.
     Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!descriptor) throw file_error("can't be read", errno);
@@ -51,7 +51,7 @@ void read_block(int descriptor, unsigned char* to, std::size_t begin, std::size_
         const ssize_t count = ::pread(descriptor, to + begin, end - begin, static_cast<off_t>(begin));
         if (count < 0 && errno == EINTR) continue;
         if (count < 0) throw file_error("can't be read", errno);
-        if (count == 0) throw Error("can't be read: it became shorter meanwhile");
+        if (count == 0) throw Error("can't be read: it was shortened while it was read");
         begin += static_cast<std::size_t>(count);
     }
 }
@@ -70,7 +70,7 @@ InputFile::InputFile(const std::filesystem::path& path)
 {
     const OpenFile file = open_regular(path);
     if (const auto bytes = static_cast<double>(file.bytes); !fits_in_memory(bytes))  // a sparse file may have any size
-        throw memory_exceeded("the file, which is read whole,", bytes, "read a smaller one");
+        throw memory_exceeded("the whole file", bytes, "read a smaller file");
     bytes_ = std::make_unique_for_overwrite<unsigned char[]>(file.bytes);
     size_ = file.bytes;
     constexpr std::size_t block = std::size_t{4} << 20;  // large enough to amortise a task, small enough to distribute

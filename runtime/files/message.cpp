@@ -21,7 +21,7 @@ void MessageWriter::put_text(const std::string& text)
 
 void MessageReader::check_left(std::size_t count, std::size_t bytes) const
 {
-    if (count > (memory_.size() - at_) / bytes) throw Error("can't be read: its reader went wrong; it is damaged");
+    if (count > (memory_.size() - at_) / bytes) throw Error("can't be read: the reader failed, so the file is damaged");
 }
 
 const unsigned char* MessageReader::take_bytes(std::size_t count, std::size_t bytes)

@@ -205,7 +205,7 @@ private:
 OutputFile::OutputFile(const fs::path& path, Unfinished unfinished)
     : path_(path), folder_(path.has_parent_path() ? path.parent_path() : fs::path("."))
 {
-    if (path.native().find('\0') != std::string::npos) throw Error("can't be written: its name holds a byte 0");
+    if (path.native().find('\0') != std::string::npos) throw Error("can't be written: its name contains a zero byte");
     make_folder(folder_);
     std::error_code error;
     const fs::file_status status = fs::status(path_, error);

@@ -125,8 +125,9 @@ void PlyFile::check_promise(const PlyElement& element) const
     const std::size_t row = encoding_ == Encoding::Ascii ? 2 * element.properties.size() : element.stride();
     const std::size_t held = (text_.size() - at_) / row;
     if (element.count > held)
-        throw Error(fmt::format("the file ends early: its header promises {} of the element \"{}\", it holds {}{}",
-                                element.count, element.name, element.has_lists() ? "at most " : "", held));
+        throw Error(
+            fmt::format("the file ends early: its header announces {} of the element \"{}\", but it contains {}{}",
+                        element.count, element.name, element.has_lists() ? "at most " : "", held));
 }
 
 double PlyFile::parse_number(const PlyElement& element, std::size_t row, const PlyProperty& property, ScalarType type)
@@ -140,12 +141,12 @@ double PlyFile::parse_number(const PlyElement& element, std::size_t row, const P
     double number = 0;
     const auto parsed = std::from_chars(from, end, number);
     if (parsed.ec != std::errc())
-        throw wrong(fmt::format("there is no {}; the file ends early or is damaged", property.name));
+        throw wrong(fmt::format("{} is missing; the file ends early or is damaged", property.name));
     if (parsed.ptr == end)
-        throw wrong(fmt::format("the file ends with the number {}, and may be cut within it", property.name));
+        throw wrong(fmt::format("the file ends with the number {} and may be cut off within it", property.name));
     const std::string_view word(from, static_cast<std::size_t>(parsed.ptr - from));
     if (white_space.find(*parsed.ptr) == std::string_view::npos || !is_of(type, number))
-        throw wrong(fmt::format("{} = {} is no number of its type", property.name,
+        throw wrong(fmt::format("{} = {} is not a number of its type", property.name,
                                 text_.substr(at_, std::max<std::size_t>(word.size(), 1))));
     at_ += word.size();
     return number;
@@ -189,7 +190,7 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t selected,
 {
     check_promise(element);
     if (selected < element.properties.size() && is_floating(element.properties[selected].type))
-        throw Error(fmt::format("{} of {} is of floating numbers; it must be of integers",
+        throw Error(fmt::format("{} of {} has floating-point numbers; it must have integers",
                                 element.properties[selected].name, element.name));
     std::vector<std::int64_t> list;
     if (element.properties.empty()) return;

@@ -66,7 +66,7 @@ public:
         constexpr std::size_t least = std::size_t{64} << 20;
         do start_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
         while (start_ == MAP_FAILED && errno == ENOMEM && (bytes_ /= 2) >= least);
-        if (start_ == MAP_FAILED) throw file_error("can't be read, for want of shared memory", errno);
+        if (start_ == MAP_FAILED) throw file_error("can't be read: there is no shared memory", errno);
     }
     ~SharedMemory() { ::munmap(start_, bytes_); }
     SharedMemory(const SharedMemory&) = delete;
@@ -182,22 +182,21 @@ Header outcome_of(const std::function<void(MessageWriter&)>& read, const SharedM
 std::string text_of_end(int status, const Limits& limits)
 {
     if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
-        return fmt::format("takes its reader longer than {} s", limits.seconds);
+        return fmt::format("takes longer than {} s to read", limits.seconds);
     if (WIFSIGNALED(status))
-        return fmt::format("ends its reader with signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
-    return "ends its reader";
+        return fmt::format("crashed the reader with signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+    return "crashed the reader";
 }
 
 Error beyond_limit(const Limits& limits)
 {
     if (limits.is_of_budget)
         return Error(
-            fmt::format("can't be read: its reader takes more than the {} that are left for it; read a smaller file, "
-                        "or set {}",
+            fmt::format("can't be read: the reader needs more than the available {}; read a smaller file, or set {}",
                         memory_text(static_cast<double>(limits.memory)), name_of(Setting::Memory)),
             ErrorKind::OutOfMemory);
     return Error(
-        fmt::format("can't be read: it takes more than {} MB of memory, and must be damaged", limits.memory >> 20));
+        fmt::format("can't be read: it needs more than {} MB of memory, so it must be damaged", limits.memory >> 20));
 }
 
 }  // namespace
@@ -220,7 +219,7 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
     tbb::task_arena alone(1);
     alone.initialize();
     const pid_t parent = ::getpid(), child = ::fork();
-    if (child < 0) throw file_error("can't be read, for want of a process to read it in", errno);
+    if (child < 0) throw file_error("can't be read: the reader process can't be started", errno);
     if (child == 0) {
         confine(parent, limits);
         alone.execute([&] {
@@ -250,8 +249,8 @@ void read_in_copy(const std::filesystem::path& path, const std::function<void(Me
             break;
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == status_of_waiting)
-        throw Error(fmt::format("can't be read: its reader waited for {} s", 2 * interval));
-    throw Error(fmt::format("can't be read: it {}, and must be damaged", text_of_end(status, limits)));
+        throw Error(fmt::format("can't be read: the reader waited for {} s", 2 * interval));
+    throw Error(fmt::format("can't be read: it {}, so it must be damaged", text_of_end(status, limits)));
 }
 
 }  // namespace rapid

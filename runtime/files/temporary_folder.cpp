@@ -14,8 +14,7 @@ namespace fs = std::filesystem;
 TemporaryFolder::TemporaryFolder(const std::string& purpose)
 {
     std::string name = (fs::temp_directory_path() / fmt::format("rapid-{}-XXXXXX", purpose)).string();
-    if (!mkdtemp(name.data()))
-        throw file_error(fmt::format("no folder for a {} can be made: {}", purpose, name), errno);
+    if (!mkdtemp(name.data())) throw file_error(fmt::format("can't make a folder for a {}: {}", purpose, name), errno);
     path_ = name;
 }
 

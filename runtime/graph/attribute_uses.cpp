@@ -316,8 +316,8 @@ void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std
     if (flow.has(node, name) || is_own_column(name) || known_attribute(name)) return;
     if (const auto later = made.attributes.find(name); later != made.attributes.end())
         throw Error(
-            fmt::format("no attribute \"{}\" here; node \"{}\" at line {} makes it, which comes later: move "
-                        "it before this one",
+            fmt::format("no attribute \"{}\" here; node \"{}\" at line {} makes it, but comes later: move that node "
+                        "before this one",
                         name, later->second.node->name, later->second.node->location.line));
     throw Error(no_attribute(name, flow.names_at(node), numbers));
 }

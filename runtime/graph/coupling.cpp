@@ -13,7 +13,7 @@ namespace {
 // The type of a parameter that takes a function of all points at once (Kernel::set_function_type).
 constexpr std::string_view whole_set_function_type = "function of the points";
 
-constexpr const char* by_index = "may read p.index, the place of a point among all";
+constexpr const char* by_index = "may read p.index, the index of a point among all";
 
 std::vector<CouplingRule>& rules()
 {
@@ -58,16 +58,16 @@ std::string what_couples(const Plan& plan, const PlannedNode& planned)
 {
     const NodeType& type = *planned.node->type;
     if (const Param* param = whole_set_function_of(type))
-        return reads_whole_set(planned, *param) ? "its function is given all points, and reads them" : "";
+        return reads_whole_set(planned, *param) ? "its function reads all points" : "";
     if (reads_indices(planned)) return by_index;
     if (type.has(Stage::Constraints)) return "its constraints are solved for all points together";
     const CouplingRule* rule = rule_of(type.name);
     std::string what = rule ? rule->couples(plan, planned) : "";
     if (!what.empty()) return what;
-    if (type.has(Stage::Emission) && !(rule && rule->take)) return "brings points, and leaves none out";
+    if (type.has(Stage::Emission) && !(rule && rule->take)) return "adds points, and can't leave any out";
     if (rule) return "";
     const bool alone = planned.op->as_point_edit() || type.kind == NodeKind::Dynamic || type.kind == NodeKind::Source;
-    return alone ? "" : "may look at all points, as nothing says that it does not (RAPID_COUPLING)";
+    return alone ? "" : "may read all points, because RAPID_COUPLING does not state otherwise";
 }
 
 }  // namespace
@@ -88,8 +88,7 @@ void refuse_coupled(const Plan& plan)
     const std::vector<PointCoupling> found = couplings_of(plan);
     if (found.empty()) return;
     const auto& [node, what] = found.front();
-    throw Error(
-        fmt::format("{}: points of this scene can't be simulated in parts, nor a sample of them; run all", what))
+    throw Error(fmt::format("{}: this scene can't be run in parts or as a sample; run all points", what))
         .in_node(node->name)
         .at(node->location);
 }

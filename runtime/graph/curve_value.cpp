@@ -66,8 +66,8 @@ public:
         CurvesPtr curves = call(clock.at(static_cast<double>(frame)));
         if (curves->lines()->after != first_->lines()->after)
             throw Error(
-                fmt::format("the function of a curve returned {} points in frame {}, and {} in the first, or other "
-                            "lines between them; a curve that deforms keeps its points",
+                fmt::format("the function of a curve returned {} points in frame {} and {} in the first, or other "
+                            "lines between them; a deforming curve must keep its points",
                             curves->points().size(), frame, first_->points().size()));
         recent_.emplace_front(key, std::move(curves));
         if (recent_.size() > max_recent) recent_.pop_back();

@@ -20,7 +20,7 @@ struct StageWords {
 
 constexpr StageWords stage_words[] = {
     {Stage::Emission, "emission", "no emit node"},
-    {Stage::Script, "script", "no node has a Lua function: workers have no interpreter"},
+    {Stage::Script, "script", "no node has a Lua function"},
     {Stage::Forces, "forces", "no force node"},
     {Stage::Integration, "integration", "no solve node"},
     {Stage::Collision, "collision", "no collide node"},
@@ -62,17 +62,18 @@ std::string why_kept(const Plan& plan, const PlannedAttribute& attribute)
     std::vector<std::string> reasons;
     if (!attribute.read_by.empty()) reasons.push_back(done_by(plan, attribute.read_by, "read"));
     if (!attribute.written_by.empty()) reasons.push_back(done_by(plan, attribute.written_by, "write"));
-    if (attribute.requested_by_name) reasons.push_back("an output asks for it");
+    if (attribute.requested_by_name) reasons.push_back("an output requests it");
     if (attribute.requested_as_made && attribute.read_by.empty() && attribute.written_by.empty())
-        reasons.push_back(done_by(plan, attribute.made_by, "make") + ", and an output takes all that is made");
-    if (attribute.kept_for_merge) reasons.push_back("its points are merged with others that have it");
-    if (reasons.empty()) reasons.push_back("nothing is left out");
+        reasons.push_back(done_by(plan, attribute.made_by, "make") +
+                          ", and an output takes all attributes of the scene");
+    if (attribute.kept_for_merge) reasons.push_back("its points are merged with points that have it");
+    if (reasons.empty()) reasons.push_back("nothing is pruned");
     return fmt::format("{}", fmt::join(reasons, "; "));
 }
 
 std::string what_brings_in(const PlannedAttribute& attribute)
 {
-    if (attribute.name == "dt") return "a node that bears points within a frame";
+    if (attribute.name == "dt") return "a node that emits points within a frame";
     if (attribute.group) {
         const std::string name = attribute.name.substr(group_prefix.size());
         return fmt::format("p:within \"{0}\" in a kernel, group = \"{0}\" of a node, or {1} FILE:{0}", name,
@@ -87,21 +88,24 @@ int calls_per_frame(const Plan& plan, const PlannedNode& planned)
     return planned.in_loop ? plan.simulations[planned.simulation].subframes : 1;
 }
 
-std::string times_per_frame(int times) { return times > 1 ? fmt::format("{} times a frame", times) : "once a frame"; }
+std::string times_per_frame(int times)
+{
+    return times > 1 ? fmt::format("{} times per frame", times) : "once per frame";
+}
 
 // Returns the treatment of a function of the frame between its calls.
 std::string between_calls(const PlannedNode& planned, const Param& param)
 {
-    if (planned.node->type->kind != NodeKind::Dynamic || !planned.in_loop) return "its value holds for the frame";
+    if (planned.node->type->kind != NodeKind::Dynamic || !planned.in_loop) return "its value is constant in the frame";
     switch (ChangingNode::between_calls(*planned.node, param)) {
         case ChangingNode::Between::Interpolated:
-            return "numbers are interpolated to the time of each sub-step; the estimated error has what that is off by";
+            return "numbers are interpolated to the time of each substep; the estimated error includes the difference";
         case ChangingNode::Between::Held:
-            return "its value at the end holds throughout; the estimated error has what that is off by";
+            return "its value at the end is used for the whole frame; the estimated error includes the difference";
         case ChangingNode::Between::Unfollowed:
             break;
     }
-    return "its value at the end holds throughout; not in the estimated error";
+    return "its value at the end is used for the whole frame; the estimated error does not include the difference";
 }
 
 void explain_functions(const Plan& plan, const PlannedNode& planned, Explanation& result)
@@ -113,7 +117,7 @@ void explain_functions(const Plan& plan, const PlannedNode& planned, Explanation
         const std::string full = fmt::format("{}.{}", planned.node->name, name);
         if (param->keeps_function)
             result.functions.push_back(
-                {full, "as its path needs",
+                {full, "as often as its path needs",
                  "called between frames, until pieces of the path are within 1e-5 of its length"});
         else
             result.functions.push_back(
@@ -146,26 +150,26 @@ Explanation explain(const Plan& plan, const std::vector<std::string>& outputs)
     Explanation result;
     for (const PlannedNode& planned : plan.nodes) {
         const int times = calls_per_frame(plan, planned);
-        const std::string why = plan.outputs.size() == 1 ? "reached from the output"
-                                                         : fmt::format("reached from the output{} {}",
+        const std::string why = plan.outputs.size() == 1 ? "leads to the output"
+                                                         : fmt::format("leads to the output{} {}",
                                                                        planned.reached_from.size() == 1 ? "" : "s",
                                                                        fmt::join(planned.reached_from, ", "));
         result.nodes.push_back({planned.node->name, planned.node->type->name, true,
                                 planned.once ? "once"
-                                : times > 1  ? fmt::format("{} times a frame", times)
+                                : times > 1  ? fmt::format("{} times per frame", times)
                                              : "every frame",
                                 why, planned.changes});
         explain_functions(plan, planned, result);
     }
     for (const NodePtr& node : plan.pruned)
-        result.nodes.push_back({node->name, node->type->name, false, "never", "no output comes from it", ""});
+        result.nodes.push_back({node->name, node->type->name, false, "never", "leads to no output", ""});
 
     for (const PlannedSimulation& simulation : plan.simulations)
         for (const PlannedAttribute& attribute : simulation.attributes)
             result.attributes.push_back(
                 {attribute.name, simulation.create->name, attribute.kept,
                  attribute.kept ? attribute.bytes_per_point() : 0,
-                 attribute.kept ? why_kept(plan, attribute) : "no node reads it and no output asks for it",
+                 attribute.kept ? why_kept(plan, attribute) : "no node reads it and no output requests it",
                  attribute.kept ? std::string() : what_brings_in(attribute)});
     sort_kept_first(result.attributes);
 

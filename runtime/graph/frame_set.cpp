@@ -13,7 +13,7 @@ void read_value(const Param& param, const Value& value, FrameSet& field)
     field.frames.clear();
     for (const double number : numbers) {
         if (number != std::floor(number))
-            throw Error(fmt::format("{} has the frame {}; frames are whole", param.name, number));
+            throw Error(fmt::format("{} has the frame {}; frames must be whole numbers", param.name, number));
         field.frames.insert(static_cast<std::int64_t>(number));
     }
 }

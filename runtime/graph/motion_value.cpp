@@ -47,8 +47,8 @@ MotionPtr key(const Param& param, std::int64_t frame, const Value& value)
     MotionPtr motion = value.object<Motion>();
     if (!motion || motion->varies())
         throw Error(
-            fmt::format("{}[{}] = {} is no place to be at a frame; keys are constant motions: rapid.translate, "
-                        "rapid.rotate, rapid.scale, or a product",
+            fmt::format("{}[{}] = {} can't be a key; keys must be constant motions: rapid.translate, rapid.rotate, "
+                        "rapid.scale, or a product",
                         param.name, frame, motion ? "a motion that varies" : describe(value)));
     return motion;
 }

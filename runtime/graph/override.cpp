@@ -26,7 +26,7 @@ const Node& find_node(const Graph& graph, const std::string& path, const std::st
     }
     if (of_type.size() == 1) return *found;
     if (of_type.size() > 1)
-        throw Error(fmt::format("{}: {} nodes are of the type {}; name one of {}", path, of_type.size(), target,
+        throw Error(fmt::format("{}: {} nodes have the type {}; give one of {}", path, of_type.size(), target,
                                 fmt::join(of_type, ", ")));
     for (const NodePtr& node : graph.nodes) names.push_back(node->type->name);
     throw Error(fmt::format("{}: the graph has no node \"{}\"{}", path, target, did_you_mean(target, names)));
@@ -61,8 +61,8 @@ Graph with_arguments(const Graph& graph, const std::map<std::string, Value>& val
     for (const auto& [path, value] : values) {
         const std::size_t dot = path.rfind('.');
         if (dot == std::string::npos || dot == 0 || dot + 1 == path.size())
-            throw Error(
-                fmt::format("\"{}\" is no parameter of a node; it must be NODE.PARAM, as solve.substeps", path));
+            throw Error(fmt::format(
+                "\"{}\" is not a parameter of a node; it must be NODE.PARAM, such as solve.substeps", path));
         const Node& node = find_node(graph, path, path.substr(0, dot));
         const std::string param = path.substr(dot + 1);
         name_errors(node.name, node.location, [&] { require_param(*node.type, param); });

@@ -105,12 +105,13 @@ const Table& names_only(const Param& param, const Value& value, Map& field)
 void check_attribute_name(std::string_view name)
 {
     if (name == "group" || find_point_name(name))
-        throw Error(fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", name));
+        throw Error(
+            fmt::format("\"{}\" can't be an attribute, because Rapid uses this name; choose another one", name));
     const auto letter = [](unsigned char c) { return std::isalpha(c) || c == '_'; };
     const auto part = [&](unsigned char c) { return letter(c) || std::isdigit(c); };
     if (name.empty() || !letter(name.front()) || !std::all_of(name.begin(), name.end(), part))
-        throw Error(
-            fmt::format("attribute name \"{}\" can't be used; take letters, digits and _, no digit first", name));
+        throw Error(fmt::format(
+            "attribute name \"{}\" can't be used; use letters, digits and _, and no digit at the beginning", name));
 }
 
 }  // namespace
@@ -270,10 +271,10 @@ void read_value(const Param& param, const Value& value, AttributeValue& field)
         return;
     }
 
-    const std::string right = !known ? "a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a text"
+    const std::string right = !known ? "a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a string"
                               : std::holds_alternative<Vec3f>(known->fallback) ? "a vec3 or {x, y, z}"
                               : std::holds_alternative<Quatf>(known->fallback) ? "a quaternion {x, y, z, w}"
-                              : std::holds_alternative<Token>(known->fallback) ? "a text, in quotes"
+                              : std::holds_alternative<Token>(known->fallback) ? "a string in quotes"
                                                                                : "a number";
     throw Error(fmt::format("{} = {} has the wrong type; it must be {}", param.name, describe(value), right));
 }

@@ -50,10 +50,8 @@ void load_plugin(const std::string& file)
 {
     const std::string built = mark_of(file);
     if (built.empty())
-        throw Error(
-            fmt::format("{}: it is no plugin of Rapid; one of its sources must have RAPID_PLUGIN "
-                        "(runtime/graph/plugin.h)",
-                        file));
+        throw Error(fmt::format(
+            "{}: not a plugin of Rapid; one of its sources must contain RAPID_PLUGIN (runtime/graph/plugin.h)", file));
     if (built != RAPID_ABI)
         throw Error(fmt::format("{}: the plugin was built for Rapid {}; this is Rapid {}: build it again", file, built,
                                 RAPID_ABI));

@@ -101,8 +101,8 @@ const NodeType& Registry::at(std::string_view name) const
     std::vector<std::string> names;
     for (const NodeType* type : types()) names.push_back(type->name);
     const std::string nearest = did_you_mean(name, names);
-    throw Error(fmt::format("unknown node \"{}\"{}", name,
-                            nearest.empty() ? "; `rapid nodes` lists those that there are" : nearest));
+    throw Error(
+        fmt::format("unknown node \"{}\"{}", name, nearest.empty() ? "; `rapid nodes` lists all nodes" : nearest));
 }
 
 std::vector<const NodeType*> Registry::types() const

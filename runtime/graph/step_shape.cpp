@@ -117,7 +117,8 @@ public:
     }
     const ScatterPtr& scatter() const override
     {
-        if (!scatter_) throw Error("there is no fog at this frame; end the births there, or let the sequence hold");
+        if (!scatter_)
+            throw Error("there is no fog at this frame; stop the births, or give the sequence after = \"hold\"");
         return scatter_;
     }
     double total() const override { return a_ + b_; }

@@ -56,8 +56,8 @@ void check_column_names(std::span<const std::string> names, std::string_view for
         const std::size_t bad = name.find_first_of(forbidden);
         if (bad != std::string::npos)
             throw Error(
-                fmt::format("the name \"{}\" can't be written: this format has no place for the character "
-                            "'{}' in names; rename the attribute or group",
+                fmt::format("the name \"{}\" can't be written: this format does not allow the character '{}' in names; "
+                            "rename the attribute or group",
                             name, name[bad]));
         if (!seen.insert(name).second)
             throw Error(fmt::format("two columns would be called \"{}\"; rename one of the attributes", name));

@@ -142,7 +142,7 @@ constexpr std::string_view end_section("\x00\xff", 2);
 
 void check_count(std::size_t points)
 {
-    if (points > 0x7fffffff) throw Error(fmt::format("{} points are more than .bgeo can count; write .vdb", points));
+    if (points > 0x7fffffff) throw Error(fmt::format("{} points are too many for .bgeo; write .vdb", points));
 }
 
 // The points in the form of records: strings are replaced by their index, an int32.
@@ -158,8 +158,8 @@ Recorded recorded(const PointSet& points)
         TextTable table = text_table(points.column<Token>(name));
         for (const Token text : table.strings)
             if (text.text().size() > longest_text)
-                throw Error(fmt::format("the attribute \"{}\" has a text of {} bytes; .bgeo holds at most {}", name,
-                                        text.text().size(), longest_text));
+                throw Error(fmt::format("the attribute \"{}\" has a string of {} bytes; .bgeo can store at most {}",
+                                        name, text.text().size(), longest_text));
         result.points.set(name, std::move(table.indices));
         result.strings[name] = std::move(table.strings);
     }
@@ -349,7 +349,7 @@ Dictionary read_dictionary(BigEndianReader& reader, std::uint32_t count, std::si
                 dictionary.defaults.emplace_back();
                 dictionary.strings[name] = std::move(strings);
             } else {
-                SkippedContents::add(fmt::format("the attribute \"{}\", {} strings a point", name, size));
+                SkippedContents::add(fmt::format("the attribute \"{}\" with {} strings per point", name, size));
             }
             stride += 4 * size;
         } else {
@@ -390,7 +390,7 @@ bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t v
             for (std::uint32_t k = 0; k < size; ++k) {
                 const std::uint32_t point = reader.integer(number);
                 if (point >= lines.points.size())
-                    throw Error(fmt::format("a polygon has the point {} of {}", point, lines.points.size()));
+                    throw Error(fmt::format("a polygon uses point {} of {}", point, lines.points.size()));
                 reader.take(vertex_bytes);
                 if (is_line) lines.vertices.push_back(point);
             }
@@ -417,7 +417,7 @@ void read_group(BigEndianReader& reader, PointSet& points)
     const std::string name = reader.string(reader.integer(2));
     const std::size_t size = reader.integer(4);
     if (size != points.size())
-        throw Error(fmt::format("the group \"{}\" is one of {} points; the file has {}", name, size, points.size()));
+        throw Error(fmt::format("the group \"{}\" has {} points, but the file has {}", name, size, points.size()));
     BigEndianReader words(reader.take(4 * words_of(size)));
     Column<std::uint8_t> column;
     const std::span<std::uint8_t> members = column.append_for_writing(size);
@@ -452,7 +452,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
     Dictionary dictionary = read_dictionary(reader, attributes, position_bytes);
     dictionary.attributes.insert(dictionary.attributes.begin(), {"P", ScalarType::Float, {0, 4, 8}});
     if (n > reader.rest().size() / dictionary.stride)
-        throw Error(fmt::format("the file ends early: its header promises {} points, it holds {}", n,
+        throw Error(fmt::format("the file ends early: its header announces {} points, but it contains {}", n,
                                 reader.rest().size() / dictionary.stride));
     PointSet points =
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);

@@ -165,7 +165,8 @@ void check_ids_differ(const PointSet& points, const char* set)
     for (std::size_t i = 1; i < points.size(); ++i) {
         const std::int64_t id = ids[order.empty() ? i : order[i]];
         if (id == ids[order.empty() ? i - 1 : order[i - 1]])
-            throw Error(fmt::format("two points of {} have the id {}; points are compared by id", set, id));
+            throw Error(fmt::format("two points of {} have the id {}; points are compared by id, so ids must be unique",
+                                    set, id));
     }
 }
 

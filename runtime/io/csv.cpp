@@ -252,7 +252,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
     const double bytes = bytes_per_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
     if (!fits_in_memory(bytes))
         throw memory_exceeded(fmt::format("{} lines of {} numbers", starts.size(), names.size()), bytes,
-                              "split the file, or write .bgeo in its place");
+                              "split the file, or write .bgeo instead");
     std::vector<CsvColumn> columns(names.size());
     if (!starts.empty()) find_strings(text.substr(starts[0]), may_be_text, columns);
     for (CsvColumn& column : columns) {
@@ -295,7 +295,7 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
             }
             if (at != stop && *at == '\r') ++at;
             if (at != stop && *at != '\n')
-                throw csv_error(i + 2, fmt::format("what follows {} values can't be understood", names.size()));
+                throw csv_error(i + 2, fmt::format("the text after {} values can't be parsed", names.size()));
         }
     });
     for (std::size_t c = 0; c < names.size(); ++c) columns[c].is_whole = !broken[c];
@@ -341,8 +341,8 @@ PointSet read_csv(const std::filesystem::path& path)
     const std::vector<std::size_t> starts = line_starts(text, header_end + 1);
     if (!text.ends_with('\n'))
         throw csv_error(starts.size() + 1,
-                        "there is no newline at its end, so that its last number may be cut short; if the file is "
-                        "whole, append a newline (echo >> FILE)");
+                        "there is no newline at the end, so the last number may be cut off; if the file is complete, "
+                        "append a newline (echo >> FILE)");
     std::vector<bool> may_be_text(names.size());
     for (const JoinedColumns& attribute : attributes)
         may_be_text[attribute.columns[0]] =
@@ -383,7 +383,7 @@ PointSet read_csv(const std::filesystem::path& path)
 }
 
 RAPID_FORMAT(Format{.extension = ".csv",
-                    .doc = "a table of text, a point a line in order of id",
+                    .doc = "a text table with a line for each point in order of id",
                     .write = write_csv,
                     .read = read_csv,
                     .lines_stand_alone = true});

@@ -25,8 +25,7 @@ constexpr int input = STDIN_FILENO, output = 3;  // ffmpeg's descriptors
 std::string path_of_ffmpeg()
 {
     if (std::string file = program_path("ffmpeg"); !file.empty()) return file;
-    throw Error(
-        "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
+    throw Error("films need ffmpeg; install it (apt install ffmpeg), or write pictures (.png)");
 }
 
 // Returns encoder options: constant quality, close to that of the pictures, with the matrix and primaries of HD video,
@@ -92,11 +91,11 @@ Film::Film(OutputFile& file, std::string_view extension, int width, int height, 
 
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-        throw Error(fmt::format("no connection to ffmpeg: {}", std::strerror(errno)));
+        throw Error(fmt::format("can't connect to ffmpeg: {}", std::strerror(errno)));
     frames_ = Descriptor(ends[0]);
     const Descriptor theirs(ends[1]);
     messages_ = Descriptor(memfd_create("ffmpeg", MFD_CLOEXEC));
-    if (!messages_) throw Error(fmt::format("no connection to ffmpeg: {}", std::strerror(errno)));
+    if (!messages_) throw Error(fmt::format("can't connect to ffmpeg: {}", std::strerror(errno)));
 
     ffmpeg_ = start_program(program, std::move(words),
                             {{messages_.number(), STDERR_FILENO},
@@ -151,7 +150,7 @@ void Film::fail()
     const ssize_t count = pread(messages_.number(), text, sizeof text, 0);
     std::string said(text, count > 0 ? static_cast<std::size_t>(count) : 0);
     while (!said.empty() && said.back() == '\n') said.pop_back();
-    throw Error(fmt::format("ffmpeg failed: {}", said.empty() ? "it says nothing" : said));
+    throw Error(fmt::format("ffmpeg failed: {}", said.empty() ? "without a message" : said));
 }
 
 }  // namespace rapid

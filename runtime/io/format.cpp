@@ -51,8 +51,8 @@ const Format& format_of(const std::filesystem::path& path)
         if (format.extension == extension) return format;
         known += (known.empty() ? "" : ", ") + format.extension;
     }
-    const std::string found =
-        extension.empty() ? std::string("it has no extension") : fmt::format("unknown extension \"{}\"", extension);
+    const std::string found = extension.empty() ? std::string("the name has no extension")
+                                                : fmt::format("unknown extension \"{}\"", extension);
     throw Error(fmt::format("{}; it must be one of {}", found, known)).at({path.string(), 0});
 }
 
@@ -65,8 +65,7 @@ PointSet read_points(const std::filesystem::path& path)
 {
     const Format& format = format_of(path);
     if (!format.read)
-        throw Error(fmt::format("a {} file holds no points that could be read", format.extension))
-            .at({path.string(), 0});
+        throw Error(fmt::format("points can't be read from a {} file", format.extension)).at({path.string(), 0});
     try {
         PointSet points = format.read(path);
         check_type(points, "P", AttributeType::Vec3);

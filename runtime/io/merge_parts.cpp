@@ -29,8 +29,8 @@ void check_ids(const PointSet& points, std::size_t part, std::size_t count, cons
     for_each_chunk(points.size(), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (i > 0 && ids[i] <= ids[i - 1])
-                throw Error(fmt::format("point {} comes after point {}; points of a part are in order of id", ids[i],
-                                        ids[i - 1]))
+                throw Error(fmt::format("point {} comes after point {}; the points of a part must be in order of id",
+                                        ids[i], ids[i - 1]))
                     .at({name, 0});
             if (const std::uint64_t own = Subset::part_of(ids[i], count); own != part)
                 throw Error(
@@ -62,7 +62,7 @@ AttributeType common_type(const std::string& name, const std::vector<PointSet>& 
             type = AttributeType::Float;
         else
             throw Error(
-                fmt::format("the attribute {} is {}, and {} in {}", name, type_name(here), type_name(*type), names[of]))
+                fmt::format("the attribute {} is {}, but {} in {}", name, type_name(here), type_name(*type), names[of]))
                 .at({names[k], 0});
     }
     return type.value_or(type_of(*parts.front().find(name)));
@@ -72,7 +72,7 @@ void check_columns(const std::vector<PointSet>& parts, const std::vector<std::st
 {
     for (std::size_t k = 1; k < parts.size(); ++k)
         if (parts[k].column_names() != parts[0].column_names() || parts[k].group_names() != parts[0].group_names())
-            throw Error(fmt::format("it has the attributes and groups {} {}, and {} has {} {}",
+            throw Error(fmt::format("it has the attributes and groups {} {}, but {} has {} {}",
                                     fmt::join(parts[k].column_names(), " "), fmt::join(parts[k].group_names(), " "),
                                     names[0], fmt::join(parts[0].column_names(), " "),
                                     fmt::join(parts[0].group_names(), " ")))

@@ -184,14 +184,14 @@ private:
     }
     void expect(char c)
     {
-        if (!accept(c)) throw Error(fmt::format("the header of the array has no '{}' where there must be one", c));
+        if (!accept(c)) throw Error(fmt::format("the header of the array lacks a '{}'", c));
     }
     std::string_view quoted()
     {
         const char quote = peek();
         const std::size_t end = text_.find(quote, 1);
         if ((quote != '\'' && quote != '"') || end == std::string_view::npos)
-            throw Error("the header of the array has no text where there must be one");
+            throw Error("the header of the array lacks a string");
         const std::string_view result = text_.substr(1, end - 1);
         text_.remove_prefix(end + 1);
         return result;
@@ -209,7 +209,7 @@ private:
         while (!accept(')')) {
             peek();
             const auto parsed = std::from_chars(text_.data(), text_.data() + text_.size(), shape.emplace_back());
-            if (parsed.ec != std::errc()) throw Error("the shape of the array is no tuple of whole numbers");
+            if (parsed.ec != std::errc()) throw Error("the shape of the array is not a tuple of whole numbers");
             text_.remove_prefix(static_cast<std::size_t>(parsed.ptr - text_.data()));
             accept(',');
         }
@@ -264,7 +264,7 @@ struct Array {
 std::optional<Array> array_in(std::span<const unsigned char> bytes)
 {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (!text.starts_with(npy_magic) || bytes.size() < 12) throw Error("not an array of NumPy");
+    if (!text.starts_with(npy_magic) || bytes.size() < 12) throw Error("not a NumPy array");
     const std::size_t length_bytes = bytes[6] == 1 ? 2 : 4, begin = 8 + length_bytes;
     std::size_t length = 0;
     for (std::size_t b = length_bytes; b-- > 0;) length = length << 8 | bytes[8 + b];
@@ -277,8 +277,8 @@ std::optional<Array> array_in(std::span<const unsigned char> bytes)
     const std::span<const unsigned char> data = bytes.subspan(begin + length);
     const std::size_t row = numbers * scalar_bytes(type->scalar) * std::max<std::size_t>(1, type->characters);
     if (rows > data.size() / row)
-        throw Error(
-            fmt::format("the array ends early: its header promises {} rows, it holds {}", rows, data.size() / row));
+        throw Error(fmt::format("the array ends early: its header announces {} rows, but it contains {}", rows,
+                                data.size() / row));
     return Array{*type, rows, numbers, header.fortran, data};
 }
 
@@ -299,7 +299,7 @@ Column<Token> strings_in(const Array& array)
             else if (const auto c = load_scalar<std::uint32_t>(at, array.type.order); c <= 0x10ffff)
                 append_utf8(text, c);
             else
-                throw Error(fmt::format("the text of a row has the character {}; there is none", c));
+                throw Error(fmt::format("the string of a row has the invalid character {}", c));
         }
         text.resize(text.find_last_not_of('\0') + 1);
         token = token_of_row(text);
@@ -332,8 +332,8 @@ PointSet read_npz(const std::filesystem::path& path)
             if (const std::optional<Array> array = array_in(bytes))
                 use(*array);
             else
-                SkippedContents::add(
-                    fmt::format("the array \"{}\", which is not of numbers or texts of each point", member.name));
+                SkippedContents::add(fmt::format(
+                    "the array \"{}\", which does not have a number or string for each point", member.name));
         } catch (const Error& error) {
             throw Error(fmt::format("\"{}\": {}", member.name, error.what()), error.kind());
         }
@@ -351,15 +351,15 @@ PointSet read_npz(const std::filesystem::path& path)
         });
     }
     check_column_names(names, "");
-    if (!placed) throw Error("there is no array P of floats and of shape (n, 3)");
+    if (!placed) throw Error("there is no array P of floats with the shape (n, 3)");
     bool has_id = false;
     for (const ZipReader::Member& member : zip.members()) {
         if (!member.name.ends_with(suffix)) continue;
         const std::string name = member.name.substr(0, member.name.size() - suffix.size());
         with_array(member, [&](const Array& array) {
             if (array.rows != points.size())
-                return SkippedContents::add(fmt::format("the array \"{}\" of {} rows; there are {} points", member.name,
-                                                        array.rows, points.size()));
+                return SkippedContents::add(fmt::format("the array \"{}\" of {} rows, but there are {} points",
+                                                        member.name, array.rows, points.size()));
             read_array(points, name, array);
             has_id |= name == "id" && array.numbers == 1 && !array.type.truth && array.type.characters == 0;
         });

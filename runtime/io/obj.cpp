@@ -82,7 +82,7 @@ void check_memory(std::size_t positions)
 {
     constexpr double bytes_per_position = 3 * (sizeof(Vec3f) + sizeof(std::int32_t)) + sizeof(std::int64_t);
     if (const double bytes = bytes_per_position * static_cast<double>(positions); !fits_in_memory(bytes))
-        throw memory_exceeded(fmt::format("lines of at least {} places", positions), bytes, "split the file");
+        throw memory_exceeded(fmt::format("lines of at least {} positions", positions), bytes, "split the file");
 }
 
 // Parses a complete word. Throws Error if it is not a number.
@@ -92,7 +92,7 @@ T number_of(std::string_view word, std::size_t line)
     T number{};
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (error != std::errc() || end != word.data() + word.size())
-        throw Error(fmt::format("line {}: \"{}\" is no number", line, word.substr(0, 40)));
+        throw Error(fmt::format("line {}: \"{}\" is not a number", line, word.substr(0, 40)));
     return number;
 }
 
@@ -123,13 +123,13 @@ PointSet read_obj(const std::filesystem::path& path)
         const std::string_view kind = words.next();
         if (text.empty() && !ends && !kind.empty() && !kind.starts_with('#'))
             throw Error(
-                fmt::format("line {}: there is no newline at its end, so that its last number may be cut short; if the "
-                            "file is whole, append a newline (echo >> FILE)",
+                fmt::format("line {}: there is no newline at the end, so the last number may be cut off; if the file "
+                            "is complete, append a newline (echo >> FILE)",
                             number));
         if (kind == "v") {
             Vec3f P;
             for (int axis = 0; axis < 3; ++axis) P[axis] = number_of<float>(words.next(), number);
-            if (!P.allFinite()) throw Error(fmt::format("line {}: a place must be finite", number));
+            if (!P.allFinite()) throw Error(fmt::format("line {}: a position must be finite", number));
             vertices.push_back(P);
         } else if (kind == "l") {
             for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
@@ -140,7 +140,7 @@ PointSet read_obj(const std::filesystem::path& path)
             ++curve;
         }
     }
-    if (vertices.empty()) throw Error("is no .obj file with vertices");
+    if (vertices.empty()) throw Error("is not an .obj file with vertices");
     if (curve == 0) positions = vertices, curves.assign(vertices.size(), 0);
 
     PointSet points;
@@ -153,7 +153,7 @@ PointSet read_obj(const std::filesystem::path& path)
 }
 
 RAPID_FORMAT(Format{.extension = ".obj",
-                    .doc = "Wavefront lines: places alone, with trails as polylines",
+                    .doc = "Wavefront lines: only positions, with trails as polylines",
                     .write = write_obj,
                     .read = read_obj,
                     .positions_only = true,

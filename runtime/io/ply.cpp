@@ -169,7 +169,8 @@ PointSet read_ply(const std::filesystem::path& path)
     return without_trail_places(std::move(*points));
 }
 
-RAPID_FORMAT(Format{".ply", "binary PLY: points for viewers and mesh tools; id as int32; no texts", write_ply, read_ply,
+RAPID_FORMAT(Format{".ply", "binary PLY: points for viewers and mesh tools; id as int32; no strings", write_ply,
+                    read_ply,
                     /*film=*/false, /*positions_only=*/false, /*holds_strings=*/false});
 
 }  // namespace

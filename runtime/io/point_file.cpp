@@ -81,9 +81,9 @@ void PointFile::keep(const PointSet& points)
     // Columns may grow to twice their size, and writing takes a part of them.
     const double bytes = static_cast<double>(collected_.bytes() + points.bytes());
     if (!fits_in_memory(bytes))
-        throw memory_exceeded(
-            fmt::format("{} points, which {} takes all at once,", collected_.size() + points.size(), format_.extension),
-            bytes, "write .csv or .bgeo, which take them as they come");
+        throw memory_exceeded(fmt::format("{} points, which {} must hold in memory,", collected_.size() + points.size(),
+                                          format_.extension),
+                              bytes, "write .csv or .bgeo, which are written point by point");
     append_points(collected_, points);
 }
 

@@ -71,8 +71,8 @@ void check_channel_name(const std::string& name)
     if (name.size() >= name_bytes || name.find_first_of(letters) != 0 ||
         name.find_first_not_of(allowed) != std::string::npos)
         throw Error(
-            fmt::format("the name \"{}\" can't be written to .prt; it must have at most {} letters, digits and "
-                        "_, and begin with no digit; rename the attribute or group",
+            fmt::format("the name \"{}\" can't be written to .prt; it must have at most {} letters, digits and _, and "
+                        "must not begin with a digit; rename the attribute or group",
                         name, name_bytes - 1));
 }
 
@@ -230,7 +230,7 @@ Channels read_channels(LittleEndianReader& reader)
         if (type < 0 || type >= static_cast<std::int32_t>(std::size(channel_types)))
             throw Error(fmt::format("the channel \"{}\" has the unknown type {}", name, type));
         if (numbers < 1 || numbers > 0xffff || offset < 0)
-            throw Error(fmt::format("the channel \"{}\" has {} numbers a point, at {}", name, numbers, offset));
+            throw Error(fmt::format("the channel \"{}\" has {} numbers per point, at {}", name, numbers, offset));
         const ScalarType scalar = channel_types[type];
         const std::size_t begin = static_cast<std::size_t>(offset), size = static_cast<std::size_t>(numbers);
         channels.stride = std::max(channels.stride, begin + size * scalar_bytes(scalar));
@@ -238,7 +238,7 @@ Channels read_channels(LittleEndianReader& reader)
         if (size <= max_numbers)
             channels.attributes.push_back(attribute_of(name, scalar, size, begin));
         else
-            SkippedContents::add(fmt::format("the channel \"{}\" of {} numbers a point", name, numbers));
+            SkippedContents::add(fmt::format("the channel \"{}\" of {} numbers per point", name, numbers));
     }
     check_column_names(names, "");
     return channels;
@@ -257,7 +257,7 @@ PointSet read_prt(const std::filesystem::path& path)
     const auto version = reader.integer<std::int32_t>();
     if (version != 1 && version != 2) throw Error(fmt::format("version {} can't be read; it must be 1 or 2", version));
     const auto count = reader.integer<std::int64_t>();
-    if (count < 0) throw Error("it was never completed: its header does not say how many points it holds");
+    if (count < 0) throw Error("it was never completed: its header has no number of points");
     reader.take(static_cast<std::size_t>(header) - header_bytes);  // additions of version 2
     reader.take(4);
     const Channels channels = read_channels(reader);
@@ -269,7 +269,8 @@ PointSet read_prt(const std::filesystem::path& path)
     const std::size_t n = static_cast<std::size_t>(count);
     const std::size_t held = reader.rest().size() * max_deflate_expansion / channels.stride;
     if (n > held)
-        throw Error(fmt::format("the file ends early: its header promises {} points, it holds at most {}", n, held));
+        throw Error(
+            fmt::format("the file ends early: its header announces {} points, but it contains at most {}", n, held));
     const std::size_t bytes = n * channels.stride;
     // Accounts for the records and for the points made from them.
     if (const double both = 2.0 * static_cast<double>(bytes); !fits_in_memory(both))
@@ -281,13 +282,13 @@ PointSet read_prt(const std::filesystem::path& path)
         is_empty ? Z_OK : ::uncompress(records.get(), &found, reader.rest().data(), reader.rest().size());
     if (result == Z_MEM_ERROR) throw std::bad_alloc();
     if (found < bytes)
-        throw Error(fmt::format("the file ends early or is damaged: its header promises {} points, it holds {}", n,
-                                found / channels.stride));
+        throw Error(fmt::format("the file ends early or is damaged: its header announces {} points, but it contains {}",
+                                n, found / channels.stride));
     if (result != Z_OK) throw Error("the compressed records are damaged");
     return read_records({{records.get(), bytes}, n, channels.stride, ByteOrder::Little}, channels.attributes);
 }
 
-RAPID_FORMAT(Format{".prt", "Krakatoa's particles, compressed; all types but texts", write_prt, read_prt,
+RAPID_FORMAT(Format{".prt", "Krakatoa's particles, compressed; all types but strings", write_prt, read_prt,
                     /*film=*/false, /*positions_only=*/false, /*holds_strings=*/false});
 
 }  // namespace

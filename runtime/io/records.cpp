@@ -56,8 +56,8 @@ void check_fits_int32(const std::string& name, const Column<std::int64_t>& colum
         for (std::size_t i = begin; i < end; ++i)
             if (values[i] != static_cast<std::int32_t>(values[i]))
                 throw Error(
-                    fmt::format("{} = {} does not fit the int32 of this format (at most {}); write .vdb or "
-                                ".csv, which hold int64",
+                    fmt::format("{} = {} does not fit into the int32 of this format (at most {}); write .vdb or .csv, "
+                                "which store int64",
                                 name, values[i], std::numeric_limits<std::int32_t>::max()));
     });
 }
@@ -112,7 +112,7 @@ struct Numbers {
         check(offset, [](std::size_t i, auto number) {
             const auto id = static_cast<double>(number);
             if (!(std::abs(id) <= 0x1p53 && id == std::floor(id)))
-                throw Error(fmt::format("point {} has the id {}; ids are whole numbers", i, id));
+                throw Error(fmt::format("point {} has the id {}; ids must be whole numbers", i, id));
         });
     }
 

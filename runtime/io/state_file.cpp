@@ -79,7 +79,7 @@ bool is_worth_packing(const Raw& raw)
            worthwhile * static_cast<double>(size);
 }
 
-[[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is no whole snapshot", how)); }
+[[noreturn]] void damaged(const char* how) { throw Error(fmt::format("{}; it is not a complete snapshot", how)); }
 
 // Decompresses a piece. One as large as its content is stored uncompressed.
 void unpack(std::string_view piece, char* data, std::size_t bytes)
@@ -221,7 +221,7 @@ StateFile::StateFile(Content content) : content_(std::move(content))
 {
     const std::string_view all = text();
     constexpr std::size_t ends = state_magic.size() + 2 * sizeof(std::uint64_t);
-    if (all.size() < ends || !all.starts_with(state_magic)) damaged("it does not begin as one");
+    if (all.size() < ends || !all.starts_with(state_magic)) damaged("it does not begin like one");
     const std::size_t body = all.size() - sizeof(std::uint64_t);
     if (content_hash(all.substr(0, body)) != number_at(all.data() + body)) damaged("its checksum is wrong");
     const std::uint64_t length = number_at(all.data() + state_magic.size());

@@ -49,7 +49,7 @@ Column<Token> strings_at(const std::vector<Token>& strings, const Column<std::in
     const auto text = [&](std::int32_t index) {
         if (index == -1) return Token();
         if (index < 0 || static_cast<std::size_t>(index) >= strings.size())
-            throw Error(fmt::format("a point has the text {}; there are {}", index, strings.size()));
+            throw Error(fmt::format("a point has string number {}, but there are only {}", index, strings.size()));
         return strings[static_cast<std::size_t>(index)];
     };
     if (indices.size() == 0) return Column<Token>();

@@ -111,7 +111,7 @@ public:
 
     std::vector<UsdArray> read()
     {
-        if (!text_.starts_with("#usda")) throw Error("not USD's text: it does not begin with \"#usda\"");
+        if (!text_.starts_with("#usda")) throw Error("not a USD text file: it does not begin with \"#usda\"");
         bool found = false;
         while (skip_space(), at_ < text_.size()) {
             if (!is_word(text_[at_])) {
@@ -174,7 +174,7 @@ private:
             if (text_.substr(at_, 3) == three) return skip_to(three, at_ + 3);
             for (++at_; at_ < text_.size() && text_[at_] != c; ++at_)
                 if (text_[at_] == '\\') ++at_;
-            if (at_ >= text_.size()) throw wrong("a text has no end");
+            if (at_ >= text_.size()) throw wrong("a string has no end");
             ++at_;
         } else if (c == '@') {
             text_.substr(at_, 3) == "@@@" ? skip_to("@@@", at_ + 3) : skip_to("@", at_ + 1);
@@ -187,7 +187,7 @@ private:
     // Returns a quoted string with escapes resolved.
     std::string text_value()
     {
-        if (!is_at('"') && !is_at('\'')) throw wrong("there is no text where there should be one");
+        if (!is_at('"') && !is_at('\'')) throw wrong("a string is missing");
         const std::size_t begin = at_;
         skip_mark();
         const std::string_view quoted = text_.substr(begin, at_ - begin);
@@ -223,7 +223,7 @@ private:
             if (at_ >= text_.size()) throw wrong("the file ends within a value");
             if (std::string_view("([{").find(text_[at_]) != std::string_view::npos) ++depth;
             if (std::string_view(")]}").find(text_[at_]) != std::string_view::npos && depth-- == 0)
-                throw wrong("a bracket closes that was not opened");
+                throw wrong("a closing bracket has no opening one");
             skip_mark();
         } while (depth > 0);
     }
@@ -257,7 +257,7 @@ private:
             read_value(type, name);
             line = skip_space();
         } else if (name.empty() && !is_at('"') && !is_at('(') && !is_at('{') && !is_at(';')) {
-            throw wrong("there is no property of a prim where there should be one");
+            throw wrong("the property of a prim is missing");
         } else if (!line && at_ < text_.size() && !is_at('}')) {
             skip_mark_or_brackets();
             line = false;
@@ -275,7 +275,7 @@ private:
             if (type.ends_with("[]")) SkippedContents::add(fmt::format("{} of the type {}", name, type));
             return skip_value();
         }
-        if (!names_.insert(name).second) throw wrong(fmt::format("{} is there twice", name));
+        if (!names_.insert(name).second) throw wrong(fmt::format("{} appears twice", name));
         if (!name.ends_with(samples)) {
             if (!is_at('[')) return skip_value();  // None
             array->name = std::string(name);
@@ -293,8 +293,8 @@ private:
             if (skip_space(), is_at(':')) ++at_;
             skip_space();
             if (std::exchange(found, true))
-                throw wrong(
-                    fmt::format("{} has several time samples; give a file of one frame (usdcat can take one)", name));
+                throw wrong(fmt::format(
+                    "{} has several time samples; give a file with one frame (usdcat can extract one)", name));
             if (is_at('['))
                 read_numbers(*array);
             else
@@ -334,7 +334,7 @@ private:
     void expect(char c)
     {
         skip_space();
-        if (!is_at(c)) throw wrong(fmt::format("there is no '{}' where there should be one", c));
+        if (!is_at(c)) throw wrong(fmt::format("'{}' is missing", c));
         ++at_;
     }
 
@@ -344,7 +344,7 @@ private:
     {
         if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
             throw memory_exceeded(fmt::format("an array of at least {} rows", array.rows()), bytes,
-                                  "write .bgeo in its place");
+                                  "write .bgeo instead");
     }
 
     void read_number(UsdArray& array)
@@ -359,7 +359,7 @@ private:
             const auto parsed = std::from_chars(from, end, number);
             bool fits = parsed.ec == std::errc();
             if constexpr (std::is_integral_v<decltype(number)>) fits &= number >= array.least && number <= array.most;
-            if (!fits) throw wrong("there is no number of its type where there should be one");
+            if (!fits) throw wrong("a number of its type is missing");
             at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
             return number;
         };
@@ -429,8 +429,8 @@ void check_identifier(std::string_view name)
     });
     if (!good)
         throw Error(
-            fmt::format("the name \"{}\" can't be written to .usda; it must be of letters, digits and _, and "
-                        "begin with no digit; rename the attribute or group",
+            fmt::format("the name \"{}\" can't be written to .usda; it must consist of letters, digits and _, and must "
+                        "not begin with a digit; rename the attribute or group",
                         name));
 }
 
@@ -608,7 +608,7 @@ PointSet read_usda(const std::filesystem::path& path)
     const InputFile file(path);
     const std::vector<UsdArray> arrays = usda_points(file.text());
     const auto place = std::find_if(arrays.begin(), arrays.end(), [](const UsdArray& a) { return a.name == "points"; });
-    if (place == arrays.end() || place->tuple != 3) throw Error("the prim of points has no points of three numbers");
+    if (place == arrays.end() || place->tuple != 3) throw Error("the prim of points has no positions of three numbers");
 
     PointSet points;
     points.append(place->rows());
@@ -619,7 +619,7 @@ PointSet read_usda(const std::filesystem::path& path)
         if (array.name == "extent") continue;  // not a value per point
         if (array.rows() != points.size() && !constant) {
             SkippedContents::add(
-                fmt::format("{} of {} values; there are {} points", array.name, array.rows(), points.size()));
+                fmt::format("{} of {} values, but there are {} points", array.name, array.rows(), points.size()));
             continue;
         }
         if (array.strings) {
@@ -649,7 +649,7 @@ PointSet read_usda(const std::filesystem::path& path)
     return points;
 }
 
-RAPID_FORMAT(Format{".usda", "USD's text, points at the frame's time code; all types", write_usda, read_usda});
+RAPID_FORMAT(Format{".usda", "USD text, points at the frame's time code; all types", write_usda, read_usda});
 
 }  // namespace
 }  // namespace rapid

@@ -67,7 +67,7 @@ Column<Token> receive_column(std::size_t points, MessageReader& message)
 
 AnyColumn receive_any(std::uint8_t type, std::size_t points, MessageReader& message)
 {
-    if (type >= std::variant_size_v<AnyColumn>) throw Error("can't be read: its reader went wrong; it must be damaged");
+    if (type >= std::variant_size_v<AnyColumn>) throw Error("can't be read: the reader failed, so it must be damaged");
     return std::visit([&]<class T>(const Column<T>&) -> AnyColumn { return receive_column<T>(points, message); },
                       column_of_type<AnyColumn>(type));
 }
@@ -142,8 +142,8 @@ std::size_t checked_count(const PointDataGrid& grid)
     const auto first = grid.tree().cbeginLeaf();
     for (auto leaf = first; leaf; ++leaf) {
         if (!has_valid_offsets(*leaf))
-            throw Error(fmt::format("can't be read: a leaf of the grid \"{}\" has more points than values of them",
-                                    grid.getName()));
+            throw Error(
+                fmt::format("can't be read: a leaf of the grid \"{}\" has more points than values", grid.getName()));
         if (!have_same_attributes(*leaf, *first))
             throw Error(
                 fmt::format("can't be read: the leaves of the grid \"{}\" differ in their attributes", grid.getName()));
@@ -252,7 +252,8 @@ void read_strings(PointSet& points, const std::vector<LeafRange>& ranges, const 
         for (vdb::Index k = 0; k < leaf.getLastValue(); ++k) {
             const auto found = strings.find(numbers.get(k));
             if (found == strings.end())
-                throw Error(fmt::format("the attribute \"{}\" has the text {}; there is none", name, numbers.get(k)));
+                throw Error(fmt::format("the attribute \"{}\" uses string number {}, which does not exist", name,
+                                        numbers.get(k)));
             values[at + k] = found->second;
         }
     });
@@ -351,8 +352,8 @@ VdbPoints read_grids(const std::filesystem::path& path, const std::string&)
             count += checked_count(*grids.back());
         }
         if (grids.empty())
-            throw Error(others.empty() ? std::string("the file holds no grids")
-                                       : fmt::format("the file holds no points; its grids are {}", others));
+            throw Error(others.empty() ? std::string("the file contains no grids")
+                                       : fmt::format("the file contains no points; its grids are {}", others));
 
         VdbPoints read;
         read.points.append(count);

@@ -29,10 +29,9 @@ double largest_coordinate(const PointSet& points)
     for (std::size_t i = 0; i < points.size(); ++i) {
         const double here = P[i].cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
         if (!std::isfinite(here))
-            throw Error(
-                fmt::format("point {}: P = {} {} {} has no place in a grid; write .bgeo, .ply or .csv, or "
-                            "remove the point",
-                            points.id()[i], P[i].x(), P[i].y(), P[i].z()));
+            throw Error(fmt::format(
+                "point {}: P = {} {} {} is too far away for a grid; write .bgeo, .ply or .csv, or remove the point",
+                points.id()[i], P[i].x(), P[i].y(), P[i].z()));
         largest = std::max(largest, here);
         if (i % 65536 == 0) trim_columns();
     }

@@ -39,8 +39,8 @@ void check_names(const PointSet& points)
 {
     const auto check = [](const std::string& name, const char* what) {
         if (!AttributeSet::Descriptor::validName(name))
-            throw Error(fmt::format("the {} \"{}\" can't be written to .vdb; its name must be of letters, digits and _",
-                                    what, name));
+            throw Error(fmt::format(
+                "the {} \"{}\" can't be written to .vdb; its name must consist of letters, digits and _", what, name));
     };
     for (const auto& [name, column] : points.columns()) check(name, "attribute");
     for (const auto& [name, members] : points.groups()) check(name, "group");
@@ -503,7 +503,7 @@ void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame)
 {
     initialize_openvdb();
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
-        throw Error(fmt::format("{} points are more than one grid counts; write fewer, or .csv", points.size()));
+        throw Error(fmt::format("{} points are too many for a grid; write fewer, or write .csv", points.size()));
     check_names(points);
     try {
         const double voxel = std::ldexp(1.0, voxel_exponent(points));

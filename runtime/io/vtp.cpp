@@ -119,7 +119,7 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
             const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
             text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
             if (parsed.ec != std::errc() || (!text.empty() && xml_space.find(text[0]) == std::string_view::npos))
-                throw Error(fmt::format("the array has no number of its type where it should have its {}", i));
+                throw Error(fmt::format("the array lacks the number of its {}", i));
             std::memcpy(bytes.data() + i * sizeof number, &number, sizeof number);
         }
         if (!without_space(text).empty()) throw Error(fmt::format("the array has more than its {} numbers", count));
@@ -153,18 +153,18 @@ VtkFile::VtkFile(std::string_view text, std::string_view type)
     }
     const pugi::xml_parse_result parsed = document_.load_buffer(xml.data(), xml.size());
     const pugi::xml_node root = document_.child("VTKFile");
-    if (!root) throw Error("not a file of VTK: it has no element VTKFile");
+    if (!root) throw Error("not a VTK file: it has no element VTKFile");
     if (!parsed) throw Error(fmt::format("its XML is damaged: {}", parsed.description()));
     if (root.attribute("type").value() != type)
-        throw Error(
-            fmt::format("it holds {}; it must hold {}", root.attribute("type").as_string("no type of data"), type));
+        throw Error(fmt::format("it contains {}; it must contain {}",
+                                root.attribute("type").as_string("no type of data"), type));
     if (root.attribute("byte_order").value() == std::string_view("BigEndian")) order_ = ByteOrder::Big;
     wide_header_ = root.attribute("header_type").value() == std::string_view("UInt64");
     const std::string_view compressor = root.attribute("compressor").value();
     compressed_ = !compressor.empty();
     if (compressed_ && compressor != "vtkZLibDataCompressor")
-        throw Error(
-            fmt::format("it is compressed by {}; it must be by vtkZLibDataCompressor, or not at all", compressor));
+        throw Error(fmt::format("it is compressed by {}; it must be compressed by vtkZLibDataCompressor, or not at all",
+                                compressor));
 }
 
 std::size_t VtkFile::header_number(std::span<const unsigned char> bytes, std::size_t index) const
@@ -224,7 +224,7 @@ std::vector<unsigned char> VtkFile::decode(std::string_view text, bool base64, s
     for (std::size_t b = 0; b < blocks; ++b) {
         const std::size_t size = b + 1 == blocks && last > 0 ? last : block;
         const std::size_t packed_size = header_number(header, 3 + b);
-        if (size > result.size() - to) throw Error("the blocks of the array hold more than its numbers");
+        if (size > result.size() - to) throw Error("the blocks of the array contain more than its numbers");
         uLongf found = size;
         const int status = ::uncompress(result.data() + to, &found, data.data() + from, packed_size);
         if (status == Z_MEM_ERROR) throw std::bad_alloc();
@@ -260,7 +260,7 @@ std::pair<std::string_view, bool> VtkFile::data_of(pugi::xml_node node, std::str
     if (format != "appended")
         throw Error(fmt::format("its format is \"{}\"; it must be ascii, binary or appended", format));
     const std::optional<std::size_t> offset = whole_number(node.attribute("offset").value());
-    if (!offset || *offset > appended_.size()) throw Error("its offset leads out of the file");
+    if (!offset || *offset > appended_.size()) throw Error("its offset is beyond the end of the file");
     return {appended_.substr(*offset), appended_base64_};
 }
 
@@ -531,7 +531,7 @@ PointSet read_vtp(const std::filesystem::path& path)
     if (*n > 0) {
         const std::optional<VtkArray> P = vtk.array(piece.child("Points").child("DataArray"), *n);
         if (!P || P->numbers != 3 || !is_floating(P->type))
-            throw Error("its Points are no array of three floats for each point");
+            throw Error("its Points are not an array of three floats for each point");
         points.append(*n);
         read("P", *P);
     }
@@ -539,7 +539,7 @@ PointSet read_vtp(const std::filesystem::path& path)
     for (const pugi::xml_node node : piece.child("PointData").children("DataArray")) {
         const std::optional<VtkArray> array = vtk.array(node, *n);
         if (!array) {
-            SkippedContents::add(fmt::format("the array \"{}\" of the type {}, {} numbers a point",
+            SkippedContents::add(fmt::format("the array \"{}\" of the type {}, {} numbers per point",
                                              node.attribute("Name").value(), node.attribute("type").value(),
                                              node.attribute("NumberOfComponents").as_string("1")));
             continue;

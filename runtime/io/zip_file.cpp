@@ -140,7 +140,7 @@ struct ZipReader::Archive {
 
 namespace {
 
-Error damaged_zip() { return Error("not a whole zip file: its directory is missing or damaged"); }
+Error damaged_zip() { return Error("not a complete zip file: its directory is missing or damaged"); }
 
 // Returns true if the file has the complete end record, "PK\5\6", and the comment after it. Minizip does not read the
 // record's last bytes if there is a 64-bit one.
@@ -191,7 +191,7 @@ ZipReader::ZipReader(std::span<const unsigned char> bytes) : archive_(new Archiv
         held += std::min<std::uint64_t>(info.compressed_size, bytes.size() + 1);
         const std::uint64_t expansion = info.compression_method == 0 ? 1 : max_deflate_expansion;
         if (held > bytes.size() || info.uncompressed_size > info.compressed_size * expansion)
-            throw Error(fmt::format("\"{}\" holds less than its directory promises; the file is damaged", text));
+            throw Error(fmt::format("\"{}\" is shorter than its directory says; the file is damaged", text));
         members_.push_back({text, place.pos_in_zip_directory, place.num_of_file, info.uncompressed_size});
     }
     if (result != UNZ_END_OF_LIST_OF_FILE) throw damaged_zip();

@@ -47,11 +47,11 @@ struct Attract {
     std::string advice(double dt) const
     {
         const std::string text =
-            "without core its pull has no bound at the surface of shape, which no number of sub-steps resolves; give "
-            "core, the distance within which it grows no more";
+            "without core its pull is unbounded at the surface of shape, and no number of substeps resolves it; give "
+            "core, the distance below which it stops growing";
         if (!strength.attribute.empty()) return text;
         const double least = std::pow(16 * strength.constant * dt * dt, 1 / (falloff + 1));
-        return text + fmt::format(": from {:.2g} m on 1 sub-step resolves it", least);
+        return text + fmt::format(": from {:.2g} m on 1 substep resolves it", least);
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

@@ -47,8 +47,8 @@ void read_value(const Param& param, const Value& value, AnyCurves& field)
             throw Error(fmt::format("{} has {} points; a curve needs at least two", param.name, field.P.size()));
         for (std::size_t i = 0; i + 1 < field.P.size(); ++i)
             if (field.P[i] == field.P[i + 1])
-                throw Error(fmt::format("{}: points {} and {} are at one place; a curve goes from place to place",
-                                        param.name, i + 1, i + 2));
+                throw Error(
+                    fmt::format("{}: points {} and {} have the same position; remove one", param.name, i + 1, i + 2));
         const std::size_t count = field.P.size();
         field.open = std::make_shared<CurveLines>(std::span(&count, 1), false);
         field.closed = std::make_shared<CurveLines>(std::span(&count, 1), true);
@@ -93,8 +93,8 @@ struct CurveForce {
     {
         if (closed && !curve.is_list)
             throw Error(
-                "closed is for a list of places; a curve is closed by rapid.curve.from { points = ..., closed = true "
-                "}");
+                "closed needs a list of positions; to close a curve, give rapid.curve.from { points = ..., closed = "
+                "true }");
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

@@ -41,7 +41,7 @@ struct Delete {
 
     void check() const
     {
-        if (group.empty() && !where) throw Error("nothing says which points to remove; give group, where or both");
+        if (group.empty() && !where) throw Error("no points are selected; give group, where or both");
     }
 
     bool removes_points() const { return true; }

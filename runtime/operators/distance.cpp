@@ -24,7 +24,7 @@ void read_value(const Param& param, const Value& value, PointPair& pair)
     std::vector<int> indices;
     read_value(param, value, indices);
     if (indices.size() != 2)
-        throw Error(fmt::format("{} has an entry of {} numbers; each must be two places, {{i, j}}", param.name,
+        throw Error(fmt::format("{} has an entry of {} numbers; each must be two indices, {{i, j}}", param.name,
                                 indices.size()));
     pair = {indices[0], indices[1]};
 }
@@ -119,8 +119,8 @@ struct Distance {
     void check() const
     {
         if (pairs.empty() == !within.has_value())
-            throw Error(pairs.empty() ? "it has neither pairs nor within; give one of them"
-                                      : "it has both pairs and within; give one of them");
+            throw Error(pairs.empty() ? "neither pairs nor within is given; give one of them"
+                                      : "both pairs and within are given; remove one of them");
     }
 
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)
@@ -128,10 +128,10 @@ struct Distance {
         Flow flow = std::move(inputs[0]);
         if (!rows_ && !flow.points.empty()) {
             if (strain && !strength && compliance == 0)
-                now.warnings.push_back(fmt::format(
-                    "node \"{}\": strain = {:g} breaks no rod, as no load stretches a rigid pair; give it a "
-                    "compliance, or the strength at which it breaks, N",
-                    now.node, *strain));
+                now.warnings.push_back(
+                    fmt::format("node \"{}\": strain = {:g} breaks no rod, because no load stretches a rigid pair; "
+                                "give it a compliance, or give strength, the force at which it breaks, N",
+                                now.node, *strain));
             rows_ = tie(flow.points);
         }
         if (!rows_) return flow;
@@ -168,11 +168,10 @@ private:
         for (const PointPair& pair : pairs) {
             for (const int k : {pair.i, pair.j})
                 if (k < 1 || k > n)
-                    throw Error(
-                        fmt::format("pairs names point {}; of the set that first enters the node there are "
-                                    "points 1 to {}",
-                                    k, n));
-            if (pair.i == pair.j) throw Error(fmt::format("pairs ties point {} to itself; give two points", pair.i));
+                    throw Error(fmt::format(
+                        "pairs names point {}, but the set that first enters the node has points 1 to {}", k, n));
+            if (pair.i == pair.j)
+                throw Error(fmt::format("pairs connects point {} to itself; give two points", pair.i));
             add(static_cast<std::size_t>(pair.i - 1), static_cast<std::size_t>(pair.j - 1));
         }
         if (!within) return rows;
@@ -182,7 +181,8 @@ private:
         if (P.stride == 0) std::fill(at.begin(), at.end(), P[0].cast<double>());
         for (std::size_t i = 0; i < at.size(); ++i)
             if (!at[i].allFinite())
-                throw Error(fmt::format("point {} has no finite P; a node before this one made it so", points.id()[i]));
+                throw Error(
+                    fmt::format("the P of point {} is not finite; correct the node before this one", points.id()[i]));
         const float reach = static_cast<float>(*within / 2);
         const Strided<std::uint8_t> members = members_of(points, group);
         Pairs near;

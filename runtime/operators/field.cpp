@@ -34,8 +34,7 @@ struct Field {
 
     void check() const
     {
-        if (mode == "force" && drag)
-            throw Error("drag goes with mode = \"velocity\"; a force has none: leave it out, or add :drag");
+        if (mode == "force" && drag) throw Error("drag needs mode = \"velocity\"; remove it, or add :drag");
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

@@ -63,7 +63,7 @@ struct Group {
 
     void check() const
     {
-        if (name.empty()) throw Error("name = \"\" names no group; give it at least one letter");
+        if (name.empty()) throw Error("name = \"\" is empty; give the group a name");
     }
 
     bool reads_indices() const { return where && where->reads_indices(); }

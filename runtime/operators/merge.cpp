@@ -134,7 +134,7 @@ struct Merge {
         if (node.carries.size() > 1) return "numbers the points of several simulations in the order in which they come";
         return keeps_order(plan, node)
                    ? ""
-                   : "joins its inputs in another order than that of the ids, which parts could not be put together in";
+                   : "joins its inputs in another order than that of their ids, so parts could not be merged";
     }
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
@@ -210,8 +210,8 @@ private:
         Simulation& here = *result.simulation;
         const Simulation& there = *input.simulation;
         if (there.fps != here.fps)
-            throw Error(fmt::format("it runs at {} frames a second, input 1 at {}; give both the same fps", there.fps,
-                                    here.fps));
+            throw Error(fmt::format("it runs at {} frames per second and input 1 at {}; give both the same fps",
+                                    there.fps, here.fps));
         PointSet& points = input.points;
         if (&there != &here && !points.empty()) {
             AdoptedIds& adopted = here.adopted[&there];

@@ -403,7 +403,7 @@ struct PinNode {
     void check() const
     {
         if (transform && (target.place || target.motion || target.deforming))
-            throw Error("it has both target and transform; give one of them");
+            throw Error("both target and transform are given; remove one of them");
     }
 
     Flow evaluate(std::span<Flow> inputs, const Evaluation& now)

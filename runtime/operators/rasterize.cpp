@@ -43,15 +43,14 @@ void Rasterize::uses(Uses& uses) const { uses.reads.insert(uses.reads.end(), att
 void Rasterize::check() const
 {
     if (!file.ends_with(".vdb"))
-        throw Error(
-            fmt::format("file = \"{}\": volumes are written as .vdb; give a pattern such as "
-                        "\"smoke.####.vdb\"",
-                        file));
+        throw Error(fmt::format(
+            "file = \"{}\": volumes can only be written as .vdb; give a pattern such as \"smoke.####.vdb\"", file));
     for (const std::string& name : attributes)
-        if (name == "density") throw Error("attributes: \"density\" is the grid of the points themselves");
+        if (name == "density")
+            throw Error("attributes: \"density\" is already the grid of the points; choose another attribute");
 }
 
-std::string Rasterize::couples(const Plan&, const PlannedNode&) const { return "its volumes are of all points"; }
+std::string Rasterize::couples(const Plan&, const PlannedNode&) const { return "its volumes contain all points"; }
 
 void Rasterize::edit(PointSet& points, const Evaluation& now) const
 {
@@ -64,7 +63,7 @@ void Rasterize::edit(PointSet& points, const Evaluation& now) const
     for (const std::string& name : attributes)
         if (!written.find<Vec3f>(name))
             throw Error(
-                fmt::format("attributes: \"{}\" is {}; a grid has the mean of a vec3", name,
+                fmt::format("attributes: \"{}\" is {}; it must be a vec3", name,
                             written.has(name) ? type_name(type_of(*written.find(name))) : "none of the points'"));
     keep_columns(written, names);
     now.write(file, written);

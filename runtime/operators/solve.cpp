@@ -69,7 +69,7 @@ struct Solve {
             if (!attribute || !attribute->kept) continue;
             const std::vector<std::size_t>& writers = attribute->written_by;
             if (attribute->made_by.size() > 1 || std::any_of(writers.begin(), writers.end(), has_group))
-                return fmt::format("takes other steps where all points have the same {}", name);
+                return fmt::format("takes other steps if all points have the same {}", name);
         }
         return {};
     }

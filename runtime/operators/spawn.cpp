@@ -28,9 +28,9 @@ void require_room(const PointSet& points, const std::vector<Children>& all_child
     const std::size_t n = all_children.back().first + all_children.back().count;
     const double bytes = static_cast<double>(n) * bytes_per_birth + static_cast<double>(points.bytes());
     if (fits_in_memory(bytes)) return;
-    throw memory_exceeded(
-        fmt::format("{} births in a frame, of {} parents, behind {} points,", n, all_children.size(), points.size()),
-        bytes, "give a smaller rate or count, or a limit");
+    throw memory_exceeded(fmt::format("{} births in a frame from {} parents, in addition to {} points,", n,
+                                      all_children.size(), points.size()),
+                          bytes, "give a smaller rate or count, or a limit");
 }
 
 bool emits(const BirthPlan& plan)
@@ -135,7 +135,7 @@ struct Spawn : Newborn {
 
     std::string couples(const Plan&, const PlannedNode&) const
     {
-        return "its births are numbered over all points of its source";
+        return "it numbers births over all points of its source";
     }
 
     std::optional<std::vector<float>> values(const std::string& attribute, float) const
@@ -145,17 +145,17 @@ struct Spawn : Newborn {
 
     void check() const
     {
-        if (!rate && !count && !on) throw Error("nothing says how many points are born; give rate, count or on");
-        if (rate && count) throw Error("rate and count are given together; keep one of them");
+        if (!rate && !count && !on) throw Error("the number of points is missing; give rate, count or on");
+        if (rate && count) throw Error("rate and count are given together; remove one of them");
         check_attributes();
-        if (on && rate) throw Error("rate and on are given together; with an event give count, the births of each");
+        if (on && rate) throw Error("rate and on are given together; with on, give count, the births of each event");
         if (on && birth.when != "random")
-            throw Error(
-                fmt::format("birth = \"{}\" and on are given together; an event has its own moment", birth.when));
+            throw Error(fmt::format(
+                "birth = \"{}\" and on are given together; remove birth, because an event has a time", birth.when));
         if (min_speed && !(on && on->kind == BirthEvent::Hit))
-            throw Error("min_speed is for on = \"hit\"; leave it out, or give on");
+            throw Error("min_speed needs on = \"hit\"; remove it, or give on");
         if (kill_parent && (!on || on->kind == BirthEvent::Death))
-            throw Error("kill_parent is for births at an event in a parent's life; give on, and not \"death\"");
+            throw Error("kill_parent needs an event in a parent's life; give on, but not \"death\"");
     }
 
     Flow start(std::span<Flow> inputs, const Evaluation& now)
@@ -243,7 +243,9 @@ void Spawn::emit_children(Flow& flow, const Flow& parent_flow, const Evaluation&
 {
     const StepRecord& record = *parent_flow.simulation->record;
     if (on && on->kind == BirthEvent::Hit && !record.has_contacts)
-        throw Error("on = \"hit\": the parents' solve has a tolerance, and then keeps no contacts; give it substeps");
+        throw Error(
+            "on = \"hit\": the parents' solve has a tolerance, with which contacts are unknown; give it substeps "
+            "instead");
     // Points of the same chain move after this node: their last path is that of the previous frame.
     const bool waits = parent_flow.simulation == flow.simulation && !now.at_start;
     const ParentPaths parents(parent_flow.points, record, source_group);
@@ -264,10 +266,10 @@ void Spawn::emit_children(Flow& flow, const Flow& parent_flow, const Evaluation&
         offspring.append_to(flow.points, flow.simulation->next_id, is_trial ? trial_births : SIZE_MAX);
     now.figures.born += born;
     if (parents.without_path() > 0 && !now.at_start)
-        now.warnings.push_back(fmt::format(
-            "{}:{}: node \"{}\": the source has points that its solve has not moved, as of another chain or "
-            "made after it; what they bear is born where they are at the end of the frame",
-            now.location.file, now.location.line, now.node));
+        now.warnings.push_back(
+            fmt::format("{}:{}: node \"{}\": the source has points that its solve has not moved, from another chain or "
+                        "made after it; they emit at their position at the end of the frame",
+                        now.location.file, now.location.line, now.node));
     if (birth.edit) birth.edit->edit(flow.points, flow.points.size() - born, now);
 }
 

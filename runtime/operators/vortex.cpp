@@ -24,7 +24,7 @@ struct Vortex {
 
     void check() const
     {
-        if (!(axis.norm() > 0)) throw Error("axis = {0, 0, 0} has no direction; any length but zero is right");
+        if (!(axis.norm() > 0)) throw Error("axis = {0, 0, 0} has no direction; its length must be above 0");
     }
 
     void contribute(const Chunk& chunk, Forces& forces) const

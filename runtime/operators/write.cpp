@@ -32,7 +32,7 @@ struct Write {
 
     void check() const
     {
-        if (file.empty()) throw Error("file = \"\" names no file; give a pattern such as \"points.####.vdb\"");
+        if (file.empty()) throw Error("file = \"\" is empty; give a pattern such as \"points.####.vdb\"");
     }
 
     void edit(PointSet& points, const Evaluation& now) const

@@ -36,7 +36,8 @@ std::filesystem::path blocks_folder;
 
 Error failed(const char* what, int code)
 {
-    return Error(fmt::format("no file for columns in \"{}\": {}: {}", blocks_folder.string(), what, strerror(code)));
+    return Error(
+        fmt::format("can't make a file for columns in \"{}\": {}: {}", blocks_folder.string(), what, strerror(code)));
 }
 
 int open_unnamed(const std::filesystem::path& folder)

@@ -44,7 +44,7 @@ bool SavedState::operator==(const SavedState& other) const
     return true;
 }
 
-void StateReader::fail() { throw Error("the snapshot is of another graph, or damaged"); }
+void StateReader::fail() { throw Error("the snapshot belongs to another graph or is damaged"); }
 
 void StateReader::read(void* data, std::size_t bytes)
 {

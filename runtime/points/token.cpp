@@ -77,13 +77,13 @@ private:
     void take(std::size_t bytes)
     {
         if (strings_.size() > std::numeric_limits<std::uint32_t>::max())
-            throw Error("attributes have more than 2^32 different texts; numbers tell points apart: use them");
+            throw Error("attributes have more than 2^32 different strings; use numbers to tell points apart");
         unchecked_ += bytes;
         if (unchecked_ < bytes_between_checks) return;
         const auto next = static_cast<double>(std::exchange(unchecked_, 0)) + bytes_between_checks;
         if (!fits_in_memory(next))
-            throw memory_exceeded(fmt::format("{} different texts of attributes", strings_.size()), next,
-                                  "tell points apart by numbers");
+            throw memory_exceeded(fmt::format("{} different strings in attributes", strings_.size()), next,
+                                  "use numbers to tell points apart");
     }
 
     std::mutex mutex_;
@@ -105,15 +105,15 @@ Token token_of(std::string_view text)
 {
     if (text.empty()) return Token();
     if (!is_utf8(text) || text.find('\0') != std::string_view::npos)
-        throw Error(fmt::format("the text \"{}\" of an attribute is no UTF-8 without zeros", shown(text)));
+        throw Error(
+            fmt::format("the string \"{}\" of an attribute is not valid UTF-8 without zero bytes", shown(text)));
     return table().add(text);
 }
 std::string_view Token::text() const { return number == 0 ? std::string_view("") : table()[number]; }
 Token token_of_number(std::uint32_t number)
 {
     if (number >= table().size())
-        throw Error(
-            fmt::format("no text has the number {}; rapid_frame_token_of() gives those that there are", number));
+        throw Error(fmt::format("no string has the number {}; rapid_frame_token_of() returns valid ones", number));
     return {number};
 }
 

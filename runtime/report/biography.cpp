@@ -166,7 +166,7 @@ void Biographer::leave(const Node& node, const PointSet& points)
         if (i == IdIndex::none) {
             if (!followed.alive) return;
             if (kind == NodeKind::Source)
-                die(followed, node.name, "taken away by an emitter of another chain");
+                die(followed, node.name, "removed by an emitter of another chain");
             else if (followed.before && planned.in_loop && kind != NodeKind::Solve)  // Solve's record has the reasons
                 die(followed, node.name, "removed by " + node.name);
             else if (followed.before && !planned.in_loop)
@@ -249,7 +249,7 @@ void Biographer::note_record(Followed& followed, const StepRecord& record, Biogr
         die_of(record.killed, record.killed_at, node,
                by_collider ? "killed by contact with " + node : "killed by an action within " + node);
     }
-    die_of(record.old, record.old_at, simulation.solve->name, "its life was over");
+    die_of(record.old, record.old_at, simulation.solve->name, "its life ended");
 }
 
 void Biographer::add(const FrameResult& result)

@@ -105,7 +105,7 @@ std::string line(std::int64_t frame, double time, const std::string& what)
 
 std::string text_of(const Biography::Edit& edit)
 {
-    if (edit.removed) return fmt::format("{} leaves it out of the output", edit.node);
+    if (edit.removed) return fmt::format("{} drops it from the output", edit.node);
     std::vector<std::string> changes;
     for (const auto& [name, values] : edit.changes)
         changes.push_back(text_of(values.first) == text_of(values.second)
@@ -118,7 +118,7 @@ std::string text_of(const Biography::Step& step, bool was_asleep)
 {
     std::string text;
     for (const Biography::Edit& edit : step.edits) text += line(step.frame, step.time, text_of(edit));
-    if (step.asleep != was_asleep) text += line(step.frame, step.time, step.asleep ? "sleeps" : "is awake again");
+    if (step.asleep != was_asleep) text += line(step.frame, step.time, step.asleep ? "sleeps" : "wakes up");
     for (const Biography::Force& force : step.forces)
         text += line(step.frame, step.time,
                      fmt::format("{} accelerates it by {} m/s²", force.node, text_of_vector(force.a)));
@@ -148,8 +148,7 @@ std::string text_of(const Biography& life)
     if (life.death)
         text += line(life.death->frame, life.death->time,
                      fmt::format("dies at {}: {}", text_of_vector(life.death->P), life.death->why));
-    if (unknown)
-        text += "  Contacts are not known: with a tolerance Solve takes a point through a step several times.\n";
+    if (unknown) text += "  Contacts are unknown: with a tolerance, Solve repeats the step of a point.\n";
     return text;
 }
 

@@ -60,16 +60,15 @@ std::string text_of_half(const Explanation& plan, bool kept)
     for (const auto& attribute : plan.attributes) {
         if (attribute.kept != kept) continue;
         const bool usual = kept || attribute.brought_in_by == usual_way_to_keep(attribute.name);
-        attributes.add(
-            shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
-            usual ? attribute.why : fmt::format("{}; {} brings it in", attribute.why, attribute.brought_in_by));
+        attributes.add(shown(attribute, plan), kept ? bytes(attribute.bytes_per_point) : "",
+                       usual ? attribute.why : fmt::format("{}; {} adds it", attribute.why, attribute.brought_in_by));
     }
     for (const auto& stage : plan.stages)
         if (stage.kept == kept) stages.add(stage.name, "", stage.why);
-    const std::string of_attributes = kept
-                                          ? fmt::format(" attributes, {} bytes a point at most", plan.bytes_per_point())
-                                          : fmt::format(" attributes ({} brings one in)", usual_way_to_keep("NAME"));
-    return (kept ? "KEPT\n" : "\nLEFT OUT\n") + nodes.text(" nodes") + attributes.text(of_attributes) +
+    const std::string of_attributes =
+        kept ? fmt::format(" attributes, at most {} bytes per point", plan.bytes_per_point())
+             : fmt::format(" attributes ({} adds one)", usual_way_to_keep("NAME"));
+    return (kept ? "KEPT\n" : "\nPRUNED\n") + nodes.text(" nodes") + attributes.text(of_attributes) +
            stages.text(" stages");
 }
 

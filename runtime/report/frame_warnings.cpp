@@ -83,9 +83,9 @@ std::vector<std::string> FrameWarnings::suppressed() const
     std::stable_sort(kinds.begin(), kinds.end(), [](const Kind* a, const Kind* b) { return a->frame < b->frame; });
     std::vector<std::string> lines;
     for (const Kind* kind : kinds)
-        lines.push_back(
-            fmt::format("{} more of this kind, the last in frame {}: {}", kind->suppressed, kind->frame, kind->last));
-    if (others_ > 0) lines.push_back(fmt::format("{} more of other kinds", others_));
+        lines.push_back(fmt::format("{} more warnings of this kind, the last in frame {}: {}", kind->suppressed,
+                                    kind->frame, kind->last));
+    if (others_ > 0) lines.push_back(fmt::format("{} more warnings of other kinds", others_));
     return lines;
 }
 

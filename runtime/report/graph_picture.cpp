@@ -104,7 +104,7 @@ std::string tip_of(const GraphPicture::Node& node)
 {
     std::string tip = fmt::format("{}:{}", node.file, node.line);
     for (const auto& [name, value] : node.arguments) tip += fmt::format("\n{} = {}", name, value);
-    tip += fmt::format("\n{}: {}", node.kept ? "evaluated " + node.evaluated : "left out", node.why);
+    tip += fmt::format("\n{}: {}", node.kept ? "evaluated " + node.evaluated : "pruned", node.why);
     return node.changes.empty() ? tip : fmt::format("{}; {}", tip, node.changes);
 }
 

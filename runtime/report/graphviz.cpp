@@ -19,7 +19,7 @@ namespace {
 Descriptor memory_file()
 {
     Descriptor file(memfd_create("dot", MFD_CLOEXEC));
-    if (!file) throw Error(fmt::format("no memory for dot: {}", std::strerror(errno)));
+    if (!file) throw Error(fmt::format("not enough memory for dot: {}", std::strerror(errno)));
     return file;
 }
 
@@ -29,7 +29,7 @@ void write_all(const Descriptor& file, const std::string& text)
         const ssize_t count =
             pwrite(file.number(), text.data() + written, text.size() - written, static_cast<off_t>(written));
         if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) throw Error(fmt::format("no memory for dot: {}", std::strerror(errno)));
+        if (count <= 0) throw Error(fmt::format("not enough memory for dot: {}", std::strerror(errno)));
         written += static_cast<std::size_t>(count);
     }
 }
@@ -54,8 +54,7 @@ std::string lay_out(const std::string& graph, const std::string& format)
     write_all(input, graph);
 
     const std::string program = program_path("dot");
-    if (program.empty())
-        throw Error("graphs are laid out by dot, which is not here; install it (apt install graphviz), or write .dot");
+    if (program.empty()) throw Error("the layout needs dot; install it (apt install graphviz), or write .dot");
 
     const pid_t dot = start_program(
         program, {"dot", "-T" + format},

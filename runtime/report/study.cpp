@@ -60,7 +60,7 @@ void Study::complete()
         std::set<std::string> strings;
         for (const Value& value : values)
             if (!strings.insert(knob_text(value)).second)
-                throw Error(fmt::format("sweep: {} has the value {} twice", knob, knob_text(value)));
+                throw Error(fmt::format("sweep: {} has the value {} twice; remove one", knob, knob_text(value)));
     }
     const auto check_name = [&](const std::string& what, const std::string& knob) {
         if (!sweep.count(knob))
@@ -69,7 +69,7 @@ void Study::complete()
     for (const std::string& line : lines) {
         check_name("lines", line);
         if (std::count(lines.begin(), lines.end(), line) > 1)
-            throw Error(fmt::format("lines: \"{}\" is there twice", line));
+            throw Error(fmt::format("lines: \"{}\" appears twice; remove one", line));
     }
     if (reference)
         for (const auto& [knob, value] : *reference) check_name("reference", knob);
@@ -78,9 +78,8 @@ void Study::complete()
     for (const std::string& knob : names)
         if (std::find(lines.begin(), lines.end(), knob) == lines.end()) left.push_back(knob);
     if (left.size() > 1)
-        throw Error(fmt::format(
-            "the knobs {} are all left for the step along a line; name all but one in lines: lines = \"{}\"",
-            fmt::join(left, ", "), left.front()));
+        throw Error(fmt::format("a line can vary only one of the knobs {}; name the others in lines: lines = \"{}\"",
+                                fmt::join(left, ", "), left.front()));
     if (left.size() == 1 && step().empty()) lines.push_back(left.front());  // its values are not steps
 }
 

@@ -245,7 +245,7 @@ std::string to_svg(const StudyResult& result)
     const double y = top + 14 + legend_step * static_cast<double>(lines.size());
     svg += fmt::format("  <circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"frame\" style=\"fill: #8c959f\"/>\n",
                        legend_x + 11, y - 4, radius);
-    svg += text_at(legend_x + 30, y, "no other row beats it", "start", "small");
+    svg += text_at(legend_x + 30, y, "no other row is better", "start", "small");
     return svg + "</svg>\n";
 }
 

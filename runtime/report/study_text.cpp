@@ -102,7 +102,7 @@ std::string to_text(const StudyResult& result)
     for (const StudyLine& line : result.lines()) text += fmt::format("{}: {}\n", line.name, order_text(line));
     for (const StudyRow& row : result.rows)
         if (!row.failed.empty()) text += fmt::format("failed: {}: {}\n", study.label(row.knobs), row.failed);
-    return text + "* no other row beats it in both error and run time\n";
+    return text + "* no other row is better in both error and run time\n";
 }
 
 std::string to_json(const StudyResult& result)

@@ -19,7 +19,7 @@ std::size_t with_room(std::size_t points)
     const double bytes = bytes_per_point * static_cast<double>(points);
     if (!fits_in_memory(bytes))
         throw memory_exceeded(fmt::format("a step of {} points that act on one another", points), bytes,
-                              "give fewer points");
+                              "use fewer points");
     return points;
 }
 

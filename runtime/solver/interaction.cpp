@@ -92,7 +92,8 @@ private:
         constexpr double bytes_per_point = 160;  // measured: positions, cells, weights, headings, kicks
         const double bytes = bytes_per_point * static_cast<double>(points);
         if (!fits_in_memory(bytes))
-            throw memory_exceeded(fmt::format("the neighbourhoods of {} points", points), bytes, "let it act on fewer");
+            throw memory_exceeded(fmt::format("the neighbourhoods of {} points", points), bytes,
+                                  "apply it to fewer points");
     }
 
     // The cost of a radius that contains all points grows with the square of their number, and may be endless. If it
@@ -111,9 +112,8 @@ private:
         }
         if (const double neighbours = found / sampled; n * neighbours * passes > max_looks)
             throw Error(fmt::format(
-                "radius = {:g} m: about {:.2g} neighbours of each of {} points, {:.2g} looks in a frame of {:g} steps, "
-                "of "
-                "which at most {:g} are taken; give it a smaller radius",
+                "radius = {:g} m gives about {:.2g} neighbours for each of {} points, {:.2g} pairs in a frame of {:g} "
+                "steps; at most {:g} are possible; give a smaller radius",
                 interaction_.radius, neighbours, members_.size(), n * neighbours * passes, steps, max_looks));
     }
 

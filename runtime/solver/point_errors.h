@@ -19,11 +19,10 @@ public:
     struct Occasion {
         const char *verb, *when, *had;
     };
-    static constexpr Occasion before_step{"is", "before the step; a node before this one made it so", "it has"};
+    static constexpr Occasion before_step{"is", "before the step; correct the node before this one", "it has"};
     static constexpr Occasion in_step{"became", "in the step; the frame was not written", "it had"};
     static constexpr Occasion in_substep{
-        "became", "in a sub-step; the frame was not written; weaker forces or more sub-steps would keep it finite",
-        "it had"};
+        "became", "in a substep; the frame was not written; use weaker forces or more substeps", "it had"};
     // The point has been overwritten by the result.
     static constexpr Occasion in_step_overwritten{"became", "in the step; the frame was not written", "it has"};
 

@@ -631,9 +631,9 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     };
     const char* text = nullptr;
     std::uint32_t token = 0;
-    refused("no text has the number 4000000000",
+    refused("no string has the number 4000000000",
             [&](rapid_error** e) { return rapid_frame_text_of(4000000000u, &text, e); });
-    refused("no UTF-8", [&](rapid_error** e) { return rapid_frame_token_of("\xff", &token, e); });
+    refused("not valid UTF-8", [&](rapid_error** e) { return rapid_frame_token_of("\xff", &token, e); });
     const auto setting = [&](const char* name, rapid_value to) {
         return [=, &h](rapid_error** e) {
             const rapid_setting wrong = {name, to};
@@ -668,7 +668,7 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
             [&](auto e) { return rapid_scene_points_after(h.scene, "solve", 2, &frame, e); });
     refused("frame 0", [&](auto e) { return rapid_scene_points_after(h.scene, "solve1", 0, &frame, e); });
     refused("nowhere.so", [&](auto e) { return rapid_scene_load_plugin("nowhere.so", e); });
-    refused("it is no plugin of Rapid", [&](auto e) { return rapid_scene_load_plugin("/proc/self/exe", e); });
+    refused("not a plugin of Rapid", [&](auto e) { return rapid_scene_load_plugin("/proc/self/exe", e); });
     refused("file is NULL", [&](auto e) { return rapid_scene_load_plugin(nullptr, e); });
     refused("form = 3", [&](auto e) { return rapid_scene_graph(h.scene, 3, &text, e); });
     refused("form = -1", [&](auto e) { return rapid_scene_graph(h.scene, -1, &text, e); });
@@ -761,12 +761,12 @@ TEST_CASE("what a callback does wrong is an error of the scene, which goes on be
     for (const Wrong& wrong : {
              Wrong{"it returned -1", [](const rapid_call*) { return -1; }},
              Wrong{"broken", [](const rapid_call*) -> int { throw std::runtime_error("broken"); }},
-             Wrong{"no std::exception", [](const rapid_call*) -> int { throw 3; }},
+             Wrong{"not a std::exception", [](const rapid_call*) -> int { throw 3; }},
              Wrong{"nan at place 2", [](const rapid_call* now) { return now->writes[0][2] = NAN, 0; }},
              Wrong{"inf at place 0", [](const rapid_call* now) { return now->writes[0][0] = INFINITY, 0; }},
-             Wrong{"\"warm\" was written past the end",
+             Wrong{"\"warm\" was written beyond the end",
                    [](const rapid_call* now) { return now->writes[0][now->count] = 1, 0; }},
-             Wrong{"kills was written past the end",
+             Wrong{"kills was written beyond the end",
                    [](const rapid_call* now) { return now->kill[now->count] = 1, 0; }},
              Wrong{"takes no rods",
                    [](const rapid_call* now) -> int {

@@ -93,7 +93,7 @@ at=$(($(stat -c %s cache/events) / 2))
 printf '\125' | dd of=cache/events bs=1 seek=$at conv=notrunc status=none
 run --quiet 2>&1 && cmp whole.csv a.csv
 ]]
-    assert.matches("warning: cache/snapshot.0039.rapid: its events in cache/events: it is damaged; it is left out",
+    assert.matches("warning: cache/snapshot.0039.rapid: its events in cache/events: it is damaged; it is skipped",
       said, 1, true)
     assert.truthy(not said:find("snapshot.0003", 1, true))
     -- Once more from the repaired cache.
@@ -198,25 +198,25 @@ return rapid.create { seed = 3 }
       local result = folder:run("-f 1-3 --cache cache -o a.####.bgeo --stats a.json " .. (arguments or ""))
       assert.equal(2, result.status)
       assert.equal("", result.stdout)
-      local what, rest = result.stderr:match "^%-%-cache cache: it is of another run: (.*); give (.*)$"
-      assert.equal("another folder, or --again to begin anew\n", rest, result.stderr)
+      local what, rest = result.stderr:match "^%-%-cache cache: the cache belongs to another run: (.*); give (.*)$"
+      assert.equal("another folder, or --again to start again\n", rest, result.stderr)
       return what
     end
     assert.equal("emit1.rate was 20000, is 30000; rate was 20000, is 30000", refused "--set rate=30000")
     assert.equal("solve1.substeps was 2, is 3", refused "--set solve.substeps=3")
     assert.equal("seed of create1 was 3, is 4", refused "--seed 4")
     folder:write("scene.lua", (text:gsub("p.v %* helper", "0.5 * p.v * helper")))
-    assert.equal("the function in line 6 of scene.lua is another one", refused())
+    assert.equal("the function in line 6 of scene.lua changed", refused())
     folder:write("scene.lua", (text:gsub(":solve", ":gravity {} :solve")))
-    assert.equal("gravity1 was not there, is gravity behind push; solve1 was solve behind push, " ..
-      "is solve behind gravity1", refused())
+    assert.equal("gravity1 was missing, is gravity after push; solve1 was solve after push, " ..
+      "is solve after gravity1", refused())
     folder:write("scene.lua", "-- the same with a comment\n\n" .. text)
     assert.same({}, computed(folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"))
     folder:write("helper.lua", "return { factor = 2 }")
-    assert.equal("helper.lua is another one, outside of its functions", refused())
+    assert.equal("helper.lua changed outside its functions", refused())
     folder:write("helper.lua", "return { factor = 1 }")
     folder:write("points.csv", "id,Px,Py,Pz\n0,0,2,0\n")
-    assert.equal("the content of points.csv is another one", refused())
+    assert.equal("the content of points.csv changed", refused())
     folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json --again"
     folder:done "-f 1-3 --cache cache -o a.####.bgeo --stats a.json"
   end)
@@ -267,7 +267,7 @@ return rapid.create { seed = 3 }
         begun:shell "cp -rp cache trial"
       end
       local result = run(second, "5-6")
-      assert.equal(option.differs, (result.stderr:match "it is of another run: (.-) was "), name)
+      assert.equal(option.differs, (result.stderr:match "the cache belongs to another run: (.-) was "), name)
       assert.equal(option.differs and 2 or 0, result.status, name .. ": " .. result.stderr)
       if option.differs then return end
       if second ~= "--quiet" and second ~= "--again" then
@@ -300,7 +300,7 @@ return rapid.create { seed = 3 }
       folder:shell("cp " .. name .. " kept; printf x >>" .. name)
       local result = run "1-6"
       assert.equal(2, result.status)
-      assert.match("it is of another run: the plugin p.so was %x+ %x+, is %x+ %x+;", result.stderr)
+      assert.match("the cache belongs to another run: the plugin p.so was %x+ %x+, is %x+ %x+;", result.stderr)
       folder:shell("cp kept " .. name)
     end
     assert.same({}, computed(run("1-6").stdout))
@@ -327,7 +327,7 @@ return rapid.create { seed = 3 }
     without:done "-f 1-5 --cache cache --quiet"
     local result = without:run "-f 1-6 --cache cache --stats s.json"
     assert.equal(0, result.status)
-    assert.equal("warning: --cache cache: no errors are estimated, as the run that began it has estimated none " ..
+    assert.equal("warning: --cache cache: errors are not estimated, because the run that began the cache did not " ..
       "(--quiet); give --again to estimate them\n", result.stderr)
     assert.falsy(without:read "s.json":find("position_max", 1, true))
     without:done "-f 1-6 --cache cache --stats s.json --again"
@@ -346,11 +346,11 @@ return rapid.create {}
     folder:write("points2.csv", "id,Px,Py,Pz\n0,0,2,0\n")
     local result = folder:run "-f 1-9 --cache cache"
     assert.equal(2, result.status)
-    assert.truthy(result.stderr:find("the content of points2.csv is another one", 1, true), result.stderr)
+    assert.truthy(result.stderr:find("the content of points2.csv changed", 1, true), result.stderr)
     folder:shell "rm points2.csv"
     result = folder:run "-f 1-9 --cache cache"
     assert.equal(2, result.status)
-    assert.truthy(result.stderr:find("points2.csv is not there any more", 1, true), result.stderr)
+    assert.truthy(result.stderr:find("points2.csv no longer exists", 1, true), result.stderr)
   end)
 
   it("refuses a function of the frame that remembers, before the first frame, with the remedy", function()
@@ -369,8 +369,8 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
       assert.equal(result.stderr == "" and 0 or 2, result.status)
       return result.stderr
     end
-    local remedy = "; no snapshot of --cache can hold what a function of the frame remembers: find it from " ..
-      "frame.number, or keep it in points.detail.NAME, in a :detail\n"
+    local remedy = "; a snapshot of --cache can't store what a function of the frame remembers: compute it from " ..
+      "frame.number, or store it in points.detail.NAME, in a :detail\n"
     assert.equal("scene.lua:4: node \"emit1\": a function of the frame assigns the upvalue \"count\"" .. remedy,
       stderr_of "count = count + 1")
     assert.equal("scene.lua:4: node \"emit1\": a function of the frame assigns into a table that all points share" ..
@@ -396,7 +396,7 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
   it("leaves out damaged and foreign snapshots, with a warning, and goes on behind an earlier one", function()
     local snapshot = "cache/snapshot.0009.rapid"
     local function left_out(why)
-      return ("warning: %s: %s; it is left out\n"):format(snapshot, why)
+      return ("warning: %s: %s; it is skipped\n"):format(snapshot, why)
     end
     local function check(warning, first, damage)
       local found, from = warnings_of(damage)
@@ -404,18 +404,18 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
       assert.equal(first, from)
     end
     check("", 10, "true")
-    check(left_out "its checksum is wrong; it is no whole snapshot", 7, "truncate -s -1 " .. snapshot)
-    check(left_out "it does not begin as one; it is no whole snapshot", 7, "echo text >" .. snapshot)
-    check(left_out "it is of another run: ", 7, "cp cache/snapshot.0006.rapid " .. snapshot)
-    check(left_out "it is of another run: emit1.rate was 20, is 400; rate was 20, is 400", 7,
+    check(left_out "its checksum is wrong; it is not a complete snapshot", 7, "truncate -s -1 " .. snapshot)
+    check(left_out "it does not begin like one; it is not a complete snapshot", 7, "echo text >" .. snapshot)
+    check(left_out "it belongs to another run: ", 7, "cp cache/snapshot.0006.rapid " .. snapshot)
+    check(left_out "it belongs to another run: emit1.rate was 20, is 400; rate was 20, is 400", 7,
       '"$RAPID" run scene.lua -f 1-9 --set rate=20 --cache other >/dev/null && cp other/snapshot.0009.rapid ' ..
       snapshot)
     check("", 10, "echo text >cache/snapshot.abc.rapid")
     -- Damaged entries of the journal are not used.
-    check("warning: cache/journal: it is damaged; the cache begins anew\n", 1, "echo text >cache/journal")
+    check("warning: cache/journal is damaged; the cache starts again\n", 1, "echo text >cache/journal")
     check("warning: cache/journal: an entry is damaged; frames without a record are computed again\n", 7,
       "truncate -s -1 cache/journal")
-    check("warning: cache/journal: it is missing; the cache begins anew\n", 1, "rm cache/journal")
+    check("warning: cache/journal is missing; the cache starts again\n", 1, "rm cache/journal")
   end)
 
   it("comes to the same files whatever is damaged in a cache", function()
@@ -444,7 +444,7 @@ exec 9>cache/.lock
 flock -n 9
 "$RAPID" run scene.lua -f 1-2 --cache cache 2>&1 || echo "status $?"
 ]]
-    assert.equal("--cache cache: another run has it; wait for its end, or give another folder\nstatus 2\n", said)
+    assert.equal("--cache cache: another run is using it; wait for its end, or choose another folder\nstatus 2\n", said)
     -- A run waits for another that is ending.
     assert.truthy(folder:shell(await .. [[
 flock cache/.lock sleep 0.5 &
@@ -470,8 +470,8 @@ ls cache | grep snapshot
 (run -o a/a.####.bgeo --cache cache --stats b.json) >said 2>&1 || cat said
 diff -r whole a
 ]])
-    local frame, snapshot = said:match("^status 143\ninterrupted after frame (%d+); the same command goes on " ..
-      "behind it\nsnapshot%.(%d+)%.rapid\n$")
+    local frame, snapshot = said:match("^status 143\ninterrupted after frame (%d+); the same command continues " ..
+      "from there\nsnapshot%.(%d+)%.rapid\n$")
     assert.truthy(frame, said)
     assert.equal(tonumber(frame), tonumber(snapshot))
     assert.equal(tonumber(frame), #statistics.of(folder:read "a.json").frames)
@@ -498,7 +498,7 @@ echo "status $?"
 tail -n 1 said
 ls cache | grep snapshot
 ]])
-    assert.equal("status 143\ninterrupted; the frame took longer than the --grace, and is dropped\n" ..
+    assert.equal("status 143\ninterrupted; the frame took longer than --grace allows and is dropped\n" ..
       "snapshot.0002.rapid\n", said)
     -- A second signal ends it at once. (The first run's output would be found before this one begins.)
     said = folder:shell(await .. [[
@@ -521,8 +521,8 @@ tail -n 1 again
     folder:shell "mkdir -p cache/snapshot.0005.rapid/taken"
     local result = folder:run "-f 1-12 -o a/a.####.bgeo --cache cache --cache-every 5"
     assert.equal(0, result.status)
-    assert.equal("warning: frame 6: cache/snapshot.0005.rapid: can't be written: it is not a regular file; " ..
-      "the run goes on without this snapshot\n", (result.stderr:gsub("frame %d+", "frame 6")))
+    assert.equal("warning: frame 6: cache/snapshot.0005.rapid: can't be written: it is not a regular file; the run " ..
+      "continues without this snapshot\n", (result.stderr:gsub("frame %d+", "frame 6")))
     folder:shell "diff -r whole a"
     -- Tests a full disk; a private namespace may mount one.
     if command.shell("unshare -rm true").status ~= 0 then return end
@@ -533,7 +533,7 @@ unshare -rm sh -c 'mount -t tmpfs -o size=48k none full && exec "$0" "$@"' "$RAP
 echo "status $?"
 diff -r whole b
 ]]
-    assert.truthy(said:find("No space left on device; the run goes on without this snapshot", 1, true), said)
+    assert.truthy(said:find("No space left on device; the run continues without this snapshot", 1, true), said)
     assert.truthy(said:find "status 0\n$", said)
   end)
 
@@ -544,9 +544,11 @@ diff -r whole b
       assert.equal(2, result.status)
       return result.stderr
     end
-    assert.equal("--again says what to do with a --cache; give one, or leave it out\n", refusal "-f 1-2 --again")
-    assert.equal("--cache-every says how often a --cache is written; give one\n", refusal "-f 1-2 --cache-every 3")
-    assert.equal("--watch runs a graph that changes, of which --cache holds nothing; give one of them\n",
+    assert.equal("--again replaces the contents of a cache; add --cache DIR, or remove --again\n",
+      refusal "-f 1-2 --again")
+    assert.equal("--cache-every sets how often snapshots are written; it needs --cache DIR\n",
+      refusal "-f 1-2 --cache-every 3")
+    assert.equal("--watch runs a changing graph, which --cache can't resume; remove one of them\n",
       refusal "-f 1-2 --cache cache --watch")
     assert.truthy(refusal "-f 1-2 --cache cache --cache-every -1":find("whole number, at least 0", 1, true))
     assert.truthy(refusal "-f 1-2 --cache cache --grace 0":find("a number above 0", 1, true))
@@ -572,6 +574,6 @@ describe("rapid info", function()
     folder:shell "truncate -s -3 cache/snapshot.0004.rapid"
     result = command.rapid("info cache/snapshot.0004.rapid", { cwd = folder.path })
     assert.equal(2, result.status)
-    assert.equal("cache/snapshot.0004.rapid: its checksum is wrong; it is no whole snapshot\n", result.stderr)
+    assert.equal("cache/snapshot.0004.rapid: its checksum is wrong; it is not a complete snapshot\n", result.stderr)
   end)
 end)

@@ -21,7 +21,7 @@ describe("rapid check", function()
     local result, folder = check(scene)
     assert.equal(0, result.status, result.stderr)
     assert.equal("param rate = 100  points born per second\n" ..
-      "scene.lua: OK, 5 of 6 nodes reached from output main\n", result.stdout)
+      "scene.lua: OK, 5 of 6 nodes lead to output main\n", result.stdout)
     assert.equal("", result.stderr)
     assert.same({ "scene.lua" }, folder:list())
   end)
@@ -112,14 +112,14 @@ points:write { file = "never.####.csv" }
 return points
 ]]
     assert.equal(0, result.status)
-    assert.equal('warning: scene.lua:3: node "write1": writes nothing: no output comes from it; ' ..
-      "return it, or go on from it\n", result.stderr)
+    assert.equal('warning: scene.lua:3: node "write1": writes nothing, because it leads to no output; ' ..
+      "return it, or continue the chain from it\n", result.stderr)
   end)
 
   it("finds a :write that puts several frames into one file", function()
     local result = check [[return require("rapid").create {} :solve {} :write { file = "a.csv" }]]
     assert.equal(2, result.status)
-    assert.equal('scene.lua:1: node "write1": file = "a.csv": several frames go to one file; ' ..
-      "put the frame's number into its name, as ####\n", result.stderr)
+    assert.equal('scene.lua:1: node "write1": file = "a.csv": several frames would go into one ' ..
+      "file; put #### into the name for the frame number\n", result.stderr)
   end)
 end)

@@ -41,9 +41,9 @@ describe("rapid explain --json", function()
   it("tells of each node whether it is kept, how often it is evaluated, and why", function()
     local nodes = plan_of("falls.lua").nodes
     assert.same({ name = "emit1", type = "emit", kept = true, evaluated = "every frame",
-                  why = "reached from the output", changes = "its points are fed back from frame to frame" },
+                  why = "leads to the output", changes = "its points continue from frame to frame" },
                 nodes.emit1)
-    assert.same({ name = "spare", type = "create", kept = false, evaluated = "never", why = "no output comes from it" },
+    assert.same({ name = "spare", type = "create", kept = false, evaluated = "never", why = "leads to no output" },
                 nodes.spare)
   end)
 
@@ -53,8 +53,8 @@ local shared = rapid.create {} :emit { ]] .. source .. [[ } :solve {}
 return { left = shared, right = shared:delete { where = function(p) return p.P.x > 0 end } }
 ]])
     local nodes = plan_of("two.lua").nodes
-    assert.equal("reached from the outputs left, right", nodes.solve1.why)
-    assert.equal("reached from the output right", nodes.delete1.why)
+    assert.equal("leads to the outputs left, right", nodes.solve1.why)
+    assert.equal("leads to the output right", nodes.delete1.why)
   end)
 
   it("evaluates once what never changes", function()
@@ -67,24 +67,24 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
     assert.is_nil(nodes.attribute1.changes)
   end)
 
-  it("leaves an attribute out with the reason, and tells what brings it in", function()
+  it("leaves an attribute out with the reason, and tells what adds it", function()
     local age = plan_of("falls.lua").attributes.age
     assert.same({ name = "age", simulation = "create2", kept = false, bytes_per_point = 0,
-                  why = "no node reads it and no output asks for it",
+                  why = "no node reads it and no output requests it",
                   brought_in_by = 'p.age in a kernel, rapid.attr "age", or -o FILE:age' }, age)
     assert.is_true(plan_of("falls.lua -o a.####.csv:age").attributes.age.kept)
     assert.truthy(explain("falls.lua").stdout:find(
-      'attributes (p.NAME in a kernel, rapid.attr "NAME", or -o FILE:NAME brings one in)', 1, true))
+      'attributes (p.NAME in a kernel, rapid.attr "NAME", or -o FILE:NAME adds one)', 1, true))
   end)
 
   it("keeps an attribute for who reads it or asks for it", function()
     local falls, bounces = plan_of("falls.lua").attributes, plan_of("bounces.lua").attributes
     assert.equal("every point has it", falls.P.why)
     assert.equal(12, falls.P.bytes_per_point)
-    assert.equal("emit1 makes it, and an output takes all that is made", falls.heat.why)
+    assert.equal("emit1 makes it, and an output takes all attributes of the scene", falls.heat.why)
     assert.equal("swirl, solve1 read it", bounces.age.why)
     assert.equal("solve1 reads it; emit1 writes it", bounces.life.why)
-    assert.equal("an output asks for it", plan_of("falls.lua -o a.####.csv:mass").attributes.mass.why)
+    assert.equal("an output requests it", plan_of("falls.lua -o a.####.csv:mass").attributes.mass.why)
     assert.is_false(plan_of("falls.lua -o a.####.csv:mass").attributes.heat.kept)
   end)
 
@@ -106,7 +106,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
     end
     for name, why in pairs { collision = "no collide node", ["contact grid"] = "no contact node",
                              constraints = "no constraint node", writing = "no -o and no write node",
-                             script = "no node has a Lua function: workers have no interpreter" } do
+                             script = "no node has a Lua function" } do
       assert.same({ name = name, kept = false, why = why }, falls.stages[name])
     end
     assert.equal(9, #falls.raw.stages)
@@ -125,17 +125,17 @@ return rapid.create { subframes = 2, points = rapid.points.grid { size = {1, 1, 
   :group { name = "held", where = function(p) return p.id == 0 end } :solve {}
   :attribute { heat = function(frame) return frame.time end }
 ]])
-    local error_has = "the estimated error has what that is off by"
+    local error_has = "the estimated error includes the difference"
     assert.same({
-      { name = "gravity1.g", called = "2 times a frame",
-        between = "numbers are interpolated to the time of each sub-step; " .. error_has },
-      { name = "contact1.friction", called = "2 times a frame",
-        between = "its value at the end holds throughout; " .. error_has },
-      { name = "collide1.transform", called = "as its path needs",
+      { name = "gravity1.g", called = "2 times per frame",
+        between = "numbers are interpolated to the time of each substep; " .. error_has },
+      { name = "contact1.friction", called = "2 times per frame",
+        between = "its value at the end is used for the whole frame; " .. error_has },
+      { name = "collide1.transform", called = "as often as its path needs",
         between = "called between frames, until pieces of the path are within 1e-5 of its length" },
-      { name = "pin1.target", called = "2 times a frame",
-        between = "numbers are interpolated to the time of each sub-step; " .. error_has },
-      { name = "attribute1.heat", called = "once a frame", between = "its value holds for the frame" },
+      { name = "pin1.target", called = "2 times per frame",
+        between = "numbers are interpolated to the time of each substep; " .. error_has },
+      { name = "attribute1.heat", called = "once per frame", between = "its value is constant in the frame" },
     }, plan_of("changes.lua").raw.functions)
     assert.truthy(explain("changes.lua").stdout:find("functions of the frame\n  gravity1.g ", 1, true))
     assert.same({}, plan_of("falls.lua").raw.functions)
@@ -185,7 +185,7 @@ describe("rapid explain", function()
   it("says the same in words, what is kept before what is left out", function()
     for _, scene in ipairs { "falls.lua", "bounces.lua" } do
       local text, plan = explain(scene).stdout, plan_of(scene)
-      local left_out = text:find("\nLEFT OUT\n", 1, true)
+      local left_out = text:find("\nPRUNED\n", 1, true)
       assert.equal(1, (text:find("KEPT\n", 1, true)))
       for _, list in ipairs { plan.raw.nodes, plan.raw.attributes, plan.raw.stages } do
         for _, one in ipairs(list) do
@@ -194,7 +194,7 @@ describe("rapid explain", function()
           assert.equal(one.kept, at < left_out, one.name)
         end
       end
-      assert.truthy(text:find(plan.bytes_per_point .. " bytes a point at most", 1, true), text)
+      assert.truthy(text:find(plan.bytes_per_point .. " bytes per point", 1, true), text)
       for _, pass in ipairs(plan.passes) do
         assert.truthy(text:find("\n  " .. table.concat(pass, ", ") .. "\n", 1, true), text)
       end
@@ -268,11 +268,11 @@ describe("rapid explain --state", function()
     assert.truthy(text:find(("\n  emit1 +%d B +of the node\n"):format(state.nodes.emit1)), text)
     local wrong = explain "falls.lua --state 0"
     assert.equal(2, wrong.status)
-    assert.equal("--state 0: it is before the scene's first frame, 1\n", wrong.stderr)
+    assert.equal("--state 0 is before the scene's first frame, 1\n", wrong.stderr)
     for _, frame in ipairs { "x", "1-3", "2x2", "1e9", "9223372036854775807", "" } do
       wrong = explain(("falls.lua --state '%s'"):format(frame))
       assert.equal(2, wrong.status)
-      local reported = ("--state %s: it must be the number of a frame, such as 12\n"):format(frame)
+      local reported = ("--state %s: it must be a frame number, such as 12\n"):format(frame)
       assert.truthy(wrong.stderr:find(reported, 1, true), wrong.stderr)
     end
   end)

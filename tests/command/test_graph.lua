@@ -35,7 +35,7 @@ describe("graph", function()
     local x = {}
     for name, place in json:gmatch '"name":"([^"]-)","type".-"x":([%d.]+)' do x[name] = tonumber(place) end
     assert.is_true(x.create1 < x["end"])
-    assert.truthy(json:find('"kept":false,"evaluated":"never","why":"no output comes from it"', 1, true), json)
+    assert.truthy(json:find('"kept":false,"evaluated":"never","why":"leads to no output"', 1, true), json)
   end)
 
   it("says what is missing where there is no dot", function()

@@ -68,7 +68,7 @@ describe("rapid info", function()
   it("says what it can't read, with 2", function()
     for name, message in pairs {
       ["no.csv"] = "no.csv: no such file\n",
-      ["no.####.csv"] = "no.####.csv: no frame of this sequence is there; the first would be no.0001.csv\n",
+      ["no.####.csv"] = "no.####.csv: no frame of this sequence exists; the first would be no.0001.csv\n",
       ["."] = ".: is a folder; name a file, or a sequence such as cache.####.vdb\n",
     } do
       local result = rapid("info " .. name)
@@ -93,7 +93,8 @@ describe("rapid diff", function()
     for _, files in ipairs { "a.csv twice.csv", "twice.csv a.csv", "twice.csv twice.csv" } do
       local result = rapid("diff " .. files)
       assert.equal(2, result.status)
-      assert.truthy(result.stderr:find "^two points of [AB] have the id 1; points are compared by id\n$", result.stderr)
+      assert.truthy(result.stderr:find("^two points of [AB] have the id 1; points are compared by id, so ids must " ..
+        "be unique\n$"), result.stderr)
     end
   end)
 

@@ -8,30 +8,31 @@ local grid = "rapid.points.grid { size = {40, 40, 40}, spacing = 1 }"
 -- Scenes that need too much, by node and message.
 local needs = {
   ["return rapid.create {} :emit { source = rapid.mesh.box {}, count = 1e9 } :solve {}"] =
-    '^scene%.lua:1: node "emit1": 1000000000 births in a frame, behind 0 points, would take about 119%.2 GiB, and ' ..
-    "[%d.]+ [GM]iB are free of 1%.0 GiB; give a smaller count, or set %-%-memory\n$",
+    '^scene%.lua:1: node "emit1": 1000000000 births in a frame, in addition to 0 points, would need about 119%.2 ' ..
+    "GiB, but only [%d.]+ [GM]iB of 1%.0 GiB are free; give a smaller count, or set %-%-memory\n$",
   ["return rapid.create {} :emit { source = rapid.mesh.box {}, rate = 2e10 } :solve {}"] =
     "give a smaller rate, or set",
   ["return rapid.create {} :emit { source = rapid.mesh.box {}, impulse = { [1] = 2e9 } } :solve {}"] =
     "give a smaller impulse, or set",
   ["return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1e-3 } } :solve {}"] =
-    "^scene%.lua:1: rapid%.points%.grid: size {1, 1, 1} at spacing 0%.001: 1e%+09 points would take about 59%.6 " ..
+    "^scene%.lua:1: rapid%.points%.grid: size {1, 1, 1} with spacing 0%.001: 1e%+09 points would need about 59%.6 " ..
     "GiB, .* give a larger spacing, or set %-%-memory\n$",
   ["local s = rapid.levelset.sphere { radius = 10, voxel = 0.003 } return rapid.create {} :collide { shape = s } " ..
-    ":solve {}"] = "a voxel of at least [%d.]+ m fits, or set %-%-memory\n$",
+    ":solve {}"] = "use a voxel of at least [%d.]+ m, or set %-%-memory\n$",
   ["return rapid.create { points = " .. grid .. " } :distance { within = 1e9 } :solve {}"] =
-    '^scene%.lua:1: node "distance1": within = 1e%+09: about 2e%+09 pairs of 64000 points would take about 488%.3 ' ..
+    '^scene%.lua:1: node "distance1": within = 1e%+09: about 2e%+09 pairs of 64000 points would need about 488%.3 ' ..
     "GiB, .* give a smaller within, or set %-%-memory",
   ["return rapid.create { points = " .. grid .. " } :contact { radius = 1e9 } :solve {}"] =
-    '^scene%.lua:1: node "contact1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would take about 305%.2 ' ..
+    '^scene%.lua:1: node "contact1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would need about 305%.2 ' ..
     "GiB, .* give a smaller radius, or set %-%-memory",
   ["return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 190 } } " ..
     ":interact { radius = 0.001, cohesion = 1 } :solve {}"] = '^scene%.lua:1: node "interact1": the neighbourhoods ' ..
-    "of 6859000 points would take about 1%.0 GiB, and %d+ MiB are free of 1%.0 GiB; let it act on fewer, or set ",
+    "of 6859000 points would need about 1%.0 GiB, but only %d+ MiB of 1%.0 GiB are free; apply it to fewer points, " ..
+    "or set ",
   ["return rapid.create { points = " .. grid .. " } :contact { radius = 3 } :solve {}"] =
-    'node "contact1": radius = 3 m: about 4%.[4-9]e%+07 pairs of 64000 points would take about [67]%.%d GiB',
+    'node "contact1": radius = 3 m: about 4%.[4-9]e%+07 pairs of 64000 points would need about [67]%.%d GiB',
   ["return rapid.create { points = " .. grid .. " } :clump { radius = 1e9 } :solve {}"] =
-    'node "clump1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would take about 610%.%d GiB, .* give a ' ..
+    'node "clump1": radius = 1e%+09 m: about 2e%+09 pairs of 64000 points would need about 610%.%d GiB, .* give a ' ..
     "smaller radius, or set %-%-memory",
 }
 
@@ -48,12 +49,12 @@ describe("--memory", function()
     for text, expected in pairs {
       [ [[return rapid.create { points = two } :detail("d", function(points, frame)
   for i = 1, 1e6 do points.detail[("x"):rep(100) .. i .. "_" .. frame.number] = i end
-end) :solve {}]] ] = '^scene%.lua:1: node "d": the run takes [23]%d%d MiB of memory, and may take 200 MiB; ',
+end) :solve {}]] ] = '^scene%.lua:1: node "d": the run uses [23]%d%d MiB of memory, and the limit is 200 MiB; ',
       [ [[local n = rapid.create { points = two } :solve {}
 for i = 1, 8000 do n = n:merge(rapid.create { points = two } :solve {}) end
-return n]] ] = "^scene%.lua: the run takes [23]%d%d MiB of memory, and may take 200 MiB; ",
+return n]] ] = "^scene%.lua: the run uses [23]%d%d MiB of memory, and the limit is 200 MiB; ",
       [ [[local t = {}
-for i = 1, 1e8 do t[i] = { i } end]] ] = "^scene%.lua: the run takes [23]%d%d MiB of memory, and may take 200 MiB; ",
+for i = 1, 1e8 do t[i] = { i } end]] ] = "^scene%.lua: the run uses [23]%d%d MiB of memory, and the limit is 200 MiB; ",
     } do
       local result = scene.command("run", text, "-f 1-20 --quiet --memory 200M --script-memory 4G --stats peak.json")
       assert.match(expected .. ".*or set %-%-memory\n$", result.stderr)
@@ -67,7 +68,7 @@ for i = 1, 1e8 do t[i] = { i } end]] ] = "^scene%.lua: the run takes [23]%d%d Mi
     local result = scene.command("trace", [[return rapid.create { points = two } :detail("d", function(points, frame)
   for i = 1, frame.number > 3 and 1e6 or 0 do points.detail[("x"):rep(50) .. i .. "_" .. frame.number] = i end
 end) :solve {}]], "--id 0 -f 1-9 --memory 200M --script-memory 4G")
-    assert.match('^scene%.lua:1: node "d": the run takes 2%d%d MiB of memory, and may take 200 MiB; ', result.stderr)
+    assert.match('^scene%.lua:1: node "d": the run uses 2%d%d MiB of memory, and the limit is 200 MiB; ', result.stderr)
     assert.equal(1, result.status)
     assert.match("^point 0 of create1\n.*\n +3 +0%.08333 s ", result.stdout)
   end)
@@ -80,14 +81,14 @@ end) :solve {}]], "--id 0 -f 1-9 --memory 200M --script-memory 4G")
     assert.equal("", few.stderr)
     assert.equal(0, few.status)
     local all = scene.command("run", text:format "1e9", "-f 1-2 --quiet --memory 110M")
-    assert.match('^scene%.lua:1: node "interact1": the neighbourhoods of 512000 points would take about 78 MiB, ',
+    assert.match('^scene%.lua:1: node "interact1": the neighbourhoods of 512000 points would need about 78 MiB, ',
       all.stderr)
   end)
 
   it("is what is free where it is not given", function()
     local result = scene.command("run", "return rapid.create {} :emit { source = rapid.mesh.box {}, count = 2e9 } " ..
       ":solve {}", "-f 1-3 --quiet")
-    assert.match("2000000000 births in a frame, .* are free of [%d.]+ [GM]iB; give a smaller count", result.stderr)
+    assert.match("2000000000 births in a frame, .* of [%d.]+ [GM]iB are free; give a smaller count", result.stderr)
     assert.equal(1, result.status)
   end)
 
@@ -112,24 +113,24 @@ describe("a file that is larger than the memory that a run may take", function()
     command.shell("truncate -s 300G hole.ply hole.obj; truncate -s 60M small.ply", { cwd = scene.folder.path })
     local result = read "hole.ply"
     assert.equal(2, result.status)
-    assert.match("^scene%.lua:1: rapid%.points%.read: hole%.ply: the file, which is read whole, would take about " ..
-      "300%.0 GiB, and %d+ MiB are free of 64 MiB; read a smaller one, or set %-%-memory\n$", result.stderr)
+    assert.match("^scene%.lua:1: rapid%.points%.read: hole%.ply: the whole file would need about " ..
+      "300%.0 GiB, but only %d+ MiB of 64 MiB are free; read a smaller file, or set %-%-memory\n$", result.stderr)
     assert.match("small%.ply: not a PLY", read "small.ply".stderr)
   end)
 
   it("is refused before what is compressed, or text, is unpacked", function()
     local points = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 106 } }"
     assert.equal(0, scene.command("run", points, "-f 1 --quiet -o big.prt -o big.csv").status)
-    assert.match("big%.prt: %d+ points, decompressed, would take about 7%d MiB", read "big.prt".stderr)
-    assert.match("big%.csv: %d+ lines of 7 numbers would take about 127 MiB", read "big.csv".stderr)
+    assert.match("big%.prt: %d+ points, decompressed, would need about 7%d MiB", read "big.prt".stderr)
+    assert.match("big%.csv: %d+ lines of 7 numbers would need about 127 MiB", read "big.csv".stderr)
   end)
 
   it("is refused while text grows in memory", function()
     scene.folder:write("big.obj", "v 0 0 0\nl" .. (" 1"):rep(2200000) .. "\n")
-    assert.match("big%.obj: lines of at least 2097152 places would take about 112 MiB", read "big.obj".stderr)
+    assert.match("big%.obj: lines of at least 2097152 positions would need about 112 MiB", read "big.obj".stderr)
     scene.folder:write("big.usda",
       '#usda 1.0\ndef Points "a" { point3f[] points = [' .. ("(0,0,0),"):rep(1500000) .. "] }")
-    assert.match("big%.usda: an array of at least %d+ rows would take about %d+ MiB", read "big.usda".stderr)
+    assert.match("big%.usda: an array of at least %d+ rows would need about %d+ MiB", read "big.usda".stderr)
   end)
 end)
 
@@ -157,9 +158,9 @@ describe("a neighbourhood of all points", function()
     local result = scene.command("run", text:format(1e9), "-f 1-2 --quiet")
     assert.equal(1, result.status)
     -- 64,000 neighbours of 64,000 points, at 1,000 steps, from 4 to 6 times.
-    assert.match('^scene%.lua:1: node "interact1": radius = 1e%+09 m: about 6%.4e%+04 neighbours of each of 64000 ' ..
-      "points, 1%.6e%+13 looks in a frame of 1000 steps, of which at most 1e%+12 are taken; give it a smaller " ..
-      "radius\n$", result.stderr)
+    assert.match('^scene%.lua:1: node "interact1": radius = 1e%+09 m gives about 6%.4e%+04 neighbours for each of ' ..
+      "64000 points, 1%.6e%+13 pairs in a frame of 1000 steps; at most 1e%+12 are possible; give a smaller radius\n$",
+      result.stderr)
     -- The check counts pairs within the radius, not all pairs, so the same scene with few neighbours passes.
     local near = text:format(1.1):gsub(":contact { radius = 0.1 }", ""):gsub("1000 }", "%%d }")
     assert.match("looks in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
@@ -174,7 +175,7 @@ describe("a graph without end", function()
 return require "rapid".node { name = "selfish", doc = "Asks itself.", expand = function(input)
   return input:selfish {}
 end }]])
-    assert.match("stack overflow: a function calls itself without end",
+    assert.match("stack overflow: a function calls itself endlessly",
       scene.error "return rapid.create { points = two } :selfish {} :solve {}")
   end)
 

@@ -74,7 +74,7 @@ describe("rapid run --part", function()
     assert.truthy(folder:read "named/s_part02of16.json")
     local result = rapid "run drops.lua -f 1-2 -o 'a{part}.####.csv'"
     assert.equal(2, result.status)
-    assert.matches("{part} stands for a part of the points; give %-%-part, or leave it out", result.stderr)
+    assert.matches("{part} is the name of a part; give %-%-part, or remove {part}", result.stderr)
   end)
 
   it("has statistics that add up to those of the whole", function()
@@ -144,7 +144,7 @@ describe("parts with a cache", function()
     for _, option in ipairs { "--part 2/2", "--part 1/3", "", "--sample 0.5" } do
       local result = rapid("run drops.lua -f 1-3 -o 'co.####.csv' --cache other --quiet " .. option)
       assert.equal(2, result.status, option)
-      assert.matches("it is of another run", result.stderr)
+      assert.matches("it belongs to another run", result.stderr)
     end
   end)
 end)
@@ -205,23 +205,25 @@ local coupled = {
   ["interact1"] = { emitter .. ":interact { radius = 1 }", "neighbours" },
   ["clump1"] = { emitter .. ":clump {} :contact {}", "together" },
   ["index"] = { emitter .. ':points("index", function(p) p.v = vec3(p.index, 0, 0) end)', "p.index" },
-  ["sums"] = { emitter .. ':detail("sums", function(points) points.detail.n = #points end)', "given all points" },
+  ["sums"] = { emitter .. ':detail("sums", function(points) points.detail.n = #points end)', "its function reads " ..
+    "all points" },
   ["passes_on"] = { [[
     :emit { source = rapid.shape.sphere {}, rate = 50 }
     :detail("passes_on", function(points)
       local function count(all) return all and 1 or 0 end
       points.detail.n = count(points)
-    end)]], "given all points" },
+    end)]], "its function reads all points" },
   ["copies"] = { emitter .. [[:detail("copies", function(points)
       local all = points.detail
       if points.detail.n then all = points end
       points.detail.n = all and 1 or 0
-    end)]], "given all points" },
+    end)]], "its function reads all points" },
   ["adds"] = { emitter .. ':detail("adds", function(points) points:add { P = vec3(0, 0, 0) } end)',
-    "given all points" },
-  ["returns"] = { emitter .. ':detail("returns", function(points) return points end)', "given all points" },
+    "its function reads all points" },
+  ["returns"] = { emitter .. ':detail("returns", function(points) return points end)',
+    "its function reads all points" },
   ["any"] = { emitter .. ':detail("any", function(...) local points = ... points.detail.n = 1 end)',
-    "given all points" },
+    "its function reads all points" },
   ["delete1"] = { emitter .. ":delete { where = function(p) return p.index > 9 end }", "p.index" },
   ["collide1"] = { [[:emit { source = rapid.shape.sphere {}, rate = 50, attributes = { pscale = {0.1, 0.2} } }
     :collide { shape = rapid.levelset.sphere { radius = 0.3, voxel = 0.1 } }]], "largest radius" },
@@ -260,7 +262,7 @@ return b:merge(a)
 ]])
     local because = json.decode(done("explain born.lua --json").stdout).parts.because
     assert.equal(2, #because)
-    assert.matches("numbered over all points", because[1].what)
+    assert.matches("numbers births over all points", because[1].what)
     assert.matches("several simulations", because[2].what)
   end)
 
@@ -400,15 +402,15 @@ describe("rapid merge", function()
     command.shell("for f in m_part1of4.*; do cp $f copy_${f#m_}; done", { cwd = folder.path })
     refused("'m_part{part}.####.csv' 'copy_part{part}.####.csv'", "missing is part 2of4",
             "of m_part3of4.####.csv frames are missing: 2-3", "of m_part4of4.####.csv a frame is missing: 4",
-            "part 1of4 is there twice: m_part1of4.####.csv and copy_part1of4.####.csv")
-    refused("'m_part2of4.####.csv'", "m_part2of4.csv.json is not there")
-    refused("'none_part{part}.####.csv'", "no complete part of this name is there")
+            "part 1of4 appears twice: m_part1of4.####.csv and copy_part1of4.####.csv")
+    refused("'m_part2of4.####.csv'", "m_part2of4.csv.json is missing")
+    refused("'none_part{part}.####.csv'", "there is no complete part with this name")
   end)
 
   it("lists what differs between the runs of parts", function()
     parts(2)
     done "run drops.lua --part 2/2 -f 1-4 --set rate=2000 -o 'm.####.csv' --quiet"
-    refused("'m_part{part}.####.csv'", "m_part2of2.####.csv is of another run than m_part1of2.####.csv",
+    refused("'m_part{part}.####.csv'", "m_part2of2.####.csv belongs to another run than m_part1of2.####.csv",
             "rate is not given there and 2000 here")
     done "run drops.lua --part 2/2 -f 1-3 --seed 9 -o 'm.####.csv' --quiet"
     refused("'m_part{part}.####.csv'", "--seed is not given there and 9 here", "-f is 1-4x1 there and 1-3x1 here")
@@ -434,8 +436,8 @@ describe("rapid merge", function()
     command.shell("cp m_part1of2.0003.csv m_part2of2.0003.csv", { cwd = folder.path })
     local result = rapid "merge -o 'out.####.csv' 'm_part{part}.####.csv'"
     assert.equal(1, result.status)
-    assert.matches("m_part2of2.0003.csv: is not the file that the part has written, which had %d+ points; this one " ..
-      "has %d+. Run the part again", result.stderr)
+    assert.matches("m_part2of2.0003.csv: was changed after the part wrote it: it had %d+ points then and has %d+ " ..
+      "now. Run the part again", result.stderr)
     assert.is_nil(folder:read "out.0003.csv")
     assert.truthy(folder:read "out.0002.csv")
   end)
@@ -447,14 +449,14 @@ describe("rapid merge", function()
     done "diff 'other.####.vdb' 'direct.####.csv'"
     local result = rapid "merge -o 'other.####.png' 'm_part{part}.####.csv'"
     assert.equal(2, result.status)
-    assert.matches("holds no points", result.stderr)
+    assert.matches("can't store points", result.stderr)
   end)
 
   it("refuses to replace a part", function()
     parts(2)
     local result = rapid "merge -o 'm_part1of2.####.csv' 'm_part{part}.####.csv'"
     assert.equal(2, result.status)
-    assert.matches("would replace m_part1of2.0001.csv, a part", result.stderr, 1, true)
+    assert.matches("would replace the part m_part1of2.0001.csv", result.stderr, 1, true)
   end)
 
   it("has rows in the order of the ids", function()

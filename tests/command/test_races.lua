@@ -13,8 +13,8 @@ return rapid.create { points = two } :attribute { n = 0 }
   return scene.command("check", text, arguments or "--races")
 end
 
-local remedy = "; a kernel must not remember other points: keep what it needs in an attribute of the point, or find " ..
-  "it once for the whole set in :detail\n"
+local remedy = "; a kernel must not remember other points: store values in an attribute of the point, or compute " ..
+  "them once for all points in a :detail\n"
 
 describe("rapid check --races", function()
   it("finds a count of the points before, with the node, the attribute, the point and both values", function()
@@ -31,8 +31,8 @@ describe("rapid check --races", function()
   it("finds what depends on the points that a state has seen, in whatever order", function()
     local result = check((":points('seen', function(p, frame) %sif frame.number == 2 then kept.n = kept.n + 1 else " ..
       "p.n = kept.n end end) :solve {}"):format(hidden))
-    assert.equal('scene.lua:3: node "seen": frame 3: n of point id 0 is 2 in the order of the points, and 1 where ' ..
-      "every other point is worked on in another state" .. remedy, result.stderr)
+    assert.equal('scene.lua:3: node "seen": frame 3: n of point id 0 is 2 in the order of the points, and 1 if ' ..
+      "every other point is processed by a second Lua state" .. remedy, result.stderr)
     assert.equal(1, result.status)
   end)
 
@@ -75,7 +75,8 @@ describe("rapid check --races", function()
     assert.equal(0, result.status)
     local _, times = result.stdout:gsub("once", "")
     assert.equal(1, times)
-    assert.truthy(result.stdout:find("frames 2 to 3: the same bits in every order of the points, and in two states\n",
+    assert.truthy(result.stdout:find("frames 2 to 3: bit-identical in every order of the points, and in two Lua " ..
+      "states\n",
       1, true), result.stdout)
   end)
 
@@ -93,21 +94,21 @@ return rapid.create {} :emit { source = rapid.points.from { P = {{0, 0, 0}} }, i
   :points("count", function(p)
     local held = { box } local kept = held[1] kept.n = kept.n + 1 p.n = kept.n end) :solve {}]]
     local early = scene.command("check", text, "--races")
-    assert.equal("warning: there is no point in frames 2 to 3, and nothing to compare; choose later frames, " ..
-      "as -f 25-27\n", early.stderr)
+    assert.equal("warning: frames 2 to 3 have no points to compare; choose later frames, such as -f 25-27\n",
+      early.stderr)
     assert.equal(0, early.status)
     local late = scene.command("check", text, "--races -f 8-10")
     assert.truthy(late.stderr:find('node "count": frame 9: n of point id 0 is', 1, true), late.stderr)
     assert.equal(1, late.status)
     local without = scene.command("check", text, "-f 8-10")
-    assert.equal("-f chooses the frames of --races; without it no frame is run: give both, or leave it out\n",
+    assert.equal("-f chooses the frames of --races; give both, or neither\n",
       without.stderr)
     assert.equal(2, without.status)
   end)
 
   it("takes no number of threads", function()
     local result = check(":solve {}", nil, "--races --threads 2")
-    assert.equal("--races goes over the points in orders of its own, on one thread; leave --threads out\n",
+    assert.equal("--races visits the points in several orders on one thread; remove --threads\n",
       result.stderr)
     assert.equal(2, result.status)
   end)

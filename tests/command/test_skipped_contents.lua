@@ -20,14 +20,14 @@ describe("what a reader leaves out", function()
       big(0, 4):rep(3) .. big(4, 2) .. "kind" .. big(1, 2) .. big(4, 4) .. big(1, 4) .. big(4, 2) .. "rock" ..
       big(0, 4):rep(3) .. "\63\128\0\0" .. big(0, 4) .. big(7, 4) .. "\0\255")
     local text, points = warnings "one.bgeo"
-    assert.matches('rapid.points.read: ".*one.bgeo": its 3 primitives can\'t be read, and is left out', text)
+    assert.matches('rapid.points.read: ".*one.bgeo": not read: its 3 primitives', text)
     assert.equal("rock", points[1].kind)
   end)
 
   it("is told of .ply: other elements", function()
     scene.folder:write("one.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" ..
       "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0\n1 0\n")
-    assert.matches('its 2 elements "face" can\'t be read', warnings "one.ply", 1, true)
+    assert.matches('not read: its 2 elements "face"', warnings "one.ply", 1, true)
   end)
 
   it("is told of .usda: arrays of other types, and of other numbers of values", function()
@@ -41,8 +41,8 @@ def Points "a"
 }
 ]])
     local text = warnings "one.usda"
-    assert.matches("primvars:kind of the type asset[] can't be read", text, 1, true)
-    assert.matches("primvars:three of 3 values; there are 1 points can't be read", text, 1, true)
+    assert.matches("not read: primvars:kind of the type asset[]", text, 1, true)
+    assert.matches("not read: primvars:three of 3 values, but there are 1 points", text, 1, true)
   end)
 
   it("is told of .vtp: arrays of text, and polygons", function()
@@ -52,8 +52,8 @@ def Points "a"
 </DataArray></PointData><Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">0 0 0</DataArray>
 </Points></Piece></PolyData></VTKFile>]])
     local text = warnings "one.vtp"
-    assert.matches('the array "kind" of the type String, 1 numbers a point can\'t be read', text, 1, true)
-    assert.matches("its 2 polygons can't be read", text, 1, true)
+    assert.matches('not read: the array "kind" of the type String, 1 numbers per point', text, 1, true)
+    assert.matches("not read: its 2 polygons", text, 1, true)
   end)
 
   it("is nothing of a file that Rapid wrote, and what is left is read", function()
@@ -72,7 +72,7 @@ def Points "a"
       "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0\n")
     local command = require "testing.command"
     local shown = command.rapid("info one.ply", { cwd = scene.folder.path })
-    assert.matches('left out    its 1 elements "face"', shown.stdout, 1, true)
+    assert.matches('skipped     its 1 elements "face"', shown.stdout, 1, true)
     local json = require "dkjson"
     local reported = json.decode(command.rapid("info one.ply --json", { cwd = scene.folder.path }).stdout)
     assert.same({ 'its 1 elements "face"' }, reported.left_out)

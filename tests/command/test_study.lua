@@ -175,7 +175,7 @@ return rapid.study { name = "endless", frames = {1, 2}, repeat_runs = 1, sweep =
   reference = function() return { P = {{0, 0, 0}} } end }]])
     local found = json.decode(rapid("endless.lua --json -o out --script-timeout 0.5").stdout)
     assert.equal(0, found.rows[1].error)
-    assert.truthy(found.rows[2].failed:find("the script runs for more than 0.5 s", 1, true), found.rows[2].failed)
+    assert.truthy(found.rows[2].failed:find("the script ran for more than 0.5 s", 1, true), found.rows[2].failed)
   end)
 
   it("exits 2 where a scene can't be made", function()
@@ -259,7 +259,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
   it("says that there is no residual where there is no constraint", function()
     local result = rapid "orbit.lua --sweep solve.substeps=1,2 --error residual -f 1-3 -o out"
     assert.equal(1, result.status)
-    assert.truthy(result.stdout:find("no constraint acts in the frames that are looked at", 1, true), result.stdout)
+    assert.truthy(result.stdout:find("no constraint acts in the compared frames", 1, true), result.stdout)
   end)
 
   local function message(arguments, status)
@@ -275,15 +275,15 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
       :find('orbit.lua:3: node "solve1": unknown parameter "substep"; did you mean "substeps"?', 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2"):find("--reference is missing", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --error residual --reference 2")
-      :find("--reference: a residual is compared with nothing; leave it out", 1, true))
+      :find("--reference: a residual needs no reference; remove it", 1, true))
     assert.truthy(message("orbit.lua --sweep solve --reference 2"):find("it must be NODE.PARAM=VALUE", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,1 --reference 2"):find("has the value 1 twice", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --sweep attract.core=0,1 --reference solve.substeps=2")
-      :find("are all left for the step along a line", 1, true))
+      :find("a line can vary only one of the knobs", 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substeps=1,2 --reference 4 --repeat 999999999999")
       :find("--repeat = 999999999999; it must be at most 100000", 1, true))
     assert.truthy(message("orbit.lua"):find("the file returns no study", 1, true))
-    assert.truthy(message("gone.lua --reference 5"):find("--reference goes with --sweep", 1, true))
+    assert.truthy(message("gone.lua --reference 5"):find("--reference needs --sweep", 1, true))
     assert.truthy(message("none.lua"):find("none.lua: No such file", 1, true))
   end)
 
@@ -315,14 +315,14 @@ return rapid.study { %s }]]):format(fields))
       [rest .. 'name = "x", error = "mean"'] =
         'error = "mean"; it must be "rms", "max", "p95", "residual" or a function',
       [rest .. 'name = "x", error = "residual"'] =
-        "reference = a function; it must be left out: a residual is compared with nothing",
+        "reference = a function; it must be removed: a residual needs no reference",
       [rest .. 'name = "x", frames = {2, 1}'] = "frames = {2, 1}; the last must come after the first",
       [rest .. 'name = "x", sweep = { n = {{}} }'] = "sweep: n holds a table; it must be finite numbers,",
       [rest .. 'name = "x", repeat_runs = 0'] = "repeat_runs = 0; it must be a whole number, at least 1",
       [rest .. 'name = "x", error_frames = "first"'] = 'error_frames = "first"; it must be "all" or "last"',
       [rest .. 'name = "x", repeat_runs = 1e18'] = "it must be a whole number, at least 1 and at most 100000",
       [rest .. 'name = "x", lines = "m"'] = 'lines: the sweep has no knob "m"',
-      [rest .. 'name = "x", lines = { "n", "n" }'] = 'lines: "n" is there twice',
+      [rest .. 'name = "x", lines = { "n", "n" }'] = 'lines: "n" appears twice; remove one',
       [rest .. 'name = "x", reference = { m = 1 }'] = 'reference: the sweep has no knob "m"',
     } do
       local found = message(fields)

@@ -211,7 +211,7 @@ it("four", function() io.write "no newline" end)]]
     assert.truthy(first, result.stdout)
     assert.is_true(tonumber(first) >= tonumber(second))
     assert.equal(2, select(2, result.stdout:gsub("%d s: ", "")))
-    assert.equal("--slowest does not go with --format tap; use --format text\n",
+    assert.equal("--slowest needs --format text, not tap\n",
       folder:test("a.lua --slowest 2 --format tap").stderr)
   end)
 
@@ -348,9 +348,10 @@ describe("a test", function()
     fails([[
       local a = rapid.run("scene.lua", { frames = {1, 3}, set = { up = 24 } })
       assert.conserved(a, function(p) return p.heat + (p.id == 1 and p.P.y or 0) end, 1.5)]],
-      "frame 3: the sum is 12, and 9 at the first frame; it is off by 3; most of all point 2 (id 1): 10, and 7 before")
+      "frame 3: the sum is 12, and 9 in the first frame; the difference is 3; the largest change has point 2 (id " ..
+        "1): 10, and 7 before")
     fails('assert.conserved(rapid.run("scene.lua", { frames = {1, 2} }), 1)',
-      "assert.conserved takes the result of rapid.run, a function of a point, and a tolerance")
+      "assert.conserved needs the result of rapid.run, a function of a point and a tolerance")
   end)
 
   it("fails as docs/lua-api.md shows it", function()
@@ -369,7 +370,7 @@ end)
 
   it("finds NaN near nothing", function()
     fails("assert.near(0, 0 / 0, 1e9)", "is not within 1e+09 of 0")
-    fails("assert.near(1, 1.5, 0.25)", "t.lua:2: 1.5 is not within 0.25 of 1; it is off by 0.5")
+    fails("assert.near(1, 1.5, 0.25)", "t.lua:2: 1.5 is not within 0.25 of 1; the difference is 0.5")
     holds 'local vec3 = require("vec3").make; assert.near(vec3(0, 3, 4), vec3(0, 0, 0), 5)'
   end)
 

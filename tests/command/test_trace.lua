@@ -38,7 +38,7 @@ describe("trace", function()
     assert.near(2 * fall, contacts[1][3], 1e-5)
     assert.near(g * fall, contacts[1][9], 1e-4)
     assert.near(3 * 1.5 * g * fall, contacts[1][10], 1e-3)
-    local death = text:match "([^\n]+its life was over)"
+    local death = text:match "([^\n]+its life ended)"
     assert.near(1, numbers_in(death)[2], 1e-6)
     assert.falsy(text:find("point 1 ", 1, true))
   end)
@@ -86,7 +86,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}} } }
 
   it("says where no point has the id, and refuses a create that there is not", function()
     local _, errors = reported(ball, "--id 77", 1)
-    assert.truthy(errors:find("no point has the id 77", 1, true))
+    assert.truthy(errors:find("no point up to frame 1 has the id 77", 1, true))
     local result = scene.command("trace", ball, "--id 0 --of creat1")
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find("did you mean", 1, true), result.stderr)

@@ -169,7 +169,7 @@ return rapid.create { points = rapid.points.read "two.vdb" } :emit { source = ra
   end)
 
   -- Nodes nested 60,000 deep fill Assimp's stack.
-  it("is not ended by a file that ends its reader", function()
+  it("is not ended by a file that crashed the reader", function()
     local folder = new_folder "return rapid.create {} :emit { source = rapid.mesh.read 'deep.gltf' } :solve {}"
     local nodes = {}
     for n = 1, 60000 do nodes[n] = ('{"children":[%d]}'):format(n) end
@@ -178,7 +178,7 @@ return rapid.create { points = rapid.points.read "two.vdb" } :emit { source = ra
     for _, arguments in ipairs { "", "--untrusted" } do
       local result = command.rapid("run inside/scene.lua -f 1-3 --quiet " .. arguments, { cwd = folder.path })
       assert.equal(2, result.status, result.stderr)
-      assert.match("^inside/scene.lua:3: rapid.mesh.read: .*inside/deep.gltf.*: it ends its reader with signal 11",
+      assert.match("^inside/scene.lua:3: rapid.mesh.read: .*inside/deep.gltf.*: it crashed the reader with signal 11",
         result.stderr)
     end
   end)
@@ -194,16 +194,16 @@ return rapid.create { points = rapid.points.read "two.vdb" } :emit { source = ra
     local folder = new_folder(plain)
     local watched = folder:run("--watch")
     assert.equal(2, watched.status)
-    assert.match("%-%-watch starts processes, which %-%-untrusted forbids", watched.stderr)
+    assert.match("%-%-watch starts processes, which %-%-untrusted does not allow", watched.stderr)
     local missing = folder:run("--allow-read nowhere")
     assert.equal(2, missing.status)
     assert.match("can't open nowhere", missing.stderr)
     local alone = command.rapid("run inside/scene.lua --allow-read outside", { cwd = folder.path })
     assert.equal(2, alone.status)
-    assert.match("%-%-allow%-read is for %-%-untrusted", alone.stderr)
+    assert.match("%-%-allow%-read needs %-%-untrusted", alone.stderr)
     local feigned = folder:run("--sandboxed")
     assert.equal(2, feigned.status)
-    assert.match("not inside of Landlock", feigned.stderr)
+    assert.match("not inside Landlock", feigned.stderr)
   end)
 end)
 
@@ -255,7 +255,7 @@ describe("--untrusted of other commands", function()
     for _, name in ipairs { "out.svg", "out.json" } do
       local laid_out = draw("--untrusted --allow-read outside -o " .. name)
       assert.equal(2, laid_out.status)
-      assert.match("a program of its own, lays it out, which %-%-untrusted forbids; write .dot", laid_out.stderr)
+      assert.match("needs the program dot, which %-%-untrusted does not allow; write .dot instead", laid_out.stderr)
     end
   end)
 

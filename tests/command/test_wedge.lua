@@ -116,11 +116,11 @@ describe("rapid wedge", function()
       ["--vary rate=1,x"] = false, -- found in the row
       ["--vary rate"] = "it must be NAME=VALUE,VALUE,...",
       ["--vary rate=1,,2"] = "a value is missing",
-      ["--vary rate=1,2 --vary rate=3"] = "rate is varied twice",
+      ["--vary rate=1,2 --vary rate=3"] = "rate is given twice",
       ["--vary rate=1,2 --vary solve.substeps=1,2,3 --zip"] = "rate has 2 values and solve.substeps has 3",
       ["--vary rate=1,2 -o 'x.####.csv'"] = "rate=1 and rate=2 write the same files; put {rate} into",
-      ["--vary rate=1,1 -o '{rate}.####.csv'"] = "--vary: rate=1 is there twice; leave one out",
-      ["--vary 'rate=1,{1}' -o '{rate}.####.csv'"] = "rate=1 and rate={1} write the same files; leave one out",
+      ["--vary rate=1,1 -o '{rate}.####.csv'"] = "--vary: rate=1 appears twice; remove one",
+      ["--vary 'rate=1,{1}' -o '{rate}.####.csv'"] = "rate=1 and rate={1} write the same files; remove one",
       ["--vary rate=1,2 -o '{rat}.####.csv'"] = '{rat} is not varied; did you mean "rate"?',
       ["--vary rate=1,2 -o '{rate}.####.cvs'"] = ".cvs",
       ["--vary rate=1,2 --jobs 0"] = "--jobs",
@@ -148,9 +148,8 @@ return rapid.create {} :emit { source = rapid.shape.box {}, rate = rate }
       local same = run("--again " .. more)
       assert.equal(1, same.status)
       local reported = same.stdout .. same.stderr
-      assert.truthy(reported:find(
-        'file = "same.####.ply": another row of the wedge writes it, too; put a parameter that '
-        .. "is varied into its name", 1, true), reported)
+      assert.truthy(reported:find('file = "same.####.ply": another run of the wedge writes this file too; put a ' ..
+        "varied parameter into the name", 1, true), reported)
     end
     local own = run "--set own=true"
     assert.equal("", own.stderr)
@@ -228,6 +227,6 @@ describe("--set", function()
     assert.equal(4, snapshots)
     local result = wedge "--vary rate=240 -f 1-6 --cache-every 4"
     assert.equal(2, result.status)
-    assert.equal("--cache-every says how often a --cache is written; give one\n", result.stderr)
+    assert.equal("--cache-every sets how often snapshots are written; it needs --cache DIR\n", result.stderr)
   end)
 end)

@@ -9,9 +9,9 @@ local body = head .. "return rapid.create { points = rapid.points.read 'a.0002.c
 
 -- Arguments, the message, and the scene if it is a different one.
 local refused = {
-  { "--stats scene.lua", "--stats scene.lua: the run reads scene.lua; write to another name" },
-  { "--profile ./scene.lua", "--profile ./scene.lua: the run reads scene.lua; write to another name" },
-  { "-o a.####.csv", "-o a.####.csv: the run reads a.0002.csv; write to another name", body },
+  { "--stats scene.lua", "--stats scene.lua: the run reads scene.lua; write to another file" },
+  { "--profile ./scene.lua", "--profile ./scene.lua: the run reads scene.lua; write to another file" },
+  { "-o a.####.csv", "-o a.####.csv: the run reads a.0002.csv; write to another file", body },
   { "--stats a.json --profile ./a.json", "--profile ./a.json: --stats writes a.json, " },
   { "--events a.csv --stats a.csv", "--events a.csv: --stats writes a.csv, " },
   { "--events x.0002.csv -o x.####.csv", "-o x.####.csv: --events writes x.0002.csv, " },
@@ -48,7 +48,7 @@ describe("a name that a run writes", function()
   it("is one file's, and none that it reads", function()
     for _, case in ipairs(refused) do
       local result = run(command.folder(), case[1], case[3] or scene)
-      local message = case[2]:gsub(", $", ", too; give each a name of its own")
+      local message = case[2]:gsub(", $", " too; give each a different name")
       assert.equal(message .. "\n", result.stderr)
       assert.equal(2, result.status)
     end
@@ -65,7 +65,7 @@ describe("a name that a run writes", function()
       'rapid.grid.from { at = function(P) return P end } :write "scene.lua"' } do
       folder:write("scene.lua", head .. write .. " return " .. chain .. "\n")
       local result = command.rapid("run scene.lua -f 1 --quiet", { cwd = folder.path })
-      assert.match('path = "scene%.lua": grids are written as %.vdb; give a name such as "surface%.vdb"\n$',
+      assert.match('path = "scene%.lua": grids can only be written as %.vdb; give a name such as "surface%.vdb"\n$',
         result.stderr)
       assert.equal(2, result.status)
       assert.same({ "scene.lua" }, folder:list())

@@ -74,7 +74,7 @@ describe("rapid run --farm slurm", function()
     done "run drops.lua -f 1-8 -o 'whole/a.####.bgeo' --quiet"
     local said = done("run drops.lua -f 1-8 -o 'out/a.####.bgeo' --stats out/s.json --farm slurm --parts 5 "
       .. "--farm-options '-c 2 --nice=3'")
-    local array, last = said:match "job (%d+): 5 tasks\njob (%d+): merge, when they are done\n"
+    local array, last = said:match "job (%d+): 5 tasks\njob (%d+): merge, after the others\n"
     assert.truthy(array, said)
     local submitted = json.decode((folder:read "out/FARM.json"))
     assert.equal(tonumber(array), submitted.tasks[5].job)
@@ -102,7 +102,7 @@ describe("rapid run --farm slurm", function()
     assert.truthy(folder:read "fail/a_part3of3.0008.bgeo")
 
     shell "rmdir fail/a_part2of3.0003.bgeo"
-    assert.matches("job %d+: 1 tasks again: 2\njob %d+: merge", done "farm retry fail/FARM.json")
+    assert.matches("job %d+: 1 tasks repeated: 2\njob %d+: merge", done "farm retry fail/FARM.json")
     assert.equal("done done done done", states(settled "fail/FARM.json"))
     for frame = 1, 8 do
       local name = ("/a.%04d.bgeo"):format(frame)
@@ -194,12 +194,12 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
   it("finds what is wrong before it submits", function()
     for arguments, text in pairs {
       ["coupled.lua -o 'c/a.####.csv' --farm slurm --parts 2"] = 'node "contact1"',
-      ["drops.lua -o 'c/a.####.png' --farm slurm --parts 2"] = "can't be put together",
+      ["drops.lua -o 'c/a.####.png' --farm slurm --parts 2"] = "no output files to merge",
       ["drops.lua -o 'c/{part}.####.csv' --farm slurm --parts 2"] = "{part}",
       ["drops.lua --farm slurm --parts 2"] = "give -o",
-      ["drops.lua --parts 2"] = "--parts is for --farm",
-      ["drops.lua --dry-run"] = "--dry-run is for --farm",
-      ["drops.lua --farm-options x"] = "--farm-options are for --farm",
+      ["drops.lua --parts 2"] = "--parts needs --farm slurm",
+      ["drops.lua --dry-run"] = "--dry-run needs --farm slurm",
+      ["drops.lua --farm-options x"] = "--farm-options needs --farm slurm",
       ["drops.lua --farm lsf"] = "it must be slurm",
       ["drops.lua --farm slurm --watch"] = "--watch",
       ["drops.lua --farm slurm --untrusted"] = "--untrusted",
@@ -217,8 +217,8 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
     local result = command.rapid("run drops.lua -o 'd/a.####.csv' --farm slurm",
                                  { cwd = folder.path, environment = { PATH = "/nowhere" } })
     assert.equal(2, result.status)
-    assert.matches("sbatch and squeue and scancel are not on PATH; install slurm-client, or give --dry-run",
-                   result.stderr, 1, true)
+    assert.matches("sbatch and squeue and scancel are not on the PATH; install slurm-client, or see the scripts " ..
+      "with --dry-run", result.stderr, 1, true)
   end)
 end)
 
@@ -228,7 +228,7 @@ describe("rapid farm", function()
     assert.equal("waiting waiting waiting waiting", states(json.decode(done "farm status --json held/FARM.json").tasks))
     local again = rapid "run drops.lua -f 1-4 -o 'held/b.####.csv' --farm slurm"
     assert.equal(2, again.status)
-    assert.matches("4 tasks of the job of .*held/FARM.json are queued or run", again.stderr)
+    assert.matches("4 tasks of the job in .*held/FARM.json are queued or run", again.stderr)
     assert.equal("4 tasks cancelled\n", done "farm cancel held/FARM.json")
     settled "held/FARM.json"
     local status = rapid "farm status held/FARM.json"

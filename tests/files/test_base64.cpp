@@ -29,10 +29,10 @@ TEST_CASE("the vectors of RFC 4648 are read", "[base64]")
     CHECK(length == 8);
 }
 
-TEST_CASE("what is no base64 is an error", "[base64]")
+TEST_CASE("what is not valid base64 is an error", "[base64]")
 {
     std::size_t length = 0;
     CHECK(test::error_of([&] { from_base64("Zm9v", 4, length); }) == "the array ends early");
-    CHECK(test::error_of([&] { from_base64("Zm9*"); }) == "the array is no base64");
-    CHECK(test::error_of([&] { from_base64("Z=9v"); }) == "the array is no base64");
+    CHECK(test::error_of([&] { from_base64("Zm9*"); }) == "the array is not valid base64");
+    CHECK(test::error_of([&] { from_base64("Z=9v"); }) == "the array is not valid base64");
 }

@@ -152,10 +152,11 @@ TEST_CASE("an archive finds its files by kind and frame, and says which could no
         CHECK(file == archive.file("frame", frame));
     }
     CHECK(found == std::vector<std::int64_t>{-3, 0, 12345});
-    CHECK(archive.take_failures() ==
-          std::vector<std::string>{
-              archive.journal().string() +
-                  ": can't be written: it is not a regular file; the run goes on, and what it computes is not kept",
-              (folder / "snapshot.0007.rapid").string() + ": can't be written; the run goes on without this snapshot"});
+    CHECK(
+        archive.take_failures() ==
+        std::vector<std::string>{
+            archive.journal().string() +
+                ": can't be written: it is not a regular file; the run continues, but its results are not stored",
+            (folder / "snapshot.0007.rapid").string() + ": can't be written; the run continues without this snapshot"});
     CHECK(archive.take_failures().empty());
 }

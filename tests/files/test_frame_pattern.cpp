@@ -31,7 +31,7 @@ TEST_CASE("a pattern that is not one frame number in a file's name is refused", 
     CHECK(error_of([] { FramePattern("a.%s.vdb"); }) == "\"a.%s.vdb\": the % must be a frame number such as %04d");
     CHECK(error_of([] { FramePattern("a.##.$F4.vdb"); }) == "\"a.##.$F4.vdb\" has two frame numbers; it must have one");
     CHECK(error_of([] { FramePattern("####/a.vdb"); }) ==
-          "\"####/a.vdb\": the frame number must be in the name of the file, not of its folder");
+          "\"####/a.vdb\": the frame number must be in the name of the file, not in the name of its folder");
 }
 
 TEST_CASE("the existing files of a sequence are those that the pattern would write", "[files][pattern]")

@@ -38,16 +38,16 @@ std::vector<std::vector<std::int64_t>> lists_of(const std::string& text)
 TEST_CASE("numbers of an ascii PLY must be of their type, and end", "[files][ply]")
 {
     CHECK(error_in(ascii("1.5 255 -7\n2e3 0 2147483647\n")).empty());
-    CHECK(error_in(ascii("1.5 300 -7\n2 0 1\n")) == "vertex 0 of 2: kind = 300 is no number of its type");
+    CHECK(error_in(ascii("1.5 300 -7\n2 0 1\n")) == "vertex 0 of 2: kind = 300 is not a number of its type");
     CHECK(error_in(ascii("1.5 1 -7\n2 0 99999999999\n")) ==
-          "vertex 1 of 2: mark = 99999999999 is no number of its type");
-    CHECK(error_in(ascii("1.5 nan -7\n2 0 1\n")) == "vertex 0 of 2: kind = nan is no number of its type");
-    CHECK(error_in(ascii("1.5 0.5 -7\n2 0 1\n")) == "vertex 0 of 2: kind = 0.5 is no number of its type");
-    CHECK(error_in(ascii("1.5 1-7 1\n2 0 1\n")) == "vertex 0 of 2: kind = 1 is no number of its type");
+          "vertex 1 of 2: mark = 99999999999 is not a number of its type");
+    CHECK(error_in(ascii("1.5 nan -7\n2 0 1\n")) == "vertex 0 of 2: kind = nan is not a number of its type");
+    CHECK(error_in(ascii("1.5 0.5 -7\n2 0 1\n")) == "vertex 0 of 2: kind = 0.5 is not a number of its type");
+    CHECK(error_in(ascii("1.5 1-7 1\n2 0 1\n")) == "vertex 0 of 2: kind = 1 is not a number of its type");
     CHECK(error_in(ascii("1.5 1 -7\n2 0 1")) ==
-          "vertex 1 of 2: the file ends with the number mark, and may be cut within it");
+          "vertex 1 of 2: the file ends with the number mark and may be cut off within it");
     CHECK(error_in(ascii("1.5 1 -7\n2 0    \n")) ==
-          "vertex 1 of 2: there is no mark; the file ends early or is damaged");
+          "vertex 1 of 2: mark is missing; the file ends early or is damaged");
 }
 
 TEST_CASE("what a PLY promises is checked before memory is taken", "[files][ply]")
@@ -57,7 +57,7 @@ TEST_CASE("what a PLY promises is checked before memory is taken", "[files][ply]
     };
     const std::string count = GENERATE("3", "1000000000", "18446744073709551615", "2049638230412172402");
     const std::string message =
-        "the file ends early: its header promises " + count + " of the element \"vertex\", it holds 2";
+        "the file ends early: its header announces " + count + " of the element \"vertex\", but it contains 2";
     CHECK(error_in(promising("binary_little_endian", count) + std::string(18, '\0')) == message);
     CHECK(error_in(promising("ascii", count) + "1 2 3 4 5 6\n") == message);
     CHECK_THAT(error_of([&] { PlyFile file(promising("ascii", "99999999999999999999")); }),

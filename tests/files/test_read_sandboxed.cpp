@@ -83,11 +83,11 @@ TEST_CASE("the end of a reader is an error of its file", "[files]")
     CHECK(error_in([]() -> Numbers {
               ::raise(SIGSEGV);
               return {};
-          }) == "can't be read: it ends its reader with signal 11 (Segmentation fault), and must be damaged");
+          }) == "can't be read: it crashed the reader with signal 11 (Segmentation fault), so it must be damaged");
     CHECK_THAT(error_in([]() -> Numbers { std::abort(); }), Catch::Contains("signal 6 (Aborted)"));
-    CHECK(error_in([]() -> Numbers { ::_exit(0); }) == "can't be read: it ends its reader, and must be damaged");
+    CHECK(error_in([]() -> Numbers { ::_exit(0); }) == "can't be read: it crashed the reader, so it must be damaged");
     CHECK(error_in([]() -> Numbers { return Numbers(std::size_t{1} << 30); }) ==
-          "can't be read: it takes more than 1024 MB of memory, and must be damaged");
+          "can't be read: it needs more than 1024 MB of memory, so it must be damaged");
 }
 
 TEST_CASE("a reader takes no more than half of what the budget leaves, and may take 64 MiB", "[files]")
@@ -100,13 +100,14 @@ TEST_CASE("a reader takes no more than half of what the budget leaves, and may t
         const MemoryBudget used_up(1);
         CHECK(refusal_of(32 * mebibyte).empty());
         CHECK(refusal_of(96 * mebibyte) ==
-              "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or set "
+              "can't be read: the reader needs more than the available 64 MiB; read a smaller file, or set "
               "memory");
     }
     const std::uint64_t used = memory_budget() - free_memory();
     const MemoryBudget budget(used + 512 * mebibyte);
     CHECK(refusal_of(128 * mebibyte).empty());
-    CHECK_THAT(refusal_of(384 * mebibyte), Catch::StartsWith("can't be read: its reader takes more than the 2"));
+    CHECK_THAT(refusal_of(384 * mebibyte),
+               Catch::StartsWith("can't be read: the reader needs more than the available 2"));
 }
 
 TEST_CASE("a reader that takes too long is told from others that end by a signal", "[files]")
@@ -123,7 +124,7 @@ TEST_CASE("a reader that takes too long is told from others that end by a signal
     CHECK(error_in([]() -> Numbers {
               ::raise(SIGXCPU);
               return {};
-          }) == "can't be read: it takes its reader longer than 5 s, and must be damaged");
+          }) == "can't be read: it takes longer than 5 s to read, so it must be damaged");
 }
 
 TEST_CASE("a reader that waits ends, one that was stopped or works slowly does not", "[files]")
@@ -132,7 +133,7 @@ TEST_CASE("a reader that waits ends, one that was stopped or works slowly does n
     CHECK(error_in([]() -> Numbers {
               for (int k = 0; k < 2; ++k) ::raise(SIGALRM);
               return {};
-          }) == "can't be read: its reader waited for 30 s");
+          }) == "can't be read: the reader waited for 30 s");
 
     const auto work = [] {
         const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 20;  // processor time

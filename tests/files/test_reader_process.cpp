@@ -63,7 +63,7 @@ TEST_CASE("a reader process forks the copies that read, and outlives them", "[fi
         const Number process = reader(file, "parent");
         expect(process != here && process > 0, 2);
         expect(error_of([&] { reader(file, "crash"); }) ==
-                   "can't be read: it ends its reader with signal 11 (Segmentation fault), and must be damaged",
+                   "can't be read: it crashed the reader with signal 11 (Segmentation fault), so it must be damaged",
                3);
         expect(error_of([&] { reader(file, "name"); }) == "there is no name", 4);
         expect(error_of([&] { reader(file / "none", "parent"); }).starts_with("can't be read: "), 5);
@@ -78,8 +78,7 @@ TEST_CASE("a reader process keeps to the budget of the process that it serves", 
         expect(reader(file, "much") == 0, 1);
         set_memory_budget(1);
         expect(error_of([&] { reader(file, "much"); }) ==
-                   "can't be read: its reader takes more than the 64 MiB that are left for it; read a smaller file, or "
-                   "set memory",
+                   "can't be read: the reader needs more than the available 64 MiB; read a smaller file, or set memory",
                2);
         expect(reader(file, "parent") > 0, 3);
     });

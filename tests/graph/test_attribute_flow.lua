@@ -16,8 +16,8 @@ end
 
 describe("an attribute", function()
   it("is refused before the node that makes it, where no solve feeds it back", function()
-    local later = 'scene.lua:1: node "read": no attribute "heat" here; node "attribute1" at line 1 makes it, which ' ..
-      "comes later: move it before this one\n"
+    local later = 'scene.lua:1: node "read": no attribute "heat" here; node "attribute1" at line 1 makes it, but ' ..
+      "comes later: move that node before this one\n"
     assert.equal(later, refused(create .. read .. ":solve {} :attribute { heat = 1 }"))
     assert.equal(later, refused(create .. read .. ":attribute { heat = 1 }"))
     assert.equal((later:gsub('"read"', '"spring1"')),

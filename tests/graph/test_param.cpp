@@ -212,16 +212,16 @@ TEST_CASE("attribute values are refused by the attribute's name", "[param]")
     CHECK(refusal<Values>(list({1.0})) == "x = {1} has the wrong type; it must be attributes");
     CHECK(refusal<Values>(named({{"heat", true}})) ==
           "heat = true has the wrong type; it must be a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a "
-          "text");
+          "string");
     CHECK(refusal<Values>(named({{"mass", list({1.0, 2.0, 3.0})}})) ==
           "mass = {1, 2, 3} has the wrong type; it must be a number");
     CHECK(refusal<Values>(named({{"targetv", 1.0}})) ==
           "targetv = 1 has the wrong type; it must be a vec3 or {x, y, z}");
     CHECK(refusal<Values>(named({{"heat", inf}})) == "heat = inf is out of range; it must be finite");
     CHECK(refusal<Values>(named({{"v", 1.0}})) ==
-          "\"v\" can't be an attribute: Rapid itself uses it; choose another name");
+          "\"v\" can't be an attribute, because Rapid uses this name; choose another one");
     CHECK(refusal<Values>(named({{"a b", 1.0}})) ==
-          "attribute name \"a b\" can't be used; take letters, digits and _, no digit first");
+          "attribute name \"a b\" can't be used; use letters, digits and _, and no digit at the beginning");
 }
 
 TEST_CASE("numbers by frame are a list from frame 1, or have their frames written", "[param]")

@@ -101,9 +101,8 @@ TEST_CASE("a write that is left out is warned of", "[plan]")
     const NodePtr source = scene.node("source");
     scene.node("write", {source});
     const Plan plan(scene.returning(source), {});
-    CHECK(plan.warnings ==
-          std::vector<std::string>{"scene.lua:2: node \"write1\": writes nothing: no output comes from "
-                                   "it; return it, or go on from it"});
+    CHECK(plan.warnings == std::vector<std::string>{"scene.lua:2: node \"write1\": writes nothing, because it leads to "
+                                                    "no output; return it, or continue the chain from it"});
 }
 
 TEST_CASE("each node comes once, after its inputs, and knows how many take its result", "[plan]")
@@ -189,8 +188,8 @@ TEST_CASE("a second solve after one create is an error that names both", "[plan]
     const bool in_a_row = GENERATE(true, false);
     const NodePtr second = scene.node("post", {in_a_row ? first : source}, {}, "again");
     CHECK(error_of_plan(scene.returning({{"a", first}, {"b", second}})) ==
-          "scene.lua:3: node \"again\": a second solve after \"source1\": \"post1\" at line 2 feeds it back already; a "
-          "create has one solve");
+          "scene.lua:3: node \"again\": a second solve after \"source1\": \"post1\" at line 2 is already its solve; a "
+          "create can have only one");
 }
 
 TEST_CASE("two simulations have a solve each, and a solve behind both is one too many", "[plan]")
@@ -262,7 +261,7 @@ TEST_CASE("two nodes of one name are an error at the second", "[plan]")
     const NodePtr one = scene.node("shift", {source}, {}, "twin");
     const NodePtr two = scene.node("shift", {one}, {}, "twin");
     CHECK(error_of_plan(scene.returning(two)) ==
-          "scene.lua:3: node \"twin\": the name is taken by the node at line 2; give each its own");
+          "scene.lua:3: node \"twin\": the node at line 2 has the same name; give each node a different name");
 }
 
 TEST_CASE("a graph without an output is an error of its file", "[plan]")
@@ -280,7 +279,7 @@ TEST_CASE("a scene that needs nothing has P, v and id", "[plan]")
     CHECK(plan.columns_of(0).empty());
 }
 
-TEST_CASE("an attribute that nobody reads is kept exactly where an output asks for it", "[plan]")
+TEST_CASE("an attribute that nobody reads is kept exactly where an output requests it", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
@@ -420,7 +419,7 @@ TEST_CASE("what the result of a merge has, all points that come into it keep", "
     CHECK_FALSE(attribute(back, "mass", back.nodes[back.outputs.at("main")].simulation).kept_for_merge);
 }
 
-TEST_CASE("with keep_all nothing is left out, and nothing is evaluated once", "[plan]")
+TEST_CASE("with keep_all nothing is pruned, and nothing is evaluated once", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}, {"member", Value("hot")}});
@@ -448,7 +447,7 @@ TEST_CASE("a node that changes says why, and one that does not has no reason to"
     CHECK(planned(plan, "still").changes.empty());
     CHECK(planned(plan, "moving").changes == "its by changes with the frame");
     CHECK(planned(plan, "behind").changes == "\"moving\" before it is evaluated again");
-    CHECK(planned(plan, "inside").changes == "its points are fed back from frame to frame");
+    CHECK(planned(plan, "inside").changes == "its points continue from frame to frame");
     CHECK(planned(plan, "moving").reached_from == NameSet{"a"});
     CHECK(planned(plan, "inside").reached_from == NameSet{"b"});
 }

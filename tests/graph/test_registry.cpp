@@ -92,7 +92,7 @@ TEST_CASE("a name can't be taken twice", "[registry]")
 TEST_CASE("an unknown node is answered with the nearest name", "[registry]")
 {
     CHECK_THROWS_WITH(Registry().at("test_pas"), "unknown node \"test_pas\"; did you mean \"test_pass\"?");
-    CHECK_THROWS_WITH(Registry().at("zzzzzzz"), "unknown node \"zzzzzzz\"; `rapid nodes` lists those that there are");
+    CHECK_THROWS_WITH(Registry().at("zzzzzzz"), "unknown node \"zzzzzzz\"; `rapid nodes` lists all nodes");
 }
 
 }  // namespace rapid

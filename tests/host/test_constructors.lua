@@ -241,22 +241,22 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.mesh.sphere { radius = 0 }"] = "radius = 0 is out of range; it must be above 0",
       ["rapid.mesh.sphere { radius = 'big' }"] = 'radius = "big" has the wrong type; it must be a number',
       ["rapid.mesh.sphere { raduis = 1 }"] = 'unknown option "raduis"; did you mean "radius"?',
-      ["rapid.mesh.sphere(2)"] = "takes a table of options, not 2",
+      ["rapid.mesh.sphere(2)"] = "needs a table of options, not 2",
       ["rapid.mesh.sphere { 2 }"] = "rapid.mesh.sphere: 2 has no name; write { NAME = value, ... }",
       ["rapid.mesh.box { size = 2 }"] = "size = 2 has the wrong type; it must be a vec3 or {x, y, z}",
       ["rapid.mesh.box { size = {1, -1, 1} }"] = "size = {1, -1, 1}: each edge must be above 0",
-      ["rapid.mesh.grid { size = {1, 2, 3} }"] = "size is two lengths above 0, {x, z}",
+      ["rapid.mesh.grid { size = {1, 2, 3} }"] = "size must be two lengths above 0, {x, z}",
       ["rapid.mesh.torus { divisions = 3.5 }"] = "rapid.mesh.torus: divisions = 3.5 is not whole; " ..
         "it must be an integer",
       ["rapid.mesh.torus { radius = 1, tube = 2 }"] = "tube of a mesh torus = 2 is out of range; it must be below " ..
         "its radius, 1",
       ["rapid.mesh.from {}"] = "rapid.mesh.from: points is missing: positions {{x, y, z}, ...}",
       ["rapid.mesh.from { points = {{0, 0, 0}}, faces = {{1, 2, 3}} }"] = "rapid.mesh.from: face 1 has the corner " ..
-        "2; corners are whole, from 1 to 1",
+        "2; a corner must be a whole number from 1 to 1",
       ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { h = {1} } }"] =
         "values: h has 1 values; it must be a list of 3 values, one for each of `points`",
       ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { id = {} } }"] =
-        "values: id is no attribute of vertices",
+        "values: newborn points can't have an attribute id",
       ["rapid.mesh.read()"] = "rapid.mesh.read: the path is missing",
       ["rapid.mesh.read 'none.obj'"] = 'rapid.mesh.read: there is no mesh file "none.obj"',
       ["rapid.mesh.read(5)"] = "path = 5 has the wrong type; it must be a string",
@@ -268,33 +268,33 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.levelset.from_mesh(rapid.mesh.box {}, { voxel = -1 })"] = "voxel = -1 is out of range; it must be " ..
         "at least 2e-05",
       ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e15, 0} })"] = 'mesh "box" reaches 1e+15 m from the ' ..
-        "origin, more than 2^31 voxels of 0.1 m; put it nearer, and move what is made of it",
+        "origin, more than 2^31 voxels of 0.1 m; move it nearer to the origin, and move the level set back",
       ["rapid.levelset.from_mesh(rapid.mesh.box { center = {0, 1e8, 0} })"] = 'mesh "box" is flat: its size is 1 x ' ..
         "0 x 1 m; a level set needs an inside",
-      ["rapid.levelset.sphere { radius = 1, voxel = 2e-5 }"] = "a voxel of at least 0.000198 m stays below that",
+      ["rapid.levelset.sphere { radius = 1, voxel = 2e-5 }"] = "use a voxel of at least 0.000198 m",
       ["rapid.levelset.sphere { radius = 1, voxel = 10 }"] = "use a voxel of at most 1 m",
       ["rapid.levelset.read 'none.vdb'"] = 'there is no file "none.vdb"',
-      ["rapid.shape.plane { normal = {0, 0, 0} }"] = "normal of a plane = {0, 0, 0} has no direction; any length " ..
-        "but zero is right",
+      ["rapid.shape.plane { normal = {0, 0, 0} }"] = "normal of a plane = {0, 0, 0} has no direction; its length " ..
+        "must be above 0",
       ["rapid.shape.sphere { radius = -1 }"] = "radius = -1 is out of range; it must be above 0",
       ["rapid.shape.box { size = {0, 1, 1} }"] = "size = {0, 1, 1}: each edge must be above 0",
       ["rapid.points.from {}"] = "P is missing; give P = {{x, y, z}, ...}",
-      ["rapid.points.from()"] = "rapid.points.from takes a table of columns: { P = {{x, y, z}, ...} }",
-      ["rapid.points.from { P = {{0, 0, 0}}, heat = {1, 2} }"] = "heat has 2 values; it must be a list of 1 values, " ..
-        "as P is",
-      ["rapid.points.from { P = {{0, 0, 0}}, id = {4} }"] = "id can't be given; ids count from 0 in order",
+      ["rapid.points.from()"] = "rapid.points.from needs a table of columns: { P = {{x, y, z}, ...} }",
+      ["rapid.points.from { P = {{0, 0, 0}}, heat = {1, 2} }"] = "heat has 2 values; it must be a list of 1 " ..
+        "values, like P",
+      ["rapid.points.from { P = {{0, 0, 0}}, id = {4} }"] = "id can't be given; ids count from 0",
       ["rapid.points.from { P = {{0, 0}} }"] = "P = {0, 0} has the wrong type; it must be a list of {x, y, z}",
       ["rapid.points.from { P = {{0, 0, 0}, {1, 1, 1}}, a = {1, {1, 2, 3}} }"] = "a[2] is {1, 2, 3}; " ..
-        "it must be a float, as the first is",
+        "it must be a float, like the first",
       ["rapid.points.grid { size = {2, 1, -1} }"] = "size = {2, 1, -1}: each edge must be at least 0",
       ["rapid.points.grid { spacing = 0 }"] = "spacing = 0 is out of range; it must be above 0",
-      ["rapid.points.grid { spacing = 1e-6 }"] = "at most 2^31 can be",
+      ["rapid.points.grid { spacing = 1e-6 }"] = "at most 2^31 are possible",
       ["rapid.points.read 'none.vdb'"] = "rapid.points.read: none.vdb: can't be read: No such file or directory",
       ["rapid.fog.read 'none.vdb'"] = "rapid.fog.read: there is no file",
       ["rapid.levelset.sphere { radius = 1, voxel = 0.2 }:write 'ball.vdb' rapid.fog.read 'ball.vdb'"] =
         "there is no fog of floats",
-      ["rapid.translate(1, 2)"] = "rapid.translate takes three numbers, rapid.translate(x, y, z); one is nil",
-      ["rapid.rotate({0, 0, 0}, 90)"] = "rapid.rotate: the axis has length 0; it needs a direction",
+      ["rapid.translate(1, 2)"] = "rapid.translate needs three numbers, rapid.translate(x, y, z); one is nil",
+      ["rapid.rotate({0, 0, 0}, 90)"] = "rapid.rotate: the axis has length 0; give it a direction",
       ["rapid.rotate({0, 1, 0})"] = "rapid.rotate: the degrees is missing",
       ["rapid.scale(0)"] = "rapid.scale: factor = 0 is out of range; it must be above 0",
       ["rapid.scale()"] = "rapid.scale: the factor is missing",

@@ -207,7 +207,7 @@ return rapid.create { points = two } :detail("d", function(points) %s end)
     end
     assert.equal('scene.lua:2: node "k": no detail value "totl"; there are lo, total (point id 0, frame 2)',
       message("points.detail.total = 1 points.detail.lo = 2", "local _ = frame.detail.totl"))
-    assert.equal('scene.lua:2: node "k": no detail value "n"; a :detail node sets one: points.detail.n = 0 ' ..
+    assert.equal('scene.lua:2: node "k": no detail value "n"; set it in a :detail: points.detail.n = 0 ' ..
       "(point id 0, frame 2)", message("", "local _ = frame.detail.n"))
     assert.equal('scene.lua:1: node "d": points.detail.x = nan; a detail value is a finite number or a vec3 (frame 2)',
       (message("points.detail.x = 0/0"):gsub("-nan", "nan")))
@@ -225,10 +225,10 @@ describe("an error in a detail function", function()
       ["points:max 'colour'"] = 'no attribute "colour"; the colour of points is Cd',
       ["points[1].heat = vec3(0, 0, 0)"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
       ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float is finite, within 3.4e38 either way",
-      ["points[1].id = 3"] = "id is read only",
-      ["points:add { id = 3 }"] = "id is read only",
+      ["points[1].id = 3"] = "id is read-only",
+      ["points:add { id = 3 }"] = "id is read-only",
       ["points:add { dt = 0.1 }"] =
-        "points:add: dt = 0.1; it is the time that the point moves in this frame, from 0 to 0.0416666667 s",
+        "points:add: dt = 0.1; it must be from 0 to 0.0416666667 s",
       ["points:add { group = 'cold' }"] = "points:add: no node makes a group \"cold\"",
       ["points:add { heta = 3 }"] =
         'no attribute "heta"; did you mean "heat"? (or add :attribute{ heta = 0 } before it)',
@@ -238,7 +238,7 @@ describe("an error in a detail function", function()
         "mean, min, neighbours, sort and sum",
       ["points:sort(function(p) return p.P end)"] =
         "points:sort: the key of point 1 is vec3(0, 0, 0); it must be a number",
-      ["error {}"] = "error raised with a table instead of a message",
+      ["error {}"] = "the script raised an error with a table instead of a message",
     } do
       local ok, message = pcall(run, body)
       assert.falsy(ok, body)
@@ -248,8 +248,8 @@ describe("an error in a detail function", function()
   end)
 
   it("that is a store into what other functions share is found before the first frame", function()
-    assert.match('node "d": the kernel assigns the global "n"; a frame depends on the points that enter it, and ' ..
-      "nothing else: keep it in a detail value, points.detail.NAME = value", select(2, pcall(run, "n = #points")))
+    assert.match('node "d": the kernel assigns the global "n"; a frame may depend only on the points that enter it: ' ..
+      "store the value in a detail value, points.detail.NAME = value", select(2, pcall(run, "n = #points")))
   end)
 end)
 
@@ -329,7 +329,7 @@ return rapid.create { fps = 24, points = rapid.points.from {
   end)
 
   it("need a Solve", function()
-    assert.matches("points.events is kept where a :solve ends the chain", scene.error [[
+    assert.matches("points.events needs a :solve at the end of the chain", scene.error [[
 return rapid.create { points = two } :detail("d", function(points) return #points.events.hits end)]], 1, true)
   end)
 end)

@@ -64,20 +64,20 @@ local firm = {
   ["a metatable for rapid"] = { "setmetatable(rapid, {})", "cannot change a protected metatable" },
   ["the metatable of vec3"] = { "getmetatable(vec3(0, 0, 0)).__add = print", "attempt to index a nil value" },
   ["the metatable of points"] = { "getmetatable(two).__gc = print", "attempt to index a nil value" },
-  ["a metatable for a function"] = { "setmetatable(print, {})", "setmetatable takes a table" },
+  ["a metatable for a function"] = { "setmetatable(print, {})", "setmetatable needs a table" },
   ["what lies behind a vec3"] = { "local v = vec3(1, 2, 3) print(v[3])", 'a vec3 has no "3"' },
   ["writing behind a vec3"] = { "local v = vec3(1, 2, 3) v[3] = 4", 'a vec3 has no "3"' },
   ["a pointer by arithmetic"] = { "local v = vec3(1, 2, 3) + 8", "can't compute vec3(1, 2, 3) + 8" },
   ["a type by a value"] = { "local v = vec3(1, 2, 3) v 'int*'", "a vec3 is not a function" },
   ["memory by a number of 64 bits"] = { "print((0x7fff0000LL)[0])", "cannot be indexed" },
   ["addresses by tostring"] = { "error(tostring(print) .. tostring {}, 0)", "functiontable" },
-  ["addresses by format"] = { "print(('%p'):format(print))", "%p is not there" },
+  ["addresses by format"] = { "print(('%p'):format(print))", "%p is not available" },
   ["addresses by concatenation"] = { "print(vec3(0, 0, 0) .. {})", "attempt to concatenate a table" },
   ["addresses by a message"] = { "print(vec3(0, 0, 0)[{}])", 'a vec3 has no "a table"' },
   ["addresses by the message of rapid"] = { "print(rapid[print])", 'rapid has no "a function"' },
   ["an error object that does something"] = {
     "error(setmetatable({}, { __tostring = function() return 'seen' end }))",
-    "error raised with a table instead of a message" },
+    "the script raised an error with a table instead of a message" },
   ["depth without end"] = { "local function f() return 1 + f() end f()", "stack overflow" },
   ["depth without end in C"] = { "local function f() return (('x'):gsub('x', f)) end f()", "overflow" },
   ["depth without end in coroutines"] = { "local function f() coroutine.wrap(f)() end f()", "overflow" },
@@ -90,13 +90,13 @@ local loading = {
   ["a library as a module"] = { "require 'ffi'", 'no module "ffi"' },
   ["inner modules of the compiler"] = { "require 'jit.util'", 'no module "jit.util"' },
   ["modules of Rapid"] = { "require 'sandbox'", 'no module "sandbox"' },
-  ["a folder above"] = { "require '../scene'", "a module's name is made of letters" },
-  ["a file anywhere"] = { "require '/etc/passwd'", "a module's name is made of letters" },
-  ["bytecode by load"] = { ("assert(load(%s))()"):format(bytecode), "bytecode is not loaded" },
-  ["bytecode by loadstring"] = { ("assert(loadstring(%s))()"):format(bytecode), "bytecode is not loaded" },
+  ["a folder above"] = { "require '../scene'", "the name of a module must consist of letters" },
+  ["a file anywhere"] = { "require '/etc/passwd'", "the name of a module must consist of letters" },
+  ["bytecode by load"] = { ("assert(load(%s))()"):format(bytecode), "bytecode can't be loaded" },
+  ["bytecode by loadstring"] = { ("assert(loadstring(%s))()"):format(bytecode), "bytecode can't be loaded" },
   ["bytecode behind a comment"] = { ("assert(load('#\\n' .. %s))()"):format(bytecode), "bytecode" },
   ["bytecode by a reader"] = {
-    ("assert(load(function() return %s end))()"):format(bytecode), "load takes a text, not a function" },
+    ("assert(load(function() return %s end))()"):format(bytecode), "load needs a string, not a function" },
 }
 
 local function each(attempts, f)
@@ -191,24 +191,24 @@ describe("a way out", function()
     for _, file in ipairs { "coded.lua", "escapee.lua" } do
       scene.folder:write(file, string.dump(function() return 1 end))
     end
-    assert.match("bytecode is not loaded", scene.error "local coded = require 'coded'")
-    assert.match("bytecode is not loaded", scene.error "return rapid.create {} :escapee {}")
+    assert.match("bytecode can't be loaded", scene.error "local coded = require 'coded'")
+    assert.match("bytecode can't be loaded", scene.error "return rapid.create {} :escapee {}")
     scene.folder:write("coded_scene.lua", string.dump(function() return 1 end))
     local ok, message = pcall(require("rapid").run, scene.folder:file "coded_scene.lua", { frames = {1, 1} })
     assert.falsy(ok)
-    assert.match("bytecode is not loaded", message)
+    assert.match("bytecode can't be loaded", message)
     nothing_is_left()
   end)
 
   it("by making things in a kernel is an error", function()
     for code, expected in pairs {
-      ["rapid.create {}"] = ":create is called while a frame runs; the graph's body makes the nodes",
-      ["rapid.mesh.box {}"] = "a kernel can't call rapid.mesh.box; make it outside, once",
-      ["rapid.translate(1, 2, 3)"] = "a kernel can't call rapid.translate; make it outside, once",
-      ["rapid.param('x', 1)"] = "a kernel can't call rapid.param; call it outside, once",
-      ["rapid.node { name = 'x' }"] = "rapid.node is called while a frame runs; a node's file defines it",
-      ["load 'escaped = 1' ()"] = "a kernel can't call load; what it makes can't be checked there",
-      ["require 'helper'"] = "a kernel can't call require; let the graph's body do it first",
+      ["rapid.create {}"] = ":create is called while a frame runs; make nodes in the graph's body",
+      ["rapid.mesh.box {}"] = "a kernel can't call rapid.mesh.box; make it once outside",
+      ["rapid.translate(1, 2, 3)"] = "a kernel can't call rapid.translate; make it once outside",
+      ["rapid.param('x', 1)"] = "a kernel can't call rapid.param; call it once outside",
+      ["rapid.node { name = 'x' }"] = "rapid.node is called while a frame runs; call it in the file of the node",
+      ["load 'escaped = 1' ()"] = "a kernel can't call load; its result can't be checked there",
+      ["require 'helper'"] = "a kernel can't call require; call it first in the graph's body",
     } do
       assert.equal(expected, (refused(places.kernel:format(code))))
     end
@@ -255,7 +255,7 @@ return rapid.create { points = two } :attribute { heat = 0 } %s
       ["points  "] = "kept:sort 'heat'", ["points   "] = "print(kept:sum 'heat')",
       ["points    "] = "kept:neighbours(1, 1)",
     } do
-      assert.equal("points can't be used outside the :detail function that they were given to",
+      assert.equal("points can't be used outside the :detail function that received them",
         message_of(detail:format(what), use), what .. use)
     end
   end)
@@ -266,7 +266,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 1, 1}, spacing = 0
   :detail("a", function(points) local box = { keeper } box[1](points) points[300].heat = 1 end)
   :delete { where = function(p) return p.id > 1 end }
   :detail("b", function() local box = { keeper } box[1]()[300].heat = 1 end) :solve {}]], { frames = {1, 2} })
-    assert.match("points can't be used outside the :detail function that they were given to", message)
+    assert.match("points can't be used outside the :detail function that received them", message)
   end)
 end)
 
@@ -274,15 +274,15 @@ describe("methods", function()
   it("of points take no forged point, nor a forged set", function()
     for code, expected in pairs {
       ["points[1].join({ rapid_place = 1e8, rapid_serial = 1 }, 'g')"] =
-        "p:join is called on a point: with a colon, not a dot",
-      ["points[1].leave(vec3(1, 2, 3), 'g')"] = "p:leave is called on a point: with a colon, not a dot",
-      ["points[1].within({ rapid_place = -1e8 }, 'P')"] = "p:within is called on a point: with a colon, not a dot",
-      ["points[1].rand({ rapid_place = 1e8 }, 1)"] = "p:rand is called on a point: with a colon, not a dot",
-      ["points[1].kill {}"] = "p:kill is called on a point: with a colon, not a dot",
-      ["points.sum({}, 'P')"] = "points:sum is called on the points: with a colon, not a dot",
-      ["points.neighbours(points[1], 1, 1)"] = "points:neighbours is called on the points: with a colon, not a dot",
-      ["points[1].rapid_place = 1e8"] = "neither a component nor the frame can be assigned",
-      ["points.rapid_serial = 7"] = "neither a component nor the frame can be assigned",
+        "p:join must be called with a colon, not a dot",
+      ["points[1].leave(vec3(1, 2, 3), 'g')"] = "p:leave must be called with a colon, not a dot",
+      ["points[1].within({ rapid_place = -1e8 }, 'P')"] = "p:within must be called with a colon, not a dot",
+      ["points[1].rand({ rapid_place = 1e8 }, 1)"] = "p:rand must be called with a colon, not a dot",
+      ["points[1].kill {}"] = "p:kill must be called with a colon, not a dot",
+      ["points.sum({}, 'P')"] = "points:sum must be called with a colon, not a dot",
+      ["points.neighbours(points[1], 1, 1)"] = "points:neighbours must be called with a colon, not a dot",
+      ["points[1].rapid_place = 1e8"] = "a component of a vector or a field of the frame can't be assigned",
+      ["points.rapid_serial = 7"] = "a component of a vector or a field of the frame can't be assigned",
       ["points[1e9].P = vec3(0, 0, 0)"] = "points: there is no point 1000000000; the set has 1 to 2",
       ["points[1.5].P = vec3(0, 0, 0)"] = "points: there is no point 1.5; the set has 1 to 2",
       ["points[0/0].P = vec3(0, 0, 0)"] = "there is no point",
@@ -294,10 +294,10 @@ describe("methods", function()
 
   it("of shapes take no forged shape", function()
     for code, expected in pairs {
-      ["ball.distance({}, p.P)"] = "shape:distance(P) is asked of a shape: with a colon, not a dot",
-      ["ball.distance(p, p.P)"] = "shape:distance(P) is asked of a shape: with a colon, not a dot",
-      ["ball.gradient(two, p.P)"] = "shape:gradient(P) is asked of a shape: with a colon, not a dot",
-      ["ball:distance(1)"] = "shape:distance(P) takes a vec3, not 1",
+      ["ball.distance({}, p.P)"] = "shape:distance(P) must be called with a colon, not a dot",
+      ["ball.distance(p, p.P)"] = "shape:distance(P) must be called with a colon, not a dot",
+      ["ball.gradient(two, p.P)"] = "shape:gradient(P) must be called with a colon, not a dot",
+      ["ball:distance(1)"] = "shape:distance(P) needs a vec3, not 1",
     } do
       local text = "local ball = rapid.shape.sphere {} " .. places.kernel:format("local _ = " .. code)
       assert.equal(expected, (refused(text)))
@@ -357,7 +357,7 @@ describe("a bomb", function()
       local result = scene.command("run", text:format(loops[where] or "while true do end"),
         "-f 1-3 --script-timeout 0.2")
       assert.equal(1, result.status)
-      assert.equal(names[where] .. ": the script runs for more than 0.2 s; --script-timeout sets the limit\n",
+      assert.equal(names[where] .. ": the script ran for more than 0.2 s; --script-timeout sets the limit\n",
         result.stderr)
     end
   end)

@@ -25,10 +25,10 @@ return { left = chain:delete { where = function(p) return p.id == 1 end },
       ["return {}"] = "scene.lua: the graph returns no output; end the file with `return` and a node",
       ["return 3"] = "scene.lua: the graph returns 3; it must return a node, or a table of nodes by name",
       ["return two"] = "scene.lua: the graph returns points; it must return a node, or a table of nodes by name",
-      ["return { rapid.create {} }"] = "scene.lua: the graph returns a table that holds more than nodes by name; " ..
-        "return { main = node, ... }",
-      ["return { main = 3 }"] = "scene.lua: the graph returns a table that holds more than nodes by name; " ..
-        "return { main = node, ... }",
+      ["return { rapid.create {} }"] = "scene.lua: the graph returns a table that contains other things than nodes " ..
+        "by name; return { main = node, ... }",
+      ["return { main = 3 }"] = "scene.lua: the graph returns a table that contains other things than nodes by " ..
+        "name; return { main = node, ... }",
       ["return rapid.create"] = "scene.lua: the graph returns a function; it must return a node, or a table of " ..
         "nodes by name",
     } do
@@ -54,8 +54,8 @@ return { a = start, b = start:points("more", function(p) p.P = p.P + vec3(0, 10,
     for text, expected in pairs {
       ["\n\nerror 'no wind'"] = "scene.lua:3: no wind",
       ["\nerror('no wind', 0)"] = "scene.lua:2: no wind",
-      ["\nerror {}"] = "scene.lua:2: error raised with a table instead of a message",
-      ["error()"] = "scene.lua:1: error raised without a message",
+      ["\nerror {}"] = "scene.lua:2: the script raised an error with a table instead of a message",
+      ["error()"] = "scene.lua:1: the script raised an error without a message",
       ["error(42)"] = "scene.lua:1: 42",
       ["\nlocal x = nil + 1"] = "scene.lua:2: attempt to perform arithmetic on a nil value",
       ["\nwnid.push()"] = "scene.lua:2: attempt to index global 'wnid' (a nil value)",
@@ -70,7 +70,7 @@ return { a = start, b = start:points("more", function(p) p.P = p.P + vec3(0, 10,
 
   it("says that a function calls itself without end, with a line where the language has one left to tell", function()
     assert.truthy(scene.error("local function f() return f() + 1 end\nf()"):match(
-      "^scene%.lua:?%d*: stack overflow: a function calls itself without end"))
+      "^scene%.lua:?%d*: stack overflow: a function calls itself endlessly"))
   end)
 
   it("names the line of the last call too, which leaves no frame behind", function()
@@ -92,7 +92,8 @@ describe("a node", function()
   end)
 
   it("shares its name with no other", function()
-    assert.equal('scene.lua:3: node "wind": the name is taken by the node at line 2; give each its own', scene.error [[
+    assert.equal('scene.lua:3: node "wind": the node at line 2 has the same name; give each node a different name',
+      scene.error [[
 return rapid.create { points = two }
   :wind { name = "wind" }
   :wind { name = "wind" } :solve {}]])
@@ -126,24 +127,23 @@ return %s]]
 
   it("takes a table of named parameters alone", function()
     for text, expected in pairs {
-      ["rapid.create {} :gravity(5)"] = ":gravity takes a table of parameters: :gravity{ ... }",
-      ["rapid.create(24)"] = ":create takes a table of parameters: :create{ ... }",
+      ["rapid.create {} :gravity(5)"] = ":gravity needs a table of parameters: :gravity{ ... }",
+      ["rapid.create(24)"] = ":create needs a table of parameters: :create{ ... }",
       ["rapid.create {} :gravity { 0, -9.81, 0 }"] = 'node "gravity1": 0 has no name; write ' ..
         "{ NAME = value, ... }",
       ["rapid.create {} :gravity { { 0, 1, 0 } }"] = 'node "gravity1": {0, 1, 0} has no name; ' ..
         "write { NAME = value, ... }",
-      ["rapid.create {} :gravity({}, {})"] = ":gravity takes one table of parameters",
-      ["rapid.create {} :points('k')"] = ":points takes a name and a function, or a table { name = ..., kernel = ... }",
-      ["rapid.create {} :points(function() end)"] = ":points takes a name and a function, or a table " ..
-        "{ name = ..., kernel = ... }",
+      ["rapid.create {} :gravity({}, {})"] = ":gravity needs one table of parameters",
+      ["rapid.create {} :points('k')"] = ":points needs a name and a function, or a table { name = ..., kernel = ... }",
+      ["rapid.create {} :points(function() end)"] = ":points needs a name and a function, or a table { name = ..., " ..
+        "kernel = ... }",
       ["rapid.create {} :points { name = 'k' }"] =
         'node "k": kernel is missing: function of a point, function(p, frame)',
       ["rapid.create {} :points { name = 'k', kernel = 3 }"] = 'node "k": kernel = 3 has the wrong type; ' ..
         "it must be a function of a point",
-      ["rapid.create {} :merge()"] = ":merge takes another node: a:merge(b)",
-      ["rapid.create {} :merge(3)"] = 'node "merge1": input 2 is 3; it must be a node: call it as ' ..
-        "node:merge{ ... }",
-      ["rapid.create {} .gravity {}"] = 'node "gravity1": input 1 is {}; it must be a node: call it as ' ..
+      ["rapid.create {} :merge()"] = ":merge needs another node: a:merge(b)",
+      ["rapid.create {} :merge(3)"] = 'node "merge1": input 2 is 3; it must be a node: write node:merge{ ... }',
+      ["rapid.create {} .gravity {}"] = 'node "gravity1": input 1 is {}; it must be a node: write ' ..
         "node:gravity{ ... }",
       ["rapid.create { fps = '24' }"] = 'node "create1": fps = "24" has the wrong type; it must be a number',
       ["rapid.create { fps = 0 }"] = 'node "create1": fps = 0 is out of range; it must be above 0',
@@ -185,7 +185,7 @@ return rapid.create { points = points, fps = 100 } :gravity { g = {0, -20, 0} }
       scene.error [[
 local shape = rapid.shape.plane {}
 return rapid.create { points = two } :collide { shape = shape, bounce = rapid.attr "wobble" } :solve {}]])
-    assert.equal('scene.lua:1: rapid.attr takes the name of an attribute: rapid.attr "bounce"',
+    assert.equal('scene.lua:1: rapid.attr needs the name of an attribute: rapid.attr "bounce"',
       scene.error "return rapid.create { fps = rapid.attr(3) }")
     assert.truthy(scene.error([[return rapid.create { fps = rapid.attr "heat" }]])
       :find('node "create1": fps = rapid.attr "heat" has the wrong type', 1, true))
@@ -218,7 +218,8 @@ return rapid.create {} :emit { source = two, count = function(frame) return fram
       ["return -1"] = 'scene.lua:1: node "emit1": count = -1 is out of range; it must be at least 0',
       ["return nil + 1"] = 'scene.lua:3: node "emit1": attempt to perform arithmetic on a nil value',
       ["error 'no more'"] = 'scene.lua:3: node "emit1": no more',
-      ["return function() end"] = 'scene.lua:1: node "emit1": count is a function that returned a function',
+      ["return function() end"] = 'scene.lua:1: node "emit1": count is a function that returned a function; it ' ..
+        'must return a value',
     } do
       local message = scene.error(([[
 local source = { source = two, count = function(frame)
@@ -305,11 +306,11 @@ return rapid.create { points = two } :points("k", function(p, frame) p.P = p.P +
   end)
 
   it("stands in a chain once", function()
-    assert.equal('scene.lua:2: node "solve2": a second solve after "create1": "solve1" at line 1 feeds it back ' ..
-      "already; a create has one solve",
+    assert.equal('scene.lua:2: node "solve2": a second solve after "create1": "solve1" at line 1 is already its ' ..
+      "solve; a create can have only one",
       scene.error "local once = rapid.create { points = two } :solve {}\nreturn once:solve {}")
-    assert.equal('scene.lua:2: node "right": a second solve after "create1": "left" at line 2 feeds it back ' ..
-      "already; a create has one solve", scene.error [[
+    assert.equal('scene.lua:2: node "right": a second solve after "create1": "left" at line 2 is already its ' ..
+      "solve; a create can have only one", scene.error [[
 local start = rapid.create {}
 return { a = start:solve { name = 'left' }, b = start:solve { name = 'right' } }]])
   end)

@@ -1,8 +1,8 @@
 -- Kernels that keep state from point to point and hide it from the bytecode analysis.
 local scene = require "testing.scene"
 
-local of_a_point = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or do " ..
-  "it once for the whole set in :detail"
+local of_a_point = "; kernels run in parallel, in several Lua states: store the value in an attribute of the " ..
+  "point, or compute it once for all points in a :detail"
 
 -- S: a table shared by all points; push, keeper: a shared function and a shared coroutine; wrap: a table of S and push.
 local before = "local S = { n = 0, list = {} } local function push(t, x) t[#t + 1] = x end " ..
@@ -60,8 +60,8 @@ describe("a kernel with hidden state", function()
       count = count + 1
       for _, threads in ipairs { 1, 3 } do
         local message = scene.error(scene.kernel_text(body, nil, before), { frames = {2, 2}, threads = threads })
-        local reported = message:match
-          '^scene%.lua:1: node "kernel": the kernel changes what all points share %((.-)%); '
+        local reported = message:match('^scene%.lua:1: node "kernel": the kernel changes a value that all points ' ..
+          "share %((.-)%); ")
         assert.truthy(reported, body .. ": " .. message)
         if name then assert.equal(name, reported, body) end
       end
@@ -77,7 +77,7 @@ describe("a kernel with hidden state", function()
     } do
       local message = scene.error(before .. "return rapid.create { points = two } " .. chain:format(change) ..
         " :solve {}", { frames = {1, 3} })
-      assert.match("the kernel changes what all points share %(n%); ", message)
+      assert.match("the kernel changes a value that all points share %(n%); ", message)
     end
   end)
 

@@ -168,10 +168,10 @@ return rapid.create { points = two } :attribute { seen = 0 }
   end)
 
   it("refuse a computed name", function()
-    assert.equal('scene.lua:2: node "kernel": the kernel joins or leaves a group under a computed name; ' ..
-      'name it as a constant: p:join "old"', scene.kernel_error [[p:join("g" .. p.id)]])
-    assert.equal('scene.lua:1: node "kernel": can\'t join the group "g0"; a kernel names the groups that it joins ' ..
-      'and leaves as constants: p:join "old" (point id 0, frame 2)',
+    assert.equal('scene.lua:2: node "kernel": the kernel joins or leaves a group with a computed name; write the ' ..
+      'name as a constant: p:join "old"', scene.kernel_error [[p:join("g" .. p.id)]])
+    assert.equal('scene.lua:1: node "kernel": can\'t join the group "g0"; write the name as a constant: p:join ' ..
+      '"old" (point id 0, frame 2)',
       scene.kernel_error("enter(p, 'g' .. p.id)", nil, "local function enter(x, name) x:join(name) end"))
   end)
 end)
@@ -204,9 +204,9 @@ describe("a kernel that asks for something unknown", function()
         "add :attribute{ wobble = 0 } before it",
       ["p.v = p.v * p.pscal"] = 'scene.lua:2: node "kernel": no attribute "pscal"; did you mean "pscale"? ' ..
         "(or add :attribute{ pscal = 0 } before it)",
-      ["p.id = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.id, which is read only',
-      ["p.dt = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.dt, which is read only',
-      ["p.index = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.index, which is read only',
+      ["p.id = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.id, which is read-only',
+      ["p.dt = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.dt, which is read-only',
+      ["p.index = 3"] = 'scene.lua:2: node "kernel": the kernel assigns p.index, which is read-only',
     } do
       local text = scene.kernel_text(body, "heat = {1, 2}")
       local result = scene.command("check", text)
@@ -216,8 +216,8 @@ describe("a kernel that asks for something unknown", function()
   end)
 
   it("is refused when it runs, where the name is computed", function()
-    assert.equal('scene.lua:2: node "kernel": no attribute "heat" here; a name that is computed is declared, ' ..
-      'reads = { "heat" }, or also named as a constant (the kernel names P, dt, id, index) (point id 0, frame 2)',
+    assert.equal('scene.lua:2: node "kernel": no attribute "heat" here; declare a computed name with reads = { ' ..
+      '"heat" }, or also write it as a constant (the kernel names P, dt, id, index) (point id 0, frame 2)',
       scene.kernel_error("local name = 'he' .. 'at' p.P = p.P * p[name]", "heat = {1, 2}"))
     assert.near({2, 0, 0}, scene.kernel("local name = 'he' .. 'at' p.v = vec3(p[name], 0, 0) local _ = p.heat",
       "heat = {1, 2}")[2].v, 0)
@@ -246,9 +246,9 @@ return rapid.create { points = two } :action { reads = { "force" }, writes = { "
   it("are checked as others are, before the first frame", function()
     assert.equal('scene.lua:2: node "mix": no attribute "rde"; did you mean "red"? (or add :attribute{ rde = 0 } ' ..
       "before it)", scene.error(chain:format("points", '{ "rde" }', '{ "blue" }')))
-    assert.equal('scene.lua:2: node "mix": writes: id is read only',
+    assert.equal('scene.lua:2: node "mix": writes: id is read-only',
       scene.error(chain:format("action", '{ "red" }', '{ "id" }')))
-    assert.match('assigns "blue" under a computed name; declare it: writes = { "blue" } %(point id 0, frame 2%)',
+    assert.match('assigns "blue" by a computed name; declare it with writes = { "blue" } %(point id 0, frame 2%)',
       scene.error(chain:format("points", '{ "red", "blue" }', "{}")))
   end)
 end)
@@ -268,9 +268,9 @@ describe("a kernel that writes what can't be kept", function()
       ["p.heat = nil"] = 'attribute "heat" takes a number, not nil',
       ["p.heat = true"] = 'attribute "heat" takes a number, not true',
       ["p.heat = p.v"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
-      ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
-      ["p.v = {1, 2, 3}"] = 'attribute "v" takes a vec3, not a table; vec3(x, y, z) makes one',
-      ["p.v = nil"] = 'attribute "v" takes a vec3, not nil',
+      ["p.v = 1"] = 'attribute "v" needs a vec3, not 1',
+      ["p.v = {1, 2, 3}"] = 'attribute "v" needs a vec3, not a table; vec3(x, y, z) makes one',
+      ["p.v = nil"] = 'attribute "v" needs a vec3, not nil',
       ["p.hitnum = 1.5"] = 'attribute "hitnum" takes a whole number, not 1.5',
       ["p.hitnum = 3e9"] = 'attribute "hitnum" takes a whole number, not 3000000000',
     } do
@@ -305,7 +305,8 @@ end)
 
 describe("a test of a point", function()
   it("can't change it", function()
-    assert.equal('scene.lua:1: node "delete1": assigns "v"; a test must not change its point (point id 0, frame 1)',
+    assert.equal('scene.lua:1: node "delete1": assigns "v"; a condition must not change its point (point id 0, ' ..
+      'frame 1)',
       scene.error "return rapid.create { points = two } :delete { where = function(p) p.v = vec3(0, 0, 0) end }")
   end)
 

@@ -65,19 +65,19 @@ return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing 
 
   it("refuses an argument that is no number, and shows it", function()
     for expression, expected in pairs {
-      ["rapid.math.clamp(nil, 0, 1)"] = "clamp(x, lo, hi) takes numbers, not nil",
+      ["rapid.math.clamp(nil, 0, 1)"] = "clamp(x, lo, hi) needs numbers, not nil",
       ["rapid.math.clamp(1, 3, 2)"] = "clamp(x, lo, hi): lo = 3 is above hi = 2",
       ["rapid.math.fit(1, 2, 2, 0, 1)"] = "fit(x, lo, hi, from, to): lo and hi are both 2; they must differ",
-      ["rapid.math.fit(1, 2)"] = "fit(x, lo, hi, from, to) takes numbers, not nil",
+      ["rapid.math.fit(1, 2)"] = "fit(x, lo, hi, from, to) needs numbers, not nil",
       ["rapid.math.smoothstep(1, 0, 1)"] = "smoothstep(lo, hi, x): lo = 1 must be below hi = 0",
-      ["rapid.math.noise(1)"] = "noise(P, time, octaves, seed) takes a vec3 P, not 1",
+      ["rapid.math.noise(1)"] = "noise(P, time, octaves, seed) needs a vec3 P, not 1",
       ["rapid.math.noise(p.P, 0, 0)"] =
         "noise(P, time, octaves, seed): octaves = 0; it must be a whole number from 1 to 16",
       ["rapid.math.curl_noise(p.P, 0, 1.5)"] =
         "curl_noise(P, time, octaves, seed): octaves = 1.5; it must be a whole number from 1 to 16",
       ["rapid.math.noise(p.P, 0, 1, -1)"] =
         "noise(P, time, octaves, seed): seed = -1; it must be a whole number from 0 to 4294967295",
-      ["rapid.math.noise(p.P, 'now')"] = "noise(P, time, octaves, seed) takes numbers, not a string",
+      ["rapid.math.noise(p.P, 'now')"] = "noise(P, time, octaves, seed) needs numbers, not a string",
       ["rapid.math.clmap(1, 2, 3)"] = 'rapid.math has no "clmap"; did you mean "clamp"?',
     } do
       assert.equal(expected, fault(expression))

@@ -87,11 +87,11 @@ return rapid.create {}
 
   it("by keys takes constants alone", function()
     assert.truthy(error_of("rapid.mesh.box {}:transform { [1] = rapid.scale(1), [9] = 'up' }"):find(
-      'motion[9] = "up" is no place to be at a frame; keys are constant motions', 1, true))
+      'motion[9] = "up" can\'t be a key; keys must be constant motions', 1, true))
     local moving_key = "{ [1] = rapid.scale(1) * function() end, [2] = rapid.scale(2) }"
     assert.truthy(error_of("rapid.mesh.box {}:transform " .. moving_key)
       :find("motion[1] = a motion that varies is no place to be at a frame", 1, true))
-    assert.truthy(error_of("rapid.mesh.box {}:transform {}"):find("a motion by keys has none", 1, true))
+    assert.truthy(error_of("rapid.mesh.box {}:transform {}"):find("a motion by keys has no keys", 1, true))
   end)
 
   it("moves meshes and shapes, and nothing else", function()
@@ -123,7 +123,7 @@ describe("a mesh sequence", function()
   it("whose faces change ends the run at that frame, with both counts", function()
     local message = scene.error([[return rapid.create {}
       :emit { source = rapid.mesh.read "breaks.$F4.obj", rate = 10 } :solve {}]], { frames = {1, 8} })
-    assert.truthy(message:find("changes at frame 4: it has 3 corners and 1 faces there, and 12 corners and 4 faces at "
+    assert.truthy(message:find("changes at frame 4: it has 3 corners and 1 faces there and 12 corners and 4 faces at "
       .. "frame 1", 1, true), message)
   end)
 

@@ -296,7 +296,7 @@ return rapid.create { seed = 5, points = rapid.points.grid { size = {9999, 0, 0}
 end)
 
 describe("functions of the whole set and the body of a scene", function()
-  it("have the squares of constants, and of text given to load", function()
+  it("have the squares of constants, and of string given to load", function()
     local points = scene.run([[
 local x = 825.6962440394036 -- the C library's pow rounds its square up
 local found = { 825.6962440394036 ^ 2, x ^ 2, load("return 825.6962440394036 ^ 2")(), math.pow(x, 2) }

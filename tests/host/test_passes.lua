@@ -185,6 +185,6 @@ describe("neighbouring edits of points", function()
     check_error({
       ":group { name = 'g', where = function(p) return p.id > 20 end }",
       ":delete { group = 'g', where = function(p) p.v = p.P end }",
-    }, 'scene.lua:1: node "delete1": assigns "v"; a test must not change its point (point id 21, frame 2)')
+    }, 'scene.lua:1: node "delete1": assigns "v"; a condition must not change its point (point id 21, frame 2)')
   end)
 end)

@@ -68,16 +68,16 @@ return rapid.create { fps = 10, points = two } :attribute { orient = {0, 0, 0, 1
     local place = 'scene.lua:2: node "kernel": '
     for body, expected in pairs {
       ["p.P = quat(0, 0, 0, 1) * p.P"] =
-        "can't compute quat(0, 0, 0, 1) * vec3(0, 1, 0); both must be a quat, and a vec3 is turned by q:rotate(v)",
+        "can't compute quat(0, 0, 0, 1) * vec3(0, 1, 0); both must be a quat; to turn a vec3, use q:rotate(v)",
       ["p.P = quat(0, 0, 1)"] =
-        "quat takes four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis",
-      ["p.q = {0, 0, 0, 1}"] = 'attribute "q" takes a quat, not a table; quat(x, y, z, w) makes one',
-      ["p.q = p.P"] = 'attribute "q" takes a quat, not vec3(0, 1, 0)',
-      ["p.P = p.q:rotate(1)"] = "q:rotate(v) takes a vec3, not 1",
+        "quat needs four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis",
+      ["p.q = {0, 0, 0, 1}"] = 'attribute "q" needs a quat, not a table; quat(x, y, z, w) makes one',
+      ["p.q = p.P"] = 'attribute "q" needs a quat, not vec3(0, 1, 0)',
+      ["p.P = p.q:rotate(1)"] = "q:rotate(v) needs a vec3, not 1",
       ["p.P = p.q.axis"] = 'a quat has no "axis"; it has x, y, z, w, rotate, inverse, length, normalized and slerp',
       ["p.q = rapid.math.rotation(vec3(0, 0, 0), 3)"] =
-        "rotation(axis, degrees): vec3(0, 0, 0) is no direction; it must have a length",
-      ["p.q = rapid.math.rotation_between(p.P, 3)"] = "rotation_between(from, to) takes a vec3, not 3",
+        "rotation(axis, degrees): vec3(0, 0, 0) has no direction; its length must be above 0",
+      ["p.q = rapid.math.rotation_between(p.P, 3)"] = "rotation_between(from, to) needs a vec3, not 3",
     } do
       assert.equal(place .. expected .. " (point id 0, frame 2)",
         scene.kernel_error(body, "q = {{0, 0, 0, 1}, {0, 0, 0, 1}}"))

@@ -43,19 +43,20 @@ describe("graph code", function()
     end
     for _, name in ipairs { "/etc/passwd", "../scene", "..", "", "a/b", "x\0y", "~" } do
       local message = assert(try(("require %q"):format(name)), name)
-      assert.truthy(message:find("looked for nothing: a module's name is made of letters, digits, _ and dots", 1, true),
+      assert.truthy(message:find("looked for nothing, because the name of a module must consist of letters, " ..
+        "digits, _ and dots", 1, true),
         message)
     end
   end)
 
   it("loads text alone, and into its own environment", function()
     local code = ("%q"):format(string.dump(function() return 1 end))
-    assert.equal("bytecode is not loaded", (try(("assert(load(%s))"):format(code))))
-    assert.equal("bytecode is not loaded", (try(("assert(loadstring(%s))"):format(code))))
+    assert.equal("bytecode can't be loaded", (try(("assert(load(%s))"):format(code))))
+    assert.equal("bytecode can't be loaded", (try(("assert(loadstring(%s))"):format(code))))
     -- After a prefix that is legal at the start of a file.
     assert.truthy(try(("assert(load('#!\\n' .. %s))"):format(code)):find "bytecode")
     assert.truthy(try(("assert(load('\\239\\187\\191' .. %s))"):format(code)):find "bytecode")
-    assert.equal("load takes a text, not a function", (try "assert(load(function() return '' end))"))
+    assert.equal("load needs a string, not a function", (try "assert(load(function() return '' end))"))
     assert.is_nil((try "assert(load 'return io == nil and vec3 ~= nil and debug == nil')()"))
     assert.equal("found", text_of("load('return word')()", "word = 'found'"))
   end)
@@ -92,10 +93,10 @@ return rapid.create { points = two } :attribute { heat = 0 }
 
   it("can't put a metatable on anything but its own tables", function()
     for statement, expected in pairs {
-      ["setmetatable('', {})"] = "setmetatable takes a table",
-      ["setmetatable(two, {})"] = "setmetatable takes a table",
-      ["setmetatable(vec3(0, 0, 0), {})"] = "setmetatable takes a table",
-      ["setmetatable(print, {})"] = "setmetatable takes a table",
+      ["setmetatable('', {})"] = "setmetatable needs a table",
+      ["setmetatable(two, {})"] = "setmetatable needs a table",
+      ["setmetatable(vec3(0, 0, 0), {})"] = "setmetatable needs a table",
+      ["setmetatable(print, {})"] = "setmetatable needs a table",
     } do
       local in_body, in_kernel = try(statement)
       assert.equal(expected, in_body)
@@ -164,11 +165,11 @@ for key in pairs(t) do words[#words + 1] = key t[key] = nil t.b = nil end]]))
   end)
 
   it("does not let the order of addresses decide", function()
-    assert.equal("pairs can't order keys that are neither numbers nor strings (here: table); keep them in a list",
+    assert.equal("pairs can't order keys that are not numbers or strings (here: table); use a list",
       (try "for key in pairs { [{}] = 1, [{}] = 2 } do local _ = key end"))
     assert.is_nil((try "for key in pairs { [{}] = 1, x = 2 } do local _ = key end"))
-    assert.equal("pairs takes a table, not nil", (try "for key in pairs(nil) do local _ = key end"))
-    assert.equal("next takes a table, not a number", (try "next(1)"))
+    assert.equal("pairs needs a table, not nil", (try "for key in pairs(nil) do local _ = key end"))
+    assert.equal("next needs a table, not a number", (try "next(1)"))
     assert.equal("next was given a key that is not in the table", (try "next({}, 'x')"))
   end)
 
@@ -190,7 +191,7 @@ for key in pairs(t) do words[#words + 1] = key t[key] = nil t.b = nil end]]))
     end
     for _, flags in ipairs { "p", "-20p", "5.3p" } do
       local message = try(("local s = ('%%%s'):format({})"):format(flags))
-      assert.equal("%p is not there: addresses differ from run to run", message)
+      assert.equal("%p is not available, because addresses differ from run to run", message)
     end
     assert.equal("50%p", text_of "('%d%%p'):format(50)")
   end)
@@ -246,6 +247,6 @@ return rapid.create { points = two } :points("k", function(p) wind.fail(p) end) 
     scene.folder:write("hen.lua", "return require 'egg'")
     scene.folder:write("egg.lua", "return require 'hen'")
     local message = scene.error "require 'hen'"
-    assert.equal('egg.lua:1: module "hen" requires itself, by way of those that it requires', message)
+    assert.equal('egg.lua:1: module "hen" requires itself through other modules', message)
   end)
 end)

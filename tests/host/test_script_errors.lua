@@ -8,19 +8,19 @@ describe("an error in a kernel", function()
     for body, expected in pairs {
       ["error 'too hot'"] = "too hot",
       ["error('too hot', 0)"] = "too hot",
-      ["error({})"] = "error raised with a table instead of a message",
-      ["error(print)"] = "error raised with a function instead of a message",
-      ["error(vec3(0, 0, 0))"] = "error raised with a cdata instead of a message",
-      ["error()"] = "error raised without a message",
-      ["error(true)"] = "error raised with a boolean instead of a message",
+      ["error({})"] = "the script raised an error with a table instead of a message",
+      ["error(print)"] = "the script raised an error with a function instead of a message",
+      ["error(vec3(0, 0, 0))"] = "the script raised an error with a cdata instead of a message",
+      ["error()"] = "the script raised an error without a message",
+      ["error(true)"] = "the script raised an error with a boolean instead of a message",
       ["assert(p.v.x > 1, 'too slow')"] = "too slow",
       ["local t = nil; t.x = 1"] = "attempt to index local 't' (a nil value)",
       ["local x = p.v.x .. {}"] = "attempt to concatenate a table value",
       ["local x = ('x'):rep(3) + 1"] = "attempt to perform arithmetic on a string value",
       ["wnid(p)"] = "attempt to call global 'wnid' (a nil value)",
       ["local x = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time, dt and detail',
-      ["local x = p:rand()"] = "p:rand takes a number, which of the point's random numbers, not nil",
-      ["local x = p:rand(1, 'frame')"] = 'p:rand takes the frame, or a number, behind the comma, not "frame"',
+      ["local x = p:rand()"] = "p:rand needs the index of the random number, not nil",
+      ["local x = p:rand(1, 'frame')"] = 'p:rand needs the frame or a number as the second argument, not "frame"',
     } do
       assert.equal('scene.lua:2: node "kernel": ' .. expected .. at, scene.kernel_error(body), body)
     end
@@ -53,7 +53,7 @@ end) :solve {}]])
     local text = scene.kernel_text("deeper(p)", nil, "local function deeper(x) return 1 + deeper(x) end")
     local result = scene.command("run", text, "-f 1-3")
     assert.equal(1, result.status)
-    assert.equal('scene.lua:1: node "kernel": stack overflow: a function calls itself without end' .. at .. "\n",
+    assert.equal('scene.lua:1: node "kernel": stack overflow: a function calls itself endlessly' .. at .. "\n",
       result.stderr)
   end)
 
@@ -95,15 +95,15 @@ describe("a script that does not end", function()
     } do
       local result = scene.command("run", text, "-f 1-3 --script-timeout 0.2")
       assert.equal(1, result.status)
-      assert.equal(place:gsub(" $", "") .. ": the script runs for more than 0.2 s; --script-timeout sets the limit\n",
+      assert.equal(place:gsub(" $", "") .. ": the script ran for more than 0.2 s; --script-timeout sets the limit\n",
         result.stderr)
     end
   end)
 end)
 
 describe("a kernel that keeps something for other points", function()
-  local keep = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or do it " ..
-    "once for the whole set in :detail"
+  local keep = "; kernels run in parallel, in several Lua states: store the value in an attribute of the point, or " ..
+    "compute it once for all points in a :detail"
   local field = 'assigns the field "%s" of a table that all points share'
 
   it("is refused before the first frame, with the line of the assignment", function()
@@ -147,11 +147,11 @@ describe("a kernel that keeps something for other points", function()
       ["local function set(t) t.n = 1 end set(box)"] = { "local box = {}", field:format "n" },
       ["table.move({ 1 }, 1, 1, 1, box)"] = { "local box = {}", "changes a table that all points share by table.move" },
       ["p.n = later()"] = { "local later = coroutine.wrap(function() end)",
-                            "resumes a coroutine, or an iterator, that was made outside of it" },
+                            "resumes a coroutine or an iterator that was made outside it" },
       ["p.n = coroutine.resume(thread)"] = { "local thread = coroutine.create(function() end)",
-                                             "resumes a coroutine, or an iterator, that was made outside of it" },
+                                             "resumes a coroutine or an iterator that was made outside it" },
       ["local word = words()"] = { "local words = ('a b'):gmatch '%a'",
-                                   "resumes a coroutine, or an iterator, that was made outside of it" },
+                                   "resumes a coroutine or an iterator that was made outside it" },
     } do
       local before, what = case[1], case[2]
       local line = before:find "bump" and 1 or 2

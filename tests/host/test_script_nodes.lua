@@ -60,7 +60,7 @@ return rapid.create { points = two } :group { name = "right", where = function(p
       ["{ strength = function() return 11 end }"] = 'node "push1": strength = 11 is out of range; it must be from 0 ' ..
         "to 10 (frame 1)",
       ["{ group = 'hot' }"] = 'node "push1": no node makes a group "hot"',
-      ["(3)"] = ":push takes a table of parameters: :push{ ... }",
+      ["(3)"] = ":push needs a table of parameters: :push{ ... }",
       ["{ 3 }"] = 'node "push1": 3 has no name; write { NAME = value, ... }',
       ["{ kernel = print }"] = 'node "push1": unknown parameter "kernel"',
     } do
@@ -87,7 +87,7 @@ return rapid.node { name = "fails", doc = "Fails.",
   points = function(p, frame, params)
     params.by = 2
   end }]])
-    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are the graph's",
+    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are set by the graph",
       scene.error "return rapid.create { points = two } :fails {} :solve {}")
     scene.folder:write("fails.lua", [[
 local rapid = require "rapid"
@@ -96,7 +96,7 @@ return rapid.node { name = "fails", doc = "Fails.",
   detail = function(points, frame, params)
     params.by = points:sum "id"
   end }]])
-    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are the graph's",
+    assert.equal("fails.lua:5: node \"fails1\": params.by can't be assigned; parameters are set by the graph",
       scene.error "return rapid.create { points = two } :fails {} :solve {}")
     scene.folder:write("fails.lua", [[
 local rapid = require "rapid"
@@ -198,28 +198,28 @@ return rapid.node { name = "%s", doc = "Rises.", points = function(p) p.P = p.P 
   it("is refused for a fault of its declaration, at the line of rapid.node", function()
     local before = 'local rapid = require "rapid"\n'
     local points = "points = function(p) end"
-    local roles = 'rapid.node "odd": give it one of points = function(p, frame, params), ' ..
+    local roles = 'rapid.node "odd": the function is missing; add one of points = function(p, frame, params), ' ..
       "action = function(p, step, params), detail = function(points, frame, params) and expand = " ..
       "function(input, params)"
     for definition, expected in pairs {
-      ["5"] = "rapid.node takes a table",
+      ["5"] = "rapid.node needs a table",
       ["{ doc = 'x', " .. points .. " }"] = "rapid.node: the name is missing",
       ["{ name = 5, doc = 'x', " .. points .. " }"] = "rapid.node: name = 5; it must be a string",
-      ["{ name = 'odd', " .. points .. " }"] = 'rapid.node "odd": say what it does, doc = "..."',
+      ["{ name = 'odd', " .. points .. " }"] = 'rapid.node "odd": the documentation is missing; add doc = "..."',
       ["{ name = 'odd', doc = 'x' }"] = roles,
       ["{ name = 'odd', doc = 'x', points = 5 }"] = roles,
       ["{ name = 'odd', doc = 'x', pionts = function(p) end, " .. points .. " }"] =
         'rapid.node "odd": unknown field "pionts"; did you mean "points"?',
       ["{ name = 'odd', doc = 'x', params = 5, " .. points .. " }"] =
-        'rapid.node "odd": params is a table of declarations by name',
+        'rapid.node "odd": params must be a table of declarations by name',
       ["{ name = 'odd', doc = 'x', params = { a = 5 }, " .. points .. " }"] =
-        'rapid.node "odd", parameter a: declare it as { "float", default = 1, doc = "..." }',
+        'rapid.node "odd", parameter a: the declaration must look like { "float", default = 1, doc = "..." }',
       ["{ name = 'odd', doc = 'x', params = { a = { 'flaot', default = 1, doc = 'x' } }, " .. points .. " }"] =
         'rapid.node "odd", parameter a: unknown type "flaot"; did you mean "float"?',
       ["{ name = 'odd', doc = 'x', params = { a = { 'float', doc = 'x' } }, " .. points .. " }"] =
-        'rapid.node "odd", parameter a: give it a default, or required = true',
+        'rapid.node "odd", parameter a: the default is missing; add default = ..., or required = true',
       ["{ name = 'odd', doc = 'x', params = { a = { 'float', default = 1 } }, " .. points .. " }"] =
-        'rapid.node "odd", parameter a: say what it is, doc = "..."',
+        'rapid.node "odd", parameter a: the documentation is missing; add doc = "..."',
       ["{ name = 'odd', doc = 'x', params = { a = { 'float', default = 'x', doc = 'x' } }, " .. points .. " }"] =
         'rapid.node "odd", parameter a: the default a = "x" has the wrong type; it must be a number',
       ["{ name = 'odd', doc = 'x', params = { a = { 'float', default = 3, max = 2, doc = 'x' } }, " .. points .. " }"] =
@@ -247,7 +247,7 @@ return rapid.create { points = two } :rise_here {} :solve {}]]
       scene.error "return rapid.create {} :gravty {}")
     assert.equal('scene.lua:1: unknown node "liftt"; did you mean "lift"?',
       scene.error "return rapid.create {} :liftt {}")
-    assert.equal('scene.lua:1: unknown node "zzz"; `rapid nodes` lists those that there are',
+    assert.equal('scene.lua:1: unknown node "zzz"; `rapid nodes` lists all nodes',
       scene.error "return rapid.create {} :zzz {}")
   end)
 end)

@@ -44,11 +44,11 @@ describe("a parameter of a node in Lua", function()
     define([[r = { "ramp", required = true, doc = "x" }]], "p.P = params.r(p.a)")
     assert.near({2, 0, 3}, run("r = {{0, {0, 0, 4}}, {2, {4, 0, 2}}}", "a = {1, 0}")[2][1].P, 1e-6)
     assert.near({7, 8, 9}, run("r = {{5, {7, 8, 9}}}", "a = {1, 0}")[2][1].P, 1e-6)
-    local remedy = "; it must be a list of keys with rising positions and values of one type, such as " ..
-      "{ {0, 1}, {0.5, 4} } or { {0, {1, 0, 0}} }"
+    local remedy = "; it must be a list of keys with increasing positions and values of one type, such as { {0, " ..
+      "1}, {0.5, 4} } or { {0, {1, 0, 0}} }"
     for given, expected in pairs {
       ["3"] = "r = 3", ["{}"] = "r = {}", ["{{1, 2}, {1, 3}}"] = "r has the position 1 behind 1",
-      ["{{0, 1}, {1, {1, 1, 1}}}"] = "r has numbers and vec3s for values", ["{{0}}"] = "r has the key {0}",
+      ["{{0, 1}, {1, {1, 1, 1}}}"] = "r has both numbers and vec3s as values", ["{{0}}"] = "r has the key {0}",
     } do
       assert.equal('scene.lua:1: node "mine1": ' .. expected .. remedy, fault("r = " .. given))
     end
@@ -69,7 +69,7 @@ describe("a parameter of a node in Lua", function()
     assert.near({1, 1, 0}, run("")[2][2].v, 0)
     assert.equal('scene.lua:1: node "mine1": no attribute "haet"; did you mean "heat"? ' ..
       "(or add :attribute{ haet = 0 } before it)", fault("from = 'haet'", "heat = {0, 0}"))
-    assert.equal('scene.lua:1: node "mine1": to = "id"; that attribute is read only', fault "to = 'id'")
+    assert.equal('scene.lua:1: node "mine1": to = "id": this attribute is read-only', fault "to = 'id'")
     assert.equal('scene.lua:1: node "mine1": from = ""; it must be the name of an attribute', fault "from = ''")
     assert.truthy(fault("to = function() return 'v' end"):find("to can't be a function of the frame", 1, true))
     assert.truthy(fault("to = 'heat'", "heat = {0, 0}"):find('attribute "heat" takes a number, not vec3(0, 1, 0)', 1,
@@ -92,7 +92,7 @@ describe("a parameter of a node in Lua", function()
     define([[a = { "vec4", default = 0, doc = "x" }]], "")
     assert.truthy(fault(""):find('unknown type "vec4"; did you mean "vec3"?', 1, true), fault "")
     define([[a = { "bool", default = true, min = 0, doc = "x" }]], "")
-    assert.truthy(fault(""):find("min and max mean nothing for a bool", 1, true), fault "")
+    assert.truthy(fault(""):find("a bool has no min and max", 1, true), fault "")
     define([[a = { "float", default = math.huge, doc = "x" }]], "")
     assert.truthy(fault(""):find("the default a = inf is out of range", 1, true), fault "")
     define([[a = { "float", default = math.huge, max = math.huge, doc = "x" }]], "p.P = vec3(1 / params.a, 0, 0)")
@@ -122,7 +122,7 @@ end)
 describe("a file beside the scene with the name of a node", function()
   it("that is a scene is told apart", function()
     scene.folder:write("hider.lua", 'return require "rapid".create {} :hider {}')
-    assert.equal('scene.lua:1: hider.lua uses the node "hider" instead of defining it; rename it: it hides the node ' ..
-      "of its name", scene.error("return rapid.create {} :hider {}"):gsub("^hider%.lua:1: ", "scene.lua:1: "))
+    assert.equal('scene.lua:1: hider.lua uses the node "hider" instead of defining it; rename the file, because it ' ..
+      "hides the node", scene.error("return rapid.create {} :hider {}"):gsub("^hider%.lua:1: ", "scene.lua:1: "))
   end)
 end)

@@ -49,9 +49,9 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
       return (scene.kernel_error(body, nil, (shapes .. " local set = rapid.points.grid {}"):gsub("\n", " "))
         :gsub('^scene%.lua:2: node "kernel": ', ""):gsub(" %(point id 0, frame 2%)$", ""))
     end
-    assert.equal("shape:distance(P) takes a vec3, not 3", fault "p.P = p.P * ball:distance(3)")
-    assert.equal("shape:gradient(P) takes a vec3, not nil", fault "p.P = ball:gradient()")
-    assert.equal("shape:distance(P) is asked of a shape: with a colon, not a dot",
+    assert.equal("shape:distance(P) needs a vec3, not 3", fault "p.P = p.P * ball:distance(3)")
+    assert.equal("shape:gradient(P) needs a vec3, not nil", fault "p.P = ball:gradient()")
+    assert.equal("shape:distance(P) must be called with a colon, not a dot",
       fault "p.P = p.P * ball.distance(p.P)")
     assert.equal('points have no "distance"', fault "p.P = p.P * set:distance(p.P)")
     assert.equal('a sphere has no "distanse"; did you mean "distance"?', fault "p.P = p.P * ball:distanse(p.P)")

@@ -85,7 +85,7 @@ struct Seen {
 std::string difference(const Snapshot& a, const Snapshot& b)
 {
     for (const auto& [parts, others] : {std::pair(&a.simulations, &b.simulations), std::pair(&a.nodes, &b.nodes)}) {
-        if (parts->size() != others->size()) return "the nodes that keep something";
+        if (parts->size() != others->size()) return "the nodes with state";
         for (const auto& [name, state] : *parts)
             if (!others->count(name) || !(others->at(name) == state)) return "what " + name + " keeps";
     }

@@ -207,10 +207,10 @@ return rapid.create { seed = 4, subframes = 3 }
     end
   end)
 
-  it("all simulations of a graph have the same number", function()
+  it("all simulations of a graph must have the same number", function()
     assert.truthy(scene.error(
       "return { a = rapid.create { subframes = 4 } :solve {}, b = rapid.create {} :solve {} }")
-      :find("all simulations of a graph have the same", 1, true))
+      :find("all simulations of a graph must have the same", 1, true))
     assert.truthy(scene.error("return rapid.create { subframes = 0 } :solve {}"):find("subframes = 0", 1, true))
   end)
 end)

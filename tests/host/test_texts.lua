@@ -108,17 +108,17 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}}, n
     assert.truthy(scene.kernel_error("p.heat = p.name", named .. ", heat = {1, 2}"):find(
       'scene.lua:2: .*attribute "heat" takes a number, not "leaf"'))
     assert.truthy(scene.kernel_error("p.name = 'a\\255b'", named):find(
-      'scene.lua:2: .*the text "a\\xffb" of an attribute is no UTF%-8'))
+      'scene.lua:2: .*the string "a\\xffb" of an attribute is not valid UTF%-8'))
     for line, message in pairs {
-      [':attribute { attributes = { name = 3 } }'] = "name = 3 has the wrong type; it must be a text, in quotes",
+      [':attribute { attributes = { name = 3 } }'] = "name = 3 has the wrong type; it must be a string in quotes",
       [':attribute { mass = "heavy" }'] = 'mass = "heavy" has the wrong type; it must be a number',
       [':emit { source = two, count = 1, attributes = { kind = { {0, "a"}, {1, "b"} } } }'] =
-        'kind: nothing is between two texts; a choice of them is a list: {"a", "b"}',
+        'kind: strings can\'t be interpolated; to choose one at random, give a list: {"a", "b"}',
       [':emit { source = two, count = 1, name = "x", attributes = { kind = {"a", 3} } }'] = "kind = ",
       [':detail("d", function(points) points[1].kind = 3 end) :attribute { kind = "a" }'] =
         'attribute "kind" takes a text, not 3',
       [':detail("d", function(points) points:max "kind" end) :attribute { kind = "a" }'] =
-        'attribute "kind" is a string, which has no order and no sum',
+        'attribute "kind" is a string, which can\'t be sorted or summed',
       [':points("k", function(p) p.v = p.v * (p.name == "leaf" and 1 or 0) end)'] =
         'no attribute "name"; add :attribute{ attributes = { name = "" } } before it',
     } do
@@ -136,7 +136,7 @@ return rapid.create { points = two } :attribute { kind = "a" } :drag { linear = 
     reported = scene.error [[
 local parents = rapid.create { points = two } :attribute { kind = "a" } :solve { name = "parents" }
 return rapid.create {} :spawn { from = parents, on = "kind > 1" } :solve {}]]
-    assert.truthy(reported:find('on: "kind" is a text; test it with a function', 1, true), reported)
+    assert.truthy(reported:find('on: "kind" is a string; compare it in a function', 1, true), reported)
   end)
 end)
 
@@ -194,7 +194,7 @@ describe("texts", function()
     local result = scene.command("run", text, "-f 1-4 -o c.####.ply -o c.####.prt -o c.####.bgeo")
     assert.equal(0, result.status, result.stderr)
     for _, extension in ipairs { "ply", "prt" } do
-      local warning = 'c%.####%.NAME: %.NAME holds no texts, and leaves out "name"; these do: ' ..
+      local warning = 'c%.####%.NAME: %.NAME can\'t store strings, so "name" is not written; use one of ' ..
         "[%.%w, ]*%.csv, [%.%w, ]*%.vtp"
       local _, count = result.stderr:gsub(warning:gsub("NAME", extension), "")
       assert.equal(1, count, result.stderr)
@@ -205,7 +205,7 @@ describe("texts", function()
   it("are told of where they are asked for, and nowhere else", function()
     local result = scene.command("run", text, "-f 1-4 -o with.####.ply:name -o without.####.ply:v")
     assert.equal(0, result.status, result.stderr)
-    assert.truthy(result.stderr:find('with.####.ply: .ply holds no texts, and leaves out "name"', 1, true))
+    assert.truthy(result.stderr:find('with.####.ply: .ply can\'t store strings, so "name"', 1, true))
     assert.is_nil(result.stderr:find("without.####.ply", 1, true))
   end)
 end)

@@ -60,7 +60,7 @@ describe("a vec3", function()
 
   it("does not change", function()
     local change = "local v = vec3(1, 2, 3) v.%s = 1 return rapid.create {}"
-    assert.equal("scene.lua:1: neither a component nor the frame can be assigned; make a new vec3: " ..
+    assert.equal("scene.lua:1: a component of a vector or a field of the frame can't be assigned; make a new vec3: " ..
       "p.v = vec3(1, p.v.y, p.v.z)", scene.error(change:format "x"))
     assert.equal("scene.lua:1: a vec3 has no \"q\", and can't be changed; make a new one: vec3(x, y, z)",
       scene.error(change:format "q"))
@@ -68,7 +68,8 @@ describe("a vec3", function()
 
   it("does not change under a kernel either", function()
     local message = scene.kernel_error "p.v.x = 1"
-    assert.match("^scene.lua:2: node \"kernel\": neither a component nor the frame can be assigned", message)
+    assert.match("^scene.lua:2: node \"kernel\": a component of a vector or a field of the frame can't be assigned",
+      message)
   end)
 end)
 
@@ -80,20 +81,20 @@ describe("an operation on a vec3", function()
       ["vec3(1, 2, 3) - {1, 2, 3}"] = "can't compute vec3(1, 2, 3) - a table; both must be a vec3",
       ["vec3(1, 2, 3) * nil"] = "can't compute vec3(1, 2, 3) * nil; the other must be a number or a vec3",
       ["'2' * vec3(1, 2, 3)"] = "can't compute a string * vec3(1, 2, 3); the other must be a number or a vec3",
-      ["1 / vec3(1, 2, 3)"] = "can't compute 1 / vec3(1, 2, 3); a vec3 is divided by a number or a vec3",
-      ["vec3(1, 2, 3) ^ 2"] = "can't compute vec3(1, 2, 3) ^ 2; take its components",
-      ["vec3(1, 2, 3) % 2"] = "can't compute vec3(1, 2, 3) % 2; take its components",
+      ["1 / vec3(1, 2, 3)"] = "can't compute 1 / vec3(1, 2, 3); a vec3 can only be divided by a number or a vec3",
+      ["vec3(1, 2, 3) ^ 2"] = "can't compute vec3(1, 2, 3) ^ 2; use its components",
+      ["vec3(1, 2, 3) % 2"] = "can't compute vec3(1, 2, 3) % 2; use its components",
       ["vec3(1, 2, 3) < vec3(4, 5, 6)"] = "vec3 values have no order; compare their lengths or components",
       ["vec3(1, 2, 3) <= vec3(4, 5, 6)"] = "vec3 values have no order; compare their lengths or components",
       ["#vec3(1, 2, 3)"] = "a vec3 has no #; its length is v:length()",
       ["vec3(1, 2, 3).size"] = 'a vec3 has no "size"; it has x, y, z, dot, cross, length, normalized and lerp',
-      ["vec3(1, 2, 3):dot()"] = "v:dot(w) takes a vec3, not nil",
-      ["vec3(1, 2, 3):cross(2)"] = "v:cross(w) takes a vec3, not 2",
-      ["vec3(1, 2, 3).length()"] = "v:length() takes a vec3, not nil",
-      ["vec3(1, 2, 3):lerp(vec3(0, 0, 0))"] = "v:lerp(w, t) takes a number t, not nil",
-      ["vec3(1, 2)"] = "vec3 takes three numbers, vec3(0, 1, 0); one is nil",
-      ["vec3(1, 'two', 3)"] = "vec3 takes three numbers, vec3(0, 1, 0); one is a string",
-      ["vec3 {1, 2}"] = "vec3 takes three numbers, vec3(0, 1, 0); one is nil",
+      ["vec3(1, 2, 3):dot()"] = "v:dot(w) needs a vec3, not nil",
+      ["vec3(1, 2, 3):cross(2)"] = "v:cross(w) needs a vec3, not 2",
+      ["vec3(1, 2, 3).length()"] = "v:length() needs a vec3, not nil",
+      ["vec3(1, 2, 3):lerp(vec3(0, 0, 0))"] = "v:lerp(w, t) needs a number t, not nil",
+      ["vec3(1, 2)"] = "vec3 needs three numbers, vec3(0, 1, 0); one is nil",
+      ["vec3(1, 'two', 3)"] = "vec3 needs three numbers, vec3(0, 1, 0); one is a string",
+      ["vec3 {1, 2}"] = "vec3 needs three numbers, vec3(0, 1, 0); one is nil",
     } do
       assert.equal(expected, fault(expression))
     end

@@ -2,20 +2,21 @@
 -- the frame.
 local scene = require "testing.scene"
 
-local shared_by_all = "; kernels run in parallel, in states of their own: keep it in an attribute of the point, or " ..
-  "do it once for the whole set in :detail"
-local read_only = "neither a component nor the frame can be assigned; make a new vec3: p.v = vec3(1, p.v.y, p.v.z)"
+local shared_by_all = "; kernels run in parallel, in several Lua states: store the value in an attribute of the " ..
+  "point, or compute it once for all points in a :detail"
+local read_only = "a component of a vector or a field of the frame can't be assigned; make a new vec3: p.v = " ..
+  "vec3(1, p.v.y, p.v.z)"
 local columns = "heat = {1, 2}, count = {1, 2}"
 
 -- Found before the first frame, so without point and frame.
 local before_the_first_frame = {
-  ["p.id = 3"] = "the kernel assigns p.id, which is read only",
-  ["p.dt = 3"] = "the kernel assigns p.dt, which is read only",
-  ["p.index = 3"] = "the kernel assigns p.index, which is read only",
+  ["p.id = 3"] = "the kernel assigns p.id, which is read-only",
+  ["p.dt = 3"] = "the kernel assigns p.dt, which is read-only",
+  ["p.index = 3"] = "the kernel assigns p.index, which is read-only",
   ["p:jion 'hot'"] = 'p has no method "jion"; did you mean "join"?',
   ["p:explode()"] = 'p has no method "explode"; it has join, leave, within, kill and rand',
   ["p:join(p.heat > 0 and 'a' or 'b')"] =
-    "the kernel joins or leaves a group under a computed name; name it as a constant: p:join \"old\"",
+    "the kernel joins or leaves a group with a computed name; write the name as a constant: p:join \"old\"",
   ["total = p.heat"] = 'the kernel assigns the global "total"' .. shared_by_all,
   ["shared.n = p.heat"] = 'the kernel assigns the field "n" of a table that all points share' .. shared_by_all,
 }
@@ -38,41 +39,42 @@ local at_a_point = {
   ["p.heat = math.sqrt(-p.heat)"] = "heat became nan; a float is finite, within 3.4e38 either way",
   ["p.heat = 1 / (p.heat - 1)"] = "heat became inf; a float is finite, within 3.4e38 either way",
   ["p.heat = 10 ^ 39"] = "heat became 1e+39; a float is finite, within 3.4e38 either way",
-  ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
-  ["p.v = {0, 1, 0}"] = 'attribute "v" takes a vec3, not a table; vec3(x, y, z) makes one',
+  ["p.v = 1"] = 'attribute "v" needs a vec3, not 1',
+  ["p.v = {0, 1, 0}"] = 'attribute "v" needs a vec3, not a table; vec3(x, y, z) makes one',
   ["p.v = p.P / 0"] = "v became vec3(nan, inf, nan); a float is finite, within 3.4e38 either way",
   ["p.v = p.v + 1"] = "can't compute vec3(0, 0, 0) + 1; both must be a vec3",
   ["p.v = p.v * nil"] = "can't compute vec3(0, 0, 0) * nil; the other must be a number or a vec3",
   ["p.v.x = 1"] = read_only,
   ["p.heat = p.P.w"] = 'a vec3 has no "w"; it has x, y, z, dot, cross, length, normalized and lerp',
   ["p.v = p.P:corss(p.v)"] = 'a vec3 has no "corss"; it has x, y, z, dot, cross, length, normalized and lerp',
-  ["p.v = p.P:cross(2)"] = "v:cross(w) takes a vec3, not 2",
-  ["p.heat = p.P.length()"] = "v:length() takes a vec3, not nil",
-  ["p.v = vec3(1, 2)"] = "vec3 takes three numbers, vec3(0, 1, 0); one is nil",
+  ["p.v = p.P:cross(2)"] = "v:cross(w) needs a vec3, not 2",
+  ["p.heat = p.P.length()"] = "v:length() needs a vec3, not nil",
+  ["p.v = vec3(1, 2)"] = "vec3 needs three numbers, vec3(0, 1, 0); one is nil",
   ["if p.P > p.v then p.heat = 1 end"] = "vec3 values have no order; compare their lengths or components",
   ["p.heat = rapid.math.clmap(p.heat, 0, 1)"] = 'rapid.math has no "clmap"; did you mean "clamp"?',
   ["p.heat = rapid.math.clamp(p.heat, 2, 1)"] = "clamp(x, lo, hi): lo = 2 is above hi = 1",
-  ["p.heat = rapid.math.noise(p.heat)"] = "noise(P, time, octaves, seed) takes a vec3 P, not 1",
-  ["p.heat = p + 1"] = "p is the point; compute with what it has, by name: p.v",
-  ["p.heat = 2 * p"] = "p is the point; compute with what it has, by name: p.v",
-  ["p.heat = p()"] = "p is the point; compute with what it has, by name: p.v",
+  ["p.heat = rapid.math.noise(p.heat)"] = "noise(P, time, octaves, seed) needs a vec3 P, not 1",
+  ["p.heat = p + 1"] = "p is the point; use one of its attributes, such as p.v",
+  ["p.heat = 2 * p"] = "p is the point; use one of its attributes, such as p.v",
+  ["p.heat = p()"] = "p is the point; use one of its attributes, such as p.v",
   ["p.v = vec3(3e38, 3.5e38, 0)"] =
     "v became vec3(3e+38, 3.5e+38, 0); a float is finite, within 3.4e38 either way",
-  ["p.heat = p:rand()"] = "p:rand takes a number, which of the point's random numbers, not nil",
+  ["p.heat = p:rand()"] = "p:rand needs the index of the random number, not nil",
   ["p.heat = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time, dt and detail',
   ["frame.number = 3"] = read_only,
   ["p.heat = frame.detail.total"] =
-    'no detail value "total"; a :detail node sets one: points.detail.total = 0',
+    'no detail value "total"; set it in a :detail: points.detail.total = 0',
   ["p.heat = p['he' .. 'at'] + p['co' .. 'unt']"] =
-    'no attribute "count" here; a name that is computed is declared, reads = { "count" }, or also named as a ' ..
-    "constant (the kernel names dt, heat, id, index)",
+    'no attribute "count" here; declare a computed name with reads = { "count" }, or also write it as a constant ' ..
+    "(the kernel names dt, heat, id, index)",
   ["p['he' .. 'at'] = 1"] =
-    'no attribute "heat" here; add :attribute{ heat = 0 } before it, or where its name is computed writes = { "heat" }',
+    'no attribute "heat" here; add :attribute{ heat = 0 } before it, or declare a computed name with writes = { ' ..
+      '"heat" }',
   ["local t; t.x = p.heat"] = "attempt to index local 't' (a nil value)",
   ["p.heat = wnid(p)"] = "attempt to call global 'wnid' (a nil value)",
   ["p.heat = p.heat .. {}"] = "attempt to concatenate a table value",
   ["error 'too hot'"] = "too hot",
-  ["error { heat = p.heat }"] = "error raised with a table instead of a message",
+  ["error { heat = p.heat }"] = "the script raised an error with a table instead of a message",
   ["assert(p.heat > 5, 'too cold')"] = "too cold",
 }
 
@@ -117,8 +119,8 @@ return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing 
   it("is refused where it is a function of Lua's own", function()
     for _, call in ipairs { ":points('k', math.sin)", ":action('k', string.rep)", ":delete { where = math.floor }" } do
       local message = scene.error("return rapid.create { points = two } " .. call .. " :solve {}")
-      assert.match('^scene.lua:1: node "%w+": the kernel is a function of Lua\'s own library; it must be one of the ' ..
-        "scene's, which may call it$", message)
+      assert.match('^scene.lua:1: node "%w+": the kernel is a function of Lua\'s library; write a function in the ' ..
+        "scene that calls it$", message)
     end
   end)
 

@@ -5,8 +5,8 @@ local command = require "testing.command"
 local two = "rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}} } }"
 local ball = "rapid.levelset.sphere { voxel = 0.2 }"
 
-local further = "^scene%.lua:%d: a further 64 MiB of nodes, level sets, meshes and points would take about 64 MiB, " ..
-  "and %d+ MiB are free of 300 MiB; let the scene make fewer, or set %-%-memory\n$"
+local further = "^scene%.lua:%d: a further 64 MiB of nodes, level sets, meshes and points would need about 64 MiB, " ..
+  "but only %d+ MiB of 300 MiB are free; make fewer of them, or set %-%-memory\n$"
 
 -- Scenes, in which TWO and BALL stand for the definitions above, and the error of each.
 local refused = {
@@ -15,14 +15,14 @@ local refused = {
 local s = rapid.shape.sphere {}
 for i = 1, 1e5 do s = s:transform(function(f) return rapid.translate(0, f.time, 0) end) end
 return TWO :collide { shape = s } :solve {}]],
-    "^scene%.lua:3: :transform: a product of 1001 motions, of which some vary; at most 1000 are taken: " ..
-    "compute them in one function of the frame\n$" },
+    "^scene%.lua:3: :transform: a product has 1001 motions, some of which vary; at most 1000 are possible: compute " ..
+      "them in one function of the frame\n$" },
   { [[
 local s = rapid.shape.sphere {}
 for i = 1, 1e5 do s = s:transform(rapid.translate(0, 1e-9, 0)) end
 return TWO :collide { shape = s } :solve {}]],
-    "^scene%.lua:3: :transform: a sphere that is moved more than 1000 times; move it once, by a product of the " ..
-    "motions\n$" },
+    "^scene%.lua:3: :transform: a sphere is moved more than 1000 times; move it once, with a product of the " ..
+      "motions\n$" },
   -- Chains of nodes are released one after the other, while nothing computes them.
   { [[
 local c = TWO
@@ -33,7 +33,7 @@ error "no more"]], "^scene%.lua:4: no more\n$" },
 local m = rapid.translate(0, 0, 0) * function(f) return rapid.translate(0, f.time, 0) end
 for i = 1, 60 do m = m * m end
 return TWO :collide { shape = rapid.shape.sphere {}, transform = m } :solve {}]],
-    "^scene%.lua:3: rapid%.product: a product of 1024 motions" },
+    "^scene%.lua:3: rapid%.product: a product has 1024 motions" },
   -- Memory: many small allocations.
   { [[
 rapid.node { name = "n0", doc = "one", expand = function(i) return i:gravity {} end }
@@ -46,29 +46,29 @@ return TWO :n40 {} :solve {}]], further },
   { "local s = BALL for i = 1, 3000 do s = s:transform(rapid.translate(0, 1e-9, 0)) end return TWO", further },
   -- Memory: one allocation larger than the limit.
   { "return TWO :collide { shape = rapid.levelset.sphere { voxel = 0.05 } :offset(20) } :solve {}",
-    "^scene%.lua:2: :offset: a level set sphere of radius 1 m with voxel = 0%.05 m would take about %d%.%d GiB" },
+    "^scene%.lua:2: :offset: a level set sphere of radius 1 m with voxel = 0%.05 m would need about %d%.%d GiB" },
   { [[
 local grid = rapid.grid.from { at = function(P) return P end, voxel = 0.001 }
 return TWO :field { grid = grid } :solve {}]],
-    "^scene%.lua:2: rapid%.grid%.from: 1e%+09 nodes would take about %d+ MiB of Lua's memory, which has 1024; give " ..
+    "^scene%.lua:2: rapid%.grid%.from: 1e%+09 nodes would need about %d+ MiB of Lua's memory, which has 1024; give " ..
     "a larger voxel, or set %-%-script%-memory\n$" },
   { [[
 local names, chain = {}, rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.01 } }
 for i = 1, 300 do names[i] = "a" .. i chain = chain:attribute { ["a" .. i] = {1, 2, 3} } end
 return chain:points { name = "k", writes = names, kernel = function(p) for i = 1, 300 do p["a" .. i] = p.P end end }
   :solve {}]],
-    '^scene%.lua:4: node "k": 300 attributes and groups of 1000000 points would take about 3%.4 GiB, .* let the ' ..
-    "kernel write fewer, or set %-%-memory" },
+    '^scene%.lua:4: node "k": 300 attributes and groups of 1000000 points would need about 3%.4 GiB, .* write ' ..
+    "fewer in the kernel, or set %-%-memory" },
   { "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.008 } } " ..
     ":contact { radius = 0.004 } :solve {}",
-    '^scene%.lua:2: node "solve1": a step of 1953125 points that act on one another would take about 373 MiB' },
+    '^scene%.lua:2: node "solve1": a step of 1953125 points that act on one another would need about 373 MiB' },
   -- Libraries refuse these without a helpful message.
   { [[
 local names, values = {}, {}
 for i = 1, 66000 do values["a" .. i], names[i] = 1, "a" .. i end
 return TWO :attribute { attributes = values } :points { name = "k", kernel = function(p) end, reads = names }
   :solve {}]],
-    '^scene%.lua:4: node "k": reads and writes 66001 attributes and groups; a kernel has at most about 65000\n$' },
+    '^scene%.lua:4: node "k": reads and writes 66001 attributes and groups; a kernel can use at most about 65000\n$' },
   { "return TWO :solve {} :rasterize { file = 'r.####.vdb', voxel = 1e-6 }",
     '^scene%.lua:2: node "rasterize1": voxel = 1e%-06 is out of range; it must be at least 2e%-05\n$' },
   { "return TWO :collide { shape = BALL :transform(rapid.scale(1e-9)) } :solve {}",
@@ -108,14 +108,14 @@ describe("pictures", function()
     local scene = "return " .. two .. " :collide { shape = rapid.shape.plane {} } :solve {}"
     local result = run(folder, scene, "-o a.####.png --size 4000x4000")
     assert.equal(2, result.status)
-    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would take about 1%.0 GiB, and %d+ MiB are free of " ..
-      "300 MiB; give a smaller %-%-size, or set %-%-memory\n$", result.stderr)
+    assert.match("^%-o a%.####%.png: pictures of 4000x4000 would need about 1%.0 GiB, but only %d+ MiB of " ..
+      "300 MiB are free; give a smaller %-%-size, or set %-%-memory\n$", result.stderr)
     -- Two pictures, of which only one would fit.
     result = run(folder, scene, "-o a.####.png -o b.####.png --size 1600x1600")
-    assert.match("^%-o b%.####%.png: pictures of 1600x1600 would take about 332 MiB", result.stderr)
+    assert.match("^%-o b%.####%.png: pictures of 1600x1600 would need about 332 MiB", result.stderr)
     assert.equal(0, run(folder, scene, "-o a.####.png --size 1600x1600").status)
     -- Points alone.
     result = run(folder, "return " .. two .. " :gravity {} :solve {}", "-o a.####.png --size 4000x4000")
-    assert.match("pictures of 4000x4000 would take about 366 MiB", result.stderr)
+    assert.match("pictures of 4000x4000 would need about 366 MiB", result.stderr)
   end)
 end)

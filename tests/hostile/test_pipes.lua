@@ -25,7 +25,7 @@ describe("a pipe or a device", function()
     for text, message in pairs {
       ["require 'pipe'"] = 'no module "pipe"; looked for pipe.lua', ["require 'zero'"] = 'no module "zero"',
       ["return rapid.create {} :pipe {}"] = 'unknown node "pipe"',
-      ["require 'hole'"] = "it has more than 64 MiB, which is no scene and no module",
+      ["require 'hole'"] = "the file has more than 64 MiB, too much for a scene or a module",
     } do
       local result = run(text)
       assert.equal(2, result.status, text)
@@ -72,7 +72,7 @@ describe("a pipe or a device", function()
     local folder = folder_with(nothing)
     local endless = command.shell('timeout -k 1 60 "$RAPID" run zero.lua', { cwd = folder.path })
     assert.equal(2, endless.status)
-    assert.equal("zero.lua: it has more than 64 MiB, which is no scene and no module\n", endless.stderr)
+    assert.equal("zero.lua: the file has more than 64 MiB, too much for a scene or a module\n", endless.stderr)
     local piped = command.shell('cat scene.lua | "$RAPID" run /dev/stdin -f 1 --quiet', { cwd = folder.path })
     assert.equal("", piped.stderr)
     assert.equal(0, piped.status)

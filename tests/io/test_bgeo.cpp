@@ -164,8 +164,7 @@ TEST_CASE("groups of a .bgeo are read behind attributes of the whole, in words o
     CHECK_THAT(error_of([&] { read(text.substr(0, text.size() - 3)); }),
                Catch::EndsWith("the file ends within its groups"));
     text[text.size() - 11] = 33;
-    CHECK_THAT(error_of([&] { read(text); }),
-               Catch::EndsWith("the group \"none\" is one of 33 points; the file has 34"));
+    CHECK_THAT(error_of([&] { read(text); }), Catch::EndsWith("the group \"none\" has 33 points, but the file has 34"));
 }
 
 TEST_CASE("a .bgeo that is cut off, newer or something else is an error that says so", "[io][bgeo]")
@@ -180,7 +179,7 @@ TEST_CASE("a .bgeo that is cut off, newer or something else is an error that say
     // The groups all, hot and nobody: a length, the name, a count and a word each.
     constexpr std::size_t after_points = 3 * (2 + 4 + 4) + 3 + 3 + 6 + 2;
     CHECK_THAT(error(whole.substr(0, whole.size() - after_points - 20)),
-               Catch::EndsWith("the file ends early: its header promises 3 points, it holds 2"));
+               Catch::EndsWith("the file ends early: its header announces 3 points, but it contains 2"));
     CHECK_THAT(error(whole.substr(0, 60)), Catch::EndsWith("the file ends within its header"));
     CHECK_THAT(error("\x7fNSJb..."), Catch::EndsWith("Rapid reads the classic one (in Houdini: .bhclassic)"));
     CHECK_THAT(error("hello"), Catch::EndsWith("b.bgeo: not a classic bgeo file"));

@@ -69,8 +69,10 @@ TEST_CASE("sets in which two points have one id can't be compared", "[io][compar
     const PointSet a = diagonal_points();
     PointSet b = a;
     b.id().write()[3] = 119;
-    CHECK(error_of([&] { compare(a, b); }) == "two points of B have the id 119; points are compared by id");
-    CHECK(error_of([&] { compare(b, a); }) == "two points of A have the id 119; points are compared by id");
+    CHECK(error_of([&] { compare(a, b); }) ==
+          "two points of B have the id 119; points are compared by id, so ids must be unique");
+    CHECK(error_of([&] { compare(b, a); }) ==
+          "two points of A have the id 119; points are compared by id, so ids must be unique");
 }
 
 TEST_CASE("max, rms and p95 are those of the lengths of the differences", "[io][compare]")

@@ -93,13 +93,12 @@ TEST_CASE("a .csv that can't be understood is an error that names the line", "[i
     };
     CHECK_THAT(error("Px,Py,Pz\n1,2,3\n1,2\n"), Catch::EndsWith("line 3: there are 2 values; there must be 3"));
     CHECK_THAT(error("Px,Py,Pz\n1,2,x\n"), Catch::EndsWith("line 2: Pz is not a number"));
-    CHECK_THAT(error("Px,Py,Pz\n1,2,3,4\n"), Catch::EndsWith("line 2: what follows 3 values can't be understood"));
+    CHECK_THAT(error("Px,Py,Pz\n1,2,3,4\n"), Catch::EndsWith("line 2: the text after 3 values can't be parsed"));
     CHECK_THAT(error("a,b,c\n"), Catch::EndsWith("line 1: there are no columns Px,Py,Pz; the first line must name the "
                                                  "columns"));
-    CHECK_THAT(
-        error("Px,Py,Pz\n1,2,3\n4,5,6"),
-        Catch::EndsWith("line 3: there is no newline at its end, so that its last number may be cut short; if the "
-                        "file is whole, append a newline (echo >> FILE)"));
+    CHECK_THAT(error("Px,Py,Pz\n1,2,3\n4,5,6"),
+               Catch::EndsWith("line 3: there is no newline at the end, so the last number may be cut off; if the file "
+                               "is complete, append a newline (echo >> FILE)"));
     CHECK(error("Px,Py,Pz\n1,2,3\n4,5,6\n") == "");
     CHECK_THAT(error("idx,idy,idz,Px,Py,Pz\n1,2,3,1,2,3\n"), Catch::EndsWith("is vec3; it must be int64"));
 }

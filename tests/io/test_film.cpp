@@ -110,11 +110,10 @@ TEST_CASE("without ffmpeg a film is an error that names the package", "[io][film
     const TemporaryFolder folder;
     const Path path(folder.path().string());
     CHECK(error_of([] { require_ffmpeg(); }) ==
-          "films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
-    CHECK(
-        error_of([&] { write_points(folder / "a.gif", PointSet()); }) ==
-        (folder / "a.gif").string() +
-            ": films are made by ffmpeg, which is not here; install it (apt install ffmpeg), or write pictures (.png)");
+          "films need ffmpeg; install it (apt install ffmpeg), or write pictures (.png)");
+    CHECK(error_of([&] { write_points(folder / "a.gif", PointSet()); }) ==
+          (folder / "a.gif").string() +
+              ": films need ffmpeg; install it (apt install ffmpeg), or write pictures (.png)");
     CHECK(file_names(folder.path()).empty());
 }
 

@@ -141,7 +141,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
 
     std::string wrong = text;
     wrong[text.size() - 2 - 4 - 4 - 1] = 9;  // the last index
-    CHECK_THAT(error_of([&] { read(wrong); }), Catch::EndsWith("a polygon has the point 9 of 5"));
+    CHECK_THAT(error_of([&] { read(wrong); }), Catch::EndsWith("a polygon uses point 9 of 5"));
     CHECK_THAT(error_of([&] { read(text.substr(0, text.size() - 8)); }),
                Catch::EndsWith("the file ends within its primitives"));
 

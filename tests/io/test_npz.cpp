@@ -111,7 +111,7 @@ TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")
     };
     write_points(folder / "a.npz", random_points({.size = 3}));
     const std::string whole = file_text(folder / "a.npz");
-    CHECK_THAT(error("hello"), Catch::EndsWith("b.npz: not a whole zip file: its directory is missing or damaged"));
+    CHECK_THAT(error("hello"), Catch::EndsWith("b.npz: not a complete zip file: its directory is missing or damaged"));
     CHECK_THAT(error(whole.substr(0, whole.size() - 30)), Catch::EndsWith("its directory is missing or damaged"));
 
     // Changes a number of P, which the checksum reveals.
@@ -123,13 +123,14 @@ TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")
     std::string promising = whole;
     const std::size_t entry = whole.find("PK\1\2");
     for (const std::size_t at : {entry + 20, entry + 24}) promising.replace(at, 4, "\xff\xff\xff\x7f");
-    CHECK_THAT(error(promising), Catch::EndsWith("holds less than its directory promises; the file is damaged"));
+    CHECK_THAT(error(promising), Catch::EndsWith("is shorter than its directory says; the file is damaged"));
 
     const auto saved = [&](const std::string& arrays) {
         REQUIRE(python(folder, "np.savez('c.npz', " + arrays + ")\n"));
         return error_of([&] { read_points(folder / "c.npz"); });
     };
-    CHECK_THAT(saved("x=np.zeros((3, 3))"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
-    CHECK_THAT(saved("P=np.zeros((3, 2))"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
-    CHECK_THAT(saved("P=np.zeros((3, 3), int)"), Catch::EndsWith("there is no array P of floats and of shape (n, 3)"));
+    CHECK_THAT(saved("x=np.zeros((3, 3))"), Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
+    CHECK_THAT(saved("P=np.zeros((3, 2))"), Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
+    CHECK_THAT(saved("P=np.zeros((3, 3), int)"),
+               Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
 }

@@ -92,8 +92,8 @@ TEST_CASE("an id beyond int32 can't be written to .ply or .bgeo, and the error n
 
     CHECK(error_of([&] { write_points(folder / name, points); }) ==
           (folder / name).string() +
-              ": id = 3000000000 does not fit the int32 of this format (at most 2147483647); write .vdb or .csv, which "
-              "hold int64");
+              ": id = 3000000000 does not fit into the int32 of this format (at most 2147483647); write .vdb or .csv, "
+              "which store int64");
     CHECK(file_names(folder.path()).empty());
 }
 
@@ -110,10 +110,11 @@ TEST_CASE("a damaged .ply is an error that says how", "[io][ply]")
     CHECK_THAT(error(head + xyz), Catch::EndsWith("its header has no \"end_header\""));
     CHECK_THAT(error(head + "property quux x\nend_header\n"), Catch::EndsWith("unknown type \"quux\""));
     CHECK_THAT(error(head + "end_header\n"), Catch::EndsWith("the vertices have no x y z"));
-    CHECK_THAT(error(head + xyz + "end_header\n" + std::string(30, '\0')),
-               Catch::EndsWith("the file ends early: its header promises 3 of the element \"vertex\", it holds 2"));
+    CHECK_THAT(
+        error(head + xyz + "end_header\n" + std::string(30, '\0')),
+        Catch::EndsWith("the file ends early: its header announces 3 of the element \"vertex\", but it contains 2"));
     CHECK_THAT(error("ply\nformat ascii 1.0\nelement vertex 2\n" + xyz + "end_header\n1 2 3\n4 5       \n"),
-               Catch::EndsWith("vertex 1 of 2: there is no z; the file ends early or is damaged"));
+               Catch::EndsWith("vertex 1 of 2: z is missing; the file ends early or is damaged"));
     CHECK_THAT(error(head + xyz + "property float v\nend_header\n" + std::string(48, '\0')),
                Catch::EndsWith("the attribute v is float; it must be vec3"));
 }

@@ -96,8 +96,9 @@ TEST_CASE("what must be kept until the end is refused beyond --memory, what is w
     const auto fill = [&](PointFile& file) {
         for (int i = 0; i < 5; ++i) file.append(points);
     };
-    CHECK_THROWS_WITH(fill(kept), Catch::Contains("a.npz: 3000000 points, which .npz takes all at once, would take") &&
-                                      Catch::Contains("write .csv or .bgeo, which take them as they come"));
+    CHECK_THROWS_WITH(fill(kept),
+                      Catch::Contains("a.npz: 3000000 points, which .npz must hold in memory, would need") &&
+                          Catch::Contains("write .csv or .bgeo, which are written point by point"));
     CHECK_NOTHROW(fill(streamed));
     set_memory_budget(before);
 }

@@ -185,7 +185,7 @@ TEST_CASE("a name that .prt can't hold is an error that says what it can", "[io]
     points.add({"heat:max", 0.0f});
     CHECK_THAT(error_of([&] { write_points(folder / "a.prt", points); }),
                Catch::EndsWith("the name \"heat:max\" can't be written to .prt; it must have at most 31 letters, "
-                               "digits and _, and begin with no digit; rename the attribute or group"));
+                               "digits and _, and must not begin with a digit; rename the attribute or group"));
     CHECK(file_names(folder.path()).empty());
 }
 
@@ -203,13 +203,13 @@ TEST_CASE("a damaged .prt is an error that says how", "[io][prt]")
     CHECK_THAT(error("hello"), Catch::EndsWith("a.prt: not a .prt file"));
     CHECK_THAT(error(file.text().substr(0, 70)), Catch::EndsWith("the file ends within its header"));
     CHECK_THAT(error(file.text()),
-               Catch::EndsWith("the file ends early or is damaged: its header promises 3 points, it holds 2"));
+               Catch::EndsWith("the file ends early or is damaged: its header announces 3 points, but it contains 2"));
     OtherFile unknown = file;
     unknown.channels[0].type = 11;
     CHECK_THAT(error(unknown.text()), Catch::EndsWith("the channel \"Position\" has the unknown type 11"));
     OtherFile elsewhere = file;
     elsewhere.channels[0].offset = -4;
-    CHECK_THAT(error(elsewhere.text()), Catch::EndsWith("the channel \"Position\" has 3 numbers a point, at -4"));
+    CHECK_THAT(error(elsewhere.text()), Catch::EndsWith("the channel \"Position\" has 3 numbers per point, at -4"));
     OtherFile placeless = file;
     placeless.channels[0].name = "Velocity";
     CHECK_THAT(error(placeless.text()), Catch::EndsWith("there is no channel Position of three floats"));

@@ -101,7 +101,7 @@ TEST_CASE("what is no file of a state is said to be none", "[state]")
     const test::TemporaryFolder folder;
     const fs::path path = folder.write("points.csv", "P.x,P.y,P.z\n1,2,3\n");
     CHECK(!StateFile::is_one(path));
-    CHECK(test::error_of([&] { StateFile file(path); }) == "it does not begin as one; it is no whole snapshot");
+    CHECK(test::error_of([&] { StateFile file(path); }) == "it does not begin like one; it is not a complete snapshot");
 }
 
 }  // namespace rapid

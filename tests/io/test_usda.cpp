@@ -165,18 +165,18 @@ TEST_CASE("a .usda that is damaged, or of more than one frame, is an error that 
         return error_of([&] { read_points(folder / "a.usda"); });
     };
     const std::string head = "#usda 1.0\ndef Points \"p\"\n{\n";
-    CHECK_THAT(error("hello"), Catch::EndsWith("a.usda: not USD's text: it does not begin with \"#usda\""));
+    CHECK_THAT(error("hello"), Catch::EndsWith("a.usda: not a USD text file: it does not begin with \"#usda\""));
     CHECK_THAT(error("#usda 1.0\ndef Mesh \"points\" {}\n"), Catch::EndsWith("there is no prim of the type Points"));
-    CHECK_THAT(error(head + "}\n"), Catch::EndsWith("the prim of points has no points of three numbers"));
-    CHECK_THAT(error(head + "point3f[] points = [(0, 1, 2), (3, 4"), Catch::Contains("line 4: there is no ','"));
+    CHECK_THAT(error(head + "}\n"), Catch::EndsWith("the prim of points has no positions of three numbers"));
+    CHECK_THAT(error(head + "point3f[] points = [(0, 1, 2), (3, 4"), Catch::Contains("line 4: ','"));
     CHECK_THAT(error(head + "point3f[] points = [(0, 1, two)]\n}\n"),
-               Catch::EndsWith("line 4: there is no number of its type where there should be one"));
+               Catch::EndsWith("line 4: a number of its type is missing"));
     CHECK_THAT(error(head + "point3f[] points = [(0, 1, 2)]\n"),
                Catch::EndsWith("line 5: the file ends within the prim of points"));
-    CHECK_THAT(error(head + "string a = \"b\n"), Catch::EndsWith("a text has no end"));
+    CHECK_THAT(error(head + "string a = \"b\n"), Catch::EndsWith("a string has no end"));
     CHECK_THAT(error(head + "token[] a = [(]]\n"), Catch::Contains("line 5: "));
     CHECK_THAT(error(head + "point3f[] points.timeSamples = { 1: [(0, 1, 2)], 2: [(1, 1, 2)] }\n}\n"),
-               Catch::EndsWith("points has several time samples; give a file of one frame (usdcat can take one)"));
+               Catch::EndsWith("points has several time samples; give a file with one frame (usdcat can extract one)"));
     CHECK_THAT(error(head + "point3f[] points = [(0, 1, 2)]\n}\ndef Points \"q\" {}\n"),
                Catch::EndsWith("line 6: there are several prims of the type Points; there must be one"));
 }
@@ -187,9 +187,8 @@ TEST_CASE("a name that .usda can't hold is an error that says what it can", "[io
     PointSet points;
     points.append(1);
     points.group("wet-ground");
-    CHECK_THAT(
-        error_of([&] { write_points(folder / "a.usda", points); }),
-        Catch::EndsWith("the name \"wet-ground\" can't be written to .usda; it must be of letters, digits and _, "
-                        "and begin with no digit; rename the attribute or group"));
+    CHECK_THAT(error_of([&] { write_points(folder / "a.usda", points); }),
+               Catch::EndsWith("the name \"wet-ground\" can't be written to .usda; it must consist of letters, digits "
+                               "and _, and must not begin with a digit; rename the attribute or group"));
     CHECK(file_names(folder.path()).empty());
 }

@@ -195,7 +195,7 @@ TEST_CASE("a .vdb without points says which grids it has", "[io][vdb]")
     openvdb::io::File((folder / "a.vdb").string()).write(openvdb::GridCPtrVec{sphere});
 
     CHECK(error_of([&] { read_points(folder / "a.vdb"); }) ==
-          (folder / "a.vdb").string() + ": the file holds no points; its grids are \"surface\" (Tree_float_5_4_3)");
+          (folder / "a.vdb").string() + ": the file contains no points; its grids are \"surface\" (Tree_float_5_4_3)");
 }
 
 TEST_CASE("a .vdb that is cut is an error that says so", "[io][vdb]")
@@ -206,11 +206,12 @@ TEST_CASE("a .vdb that is cut is an error that says so", "[io][vdb]")
     for (const std::size_t missing : {1, 50, 100}) {
         const auto path = folder.write("cut.vdb", whole.substr(0, whole.size() - missing));
         CHECK(error_of([&] { read_points(path); }) ==
-              fmt::format("{}: can't be read: it is cut: its grid \"points\" ends at byte {}, the file at byte {}",
-                          path.string(), whole.size(), whole.size() - missing));
+              fmt::format(
+                  "{}: can't be read: it is cut off: its grid \"points\" ends at byte {}, but the file at byte {}",
+                  path.string(), whole.size(), whole.size() - missing));
     }
     const auto header = folder.write("header.vdb", whole.substr(0, 40));
-    CHECK(error_of([&] { read_points(header); }) == header.string() + ": can't be read: it is cut or damaged");
+    CHECK(error_of([&] { read_points(header); }) == header.string() + ": can't be read: it is cut off or damaged");
     // Bytes after the last grid are ignored.
     CHECK(read_points(folder.write("longer.vdb", whole + "more")).size() == 100);
 }
@@ -236,10 +237,10 @@ TEST_CASE("a .vdb whose sizes contradict each other is refused before OpenVDB re
         std::string message = error_of([&] { read_points(path); });
         return message.erase(0, std::min(message.size(), path.string().size() + 2));
     };
-    const std::string damaged = "can't be read: it is cut or damaged";
+    const std::string damaged = "can't be read: it is cut off or damaged";
     CHECK(error(0, 8) == damaged);  // two bytes
     CHECK(error(9, 8) == damaged);  // not uniform: a float for each point
-    CHECK(error(10, 99) == "can't be read: a leaf of the grid \"points\" has more points than values of them");
+    CHECK(error(10, 99) == "can't be read: a leaf of the grid \"points\" has more points than values");
 }
 
 TEST_CASE("a position that is not finite can't be written to .vdb, and the error names the point", "[io][vdb]")

@@ -157,24 +157,25 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
         return error_of([&] { read_points(folder / "a.vtp"); });
     };
     const std::string three = "type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">";
-    CHECK_THAT(error("hello"), Catch::EndsWith("a.vtp: not a file of VTK: it has no element VTKFile"));
+    CHECK_THAT(error("hello"), Catch::EndsWith("a.vtp: not a VTK file: it has no element VTKFile"));
     CHECK_THAT(error("<VTKFile type=\"PolyData\"><PolyData>"), Catch::Contains("its XML is damaged: "));
-    CHECK_THAT(error("<VTKFile type=\"ImageData\"/>"), Catch::EndsWith("it holds ImageData; it must hold PolyData"));
+    CHECK_THAT(error("<VTKFile type=\"ImageData\"/>"), Catch::EndsWith("it holds ImageData; it must contain PolyData"));
     CHECK_THAT(error("<VTKFile type=\"PolyData\"/>"), Catch::EndsWith("the file has no piece"));
     CHECK_THAT(
         error(file_of("compressor=\"vtkLZ4DataCompressor\"", ascii_points)),
-        Catch::EndsWith("compressed by vtkLZ4DataCompressor; it must be by vtkZLibDataCompressor, or not at all"));
+        Catch::EndsWith(
+            "compressed by vtkLZ4DataCompressor; it must be compressed by vtkZLibDataCompressor, or not at all"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4")),
                Catch::EndsWith("the array \"\" of 2 rows: the array ends early"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 five")),
-               Catch::EndsWith("the array has no number of its type where it should have its 5"));
+               Catch::EndsWith("the array lacks the number of its 5"));
     CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({20}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({24}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
-    CHECK_THAT(error(file_of("", three + std::string(40, '*'))), Catch::EndsWith("the array is no base64"));
+    CHECK_THAT(error(file_of("", three + std::string(40, '*'))), Catch::EndsWith("the array is not valid base64"));
     CHECK_THAT(error(file_of("", "type=\"Int32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 5")),
-               Catch::EndsWith("its Points are no array of three floats for each point"));
+               Catch::EndsWith("its Points are not an array of three floats for each point"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\">")),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("compressor=\"vtkZLibDataCompressor\"",

@@ -89,11 +89,12 @@ TEST_CASE("attribute refuses illegal names and values", "[attribute]")
     };
     for (const char* own : {"P", "v", "id", "dt", "index", "kill"})
         CHECK(refusal(own, 1.0) ==
-              fmt::format("\"{}\" can't be an attribute: Rapid itself uses it; choose another name", own));
-    CHECK(refusal("2nd", 1.0) == "attribute name \"2nd\" can't be used; take letters, digits and _, no digit first");
+              fmt::format("\"{}\" can't be an attribute, because Rapid uses this name; choose another one", own));
+    CHECK(refusal("2nd", 1.0) ==
+          "attribute name \"2nd\" can't be used; use letters, digits and _, and no digit at the beginning");
     CHECK(refusal("heat", true) ==
           "heat = true has the wrong type; it must be a number, a vec3 or {x, y, z}, a quaternion {x, y, z, w} or a "
-          "text");
+          "string");
     CHECK(refusal("mass", "heavy") == "mass = \"heavy\" has the wrong type; it must be a number");
     CHECK(refusal("pscale", list({1.0, 1.0, 1.0})) == "pscale = {1, 1, 1} has the wrong type; it must be a number");
     CHECK(refusal("heat", std::numeric_limits<double>::quiet_NaN()) == "heat = nan is out of range; it must be finite");

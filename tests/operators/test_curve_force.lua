@@ -136,17 +136,17 @@ return rapid.create { fps = 24 }
     end
     assert.truthy(fault(""):find("curve is missing", 1, true))
     assert.truthy(fault("curve = {{0, 0, 0}}"):find("curve has 1 points; a curve needs at least two", 1, true))
-    assert.truthy(fault("curve = {{0, 0, 0}, {0, 0, 0}}"):find("points 1 and 2 are at one place", 1, true))
+    assert.truthy(fault("curve = {{0, 0, 0}, {0, 0, 0}}"):find("points 1 and 2 have the same position", 1, true))
     assert.truthy(fault("curve = 3"):find("curve = 3", 1, true))
     local function of_file(text)
       scene.folder:write("bad.obj", text)
       return scene.error("rapid.points.read 'bad.obj'")
     end
-    assert.truthy(of_file("v 0 0\n"):find('line 1: "" is no number', 1, true))
+    assert.truthy(of_file("v 0 0\n"):find('line 1: "" is not a number', 1, true))
     assert.truthy(of_file("v 0 0 0\nl 1 2\n"):find("line 2: there is no vertex 2 of 1", 1, true))
     assert.truthy(of_file("v 0 0 0\nl 1 0\n"):find("there is no vertex 0 of 1", 1, true))
     assert.truthy(of_file("v 0 nan 0\n"):find("must be finite", 1, true))
-    assert.truthy(of_file("hello\n"):find("is no .obj file with vertices", 1, true))
+    assert.truthy(of_file("hello\n"):find("is not an .obj file with vertices", 1, true))
   end)
 
   it("is the same on any number of threads", function()

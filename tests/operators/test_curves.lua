@@ -157,26 +157,27 @@ describe("a curve", function()
     local function fault(text) return scene.error(text .. " return rapid.create {} :solve {}") end
     local function says(expected, text) assert.matches(expected, fault(text), 1, true) end
     says("it has 1 point; a curve needs at least two", "rapid.curve.from { points = {{0, 0, 0}} }")
-    says("points 2 and 3 are at one place", "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}} }")
+    says("points 2 and 3 have the same position", "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}} }")
     says("points = 3", "rapid.curve.from { points = 3 }")
     says("points is missing", "rapid.curve.from {}")
     says('unknown option "close"', "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}}, close = true }")
     says("must be a list of vec3, or points", "rapid.curve.from { points = function() return 3 end }")
     says('there is no file "none.####.obj"', "rapid.curve.read 'none.####.obj'")
-    assert.matches("closed is for a list of places", scene.error [[return rapid.create {} :curve_force { closed = true,
+    assert.matches("closed needs a list of positions", scene.error [[
+return rapid.create {} :curve_force { closed = true,
       curve = rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} } } :solve {}]], 1, true)
     local function of_source(expected, source, more)
       assert.matches(expected, scene.error(birth_scene(source, more)), 1, true)
     end
-    of_source('from = "volume" needs a mesh or a shape; along a curve leave it out',
+    of_source('from = "volume" needs a mesh or a shape; remove it for a curve',
       "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }", "from = 'volume'")
-    of_source("a curve bears evenly by length", "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }", "density = 'u'")
+    of_source("a curve emits evenly by length", "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }", "density = 'u'")
     of_source("give the function to rapid.curve.from",
       "function(frame) return rapid.curve.from { points = {{0, frame.time, 0}, {1, 0, 0}} } end")
     of_source("returned 3 points in frame 2, and 2 in the first", [[rapid.curve.from { points = function(frame)
       return frame.number == 2 and {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}} or {{0, 0, 0}, {1, 0, 0}} end }]])
     scene.folder:write("few.0001.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n")
     scene.folder:write("few.0002.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nl 1 2 3\n")
-    of_source("changes at frame 2: it has 3 points there, and 2 at frame 1", "rapid.curve.read 'few.####.obj'")
+    of_source("changes at frame 2: it has 3 points there and 2 at frame 1", "rapid.curve.read 'few.####.obj'")
   end)
 end)

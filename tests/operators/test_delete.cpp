@@ -35,7 +35,7 @@ TEST_CASE("a group that nobody joined deletes nothing", "[delete][extreme]")
 
 TEST_CASE("delete needs a group or where", "[delete]")
 {
-    CHECK(error_of([] { NodeTest("delete", {}); }) == "nothing says which points to remove; give group, where or both");
+    CHECK(error_of([] { NodeTest("delete", {}); }) == "no points are selected; give group, where or both");
 }
 
 }  // namespace rapid

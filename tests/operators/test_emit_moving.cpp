@@ -184,7 +184,7 @@ TEST_CASE("nothing is born along a jump, which is reported; cut says so, or that
     CHECK(denied.second.empty());
     REQUIRE(found.second.size() == 1);
     CHECK_THAT(found.second[0],
-               Contains("the source jumps by 50.1 m to frame 9, 501 times as far as in the frames around"));
+               Contains("the source jumps by 50.1 m to frame 9, 501 times as far as in the neighbouring frames"));
 
     // The stream itself has no gap: 1/100 m between births, except for the jump.
     double widest = 0;
@@ -273,9 +273,10 @@ TEST_CASE("age can be an attribute of the source", "[emit]")
                      {{"source", ObjectPtr(source_of(points))}, {"count", 2.0}, {"age", Value(AttributeRef{"delya"})}});
         });
     };
-    CHECK(refusal(from) == "age = rapid.attr \"delya\": the source has no float of that name; did you mean \"delay\"?");
+    CHECK(refusal(from) ==
+          "age = rapid.attr \"delya\": the source has no float with this name; did you mean \"delay\"?");
     from.set("delya", Column<float>(2, -1.0f));
-    CHECK(refusal(from) == "age = rapid.attr \"delya\": the source's point 0 has -1; ages are at least 0");
+    CHECK(refusal(from) == "age = rapid.attr \"delya\": point 0 has -1; an age must be at least 0");
 }
 
 TEST_CASE("births on a moving mesh are the same bits on any number of threads", "[emit]")

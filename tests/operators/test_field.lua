@@ -71,7 +71,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
     local function fault(text) return scene.error(text) end
     local tail = " :solve {}"
     assert.truthy(fault(still .. " return rapid.create {} :field { grid = grid, drag = 3 }" .. tail)
-      :find('drag goes with mode = "velocity"', 1, true))
+      :find('drag needs mode = "velocity"', 1, true))
     assert.truthy(fault("return rapid.create {} :field {}" .. tail):find("grid", 1, true))
     assert.truthy(fault("rapid.grid.from { voxel = -1, at = math.sin }")
       :find("rapid.grid.from: voxel = -1; it must be above 0 m", 1, true))

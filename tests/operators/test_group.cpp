@@ -64,9 +64,7 @@ TEST_CASE("a group of no points is a group", "[group][extreme]")
 TEST_CASE("a group needs a name", "[group]")
 {
     CHECK(error_of([] { NodeTest("group", {}); }) == "name is missing: name of the group");
-    CHECK(error_of([] {
-              NodeTest("group", {{"name", ""}});
-          }) == "name = \"\" names no group; give it at least one letter");
+    CHECK(error_of([] { NodeTest("group", {{"name", ""}}); }) == "name = \"\" is empty; give the group a name");
 }
 
 TEST_CASE("a group that the plan leaves out is neither made nor tested", "[group]")

@@ -178,7 +178,7 @@ TEST_CASE("merge refuses incompatible inputs, and names the input", "[merge]")
     CHECK(merge(flow_of(simulation(), floats, 1), flow_of(simulation(), vectors, 1)) ==
           "input 2: attribute \"heat\" is float already; it can't be vec3 too");
     CHECK(merge(flow_of(simulation(24), {}, 0), flow_of(simulation(30), {}, 0)) ==
-          "input 2: it runs at 30 frames a second, input 1 at 24; give both the same fps");
+          "input 2: it runs at 30 frames per second and input 1 at 24; give both the same fps");
 }
 
 TEST_CASE("adopted ids are unique per point, whatever the order in which points appear", "[merge]")

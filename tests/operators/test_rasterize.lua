@@ -105,7 +105,7 @@ found = { sum }]], 1)[1]
     assert.equal(before, stamp())
     local result = scene.command("run", drift:format "", "-f 1-2 --part 1/2 -o p.####.{part}.csv")
     assert.equal(2, result.status)
-    assert.matches("its volumes are of all points", result.stderr, 1, true)
+    assert.matches("its volumes contain all points", result.stderr, 1, true)
   end)
 
   it("takes a voxel where a radius is below it", function()
@@ -135,11 +135,11 @@ found = { sum }]], 1)[1]
       assert.is_true(result.status > 0)
       assert.matches(expected, result.stderr, 1, true)
     end
-    says("volumes are written as .vdb", { file = "smoke.####.png" })
-    says("several frames go to one file", { file = "smoke.vdb" })
-    says('attributes: "load" is float; a grid has the mean of a vec3', { add = ", attributes = { 'load' }" })
-    says('"density" is the grid of the points themselves', { add = ", attributes = { 'density' }" })
-    says('scene.lua:3: node "rasterize2": point 0 has the radius 0 m; it must be above 0, and finite', { add =
+    says("volumes can only be written as .vdb", { file = "smoke.####.png" })
+    says("several frames would go into one file", { file = "smoke.vdb" })
+    says('attributes: "load" is float; it must be a vec3', { add = ", attributes = { 'load' }" })
+    says('"density" is already the grid of the points', { add = ", attributes = { 'density' }" })
+    says('scene.lua:3: node "rasterize2": point 0 has the radius 0 m; it must be finite and above 0', { add =
       "} :attribute { none = 0 } :rasterize { file = 'b.####.vdb', voxel = 0.3, radius = rapid.attr 'none'" })
     assert.matches("writes nothing", scene.command("check", [[
 local a = rapid.create { points = two }

@@ -99,7 +99,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}} }
     assert.matches('before = "backwards" is unknown; it must be one of hold, repeat, mirror, none',
       message [[rapid.mesh.read("flat.####.obj", { before = "backwards" })]], 1, true)
     assert.matches("offset = 0.5 is not whole", message [[rapid.mesh.read("flat.####.obj", { offset = 0.5 })]], 1, true)
-    assert.matches('after is for a sequence of files, and "flat.0001.obj" is one file',
+    assert.matches('after needs a sequence of files, but "flat.0001.obj" is one file',
       message [[rapid.mesh.read("flat.0001.obj", { after = "hold" })]], 1, true)
   end)
 end)
@@ -191,14 +191,14 @@ return rapid.create { fps = 24 } :emit { source = function(frame) return set { n
     local function message(read)
       return scene.error(("return rapid.create {} :emit { source = %s, count = 1 } :solve {}"):format(read))
     end
-    assert.matches('there is no file ".*nothing%.####%.csv", at any frame',
+    assert.matches('there is no file ".*nothing%.####%.csv" at any frame',
       message [[rapid.points.read "nothing.####.csv"]])
     write_points(1, 2)
     scene.folder:write("gap.0001.csv", "id,Px,Py,Pz\n1,0,0,0\n")
     scene.folder:write("gap.0004.csv", "id,Px,Py,Pz\n1,0,0,0\n")
-    assert.matches("frame 2 of .* is missing; there must be a file for each frame from 1 to 4",
+    assert.matches("frame 2 of .* is missing; each frame from 1 to 4 needs a file",
       message [[rapid.points.read "gap.####.csv"]])
-    assert.matches("offset is for a sequence of files", message [[rapid.points.read("set.0001.csv", { offset = 1 })]],
+    assert.matches("offset needs a sequence of files", message [[rapid.points.read("set.0001.csv", { offset = 1 })]],
       1, true)
   end)
 end)

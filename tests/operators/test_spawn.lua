@@ -355,18 +355,18 @@ describe("a node that can't bear", function()
   end
 
   it("is refused with what would be right", function()
-    fails(with("", "from = parents, count = 1"), "its points are not moved by a solve; end its chain with :solve{}")
+    fails(with("", "from = parents, count = 1"), "no solve moves its points; end its chain with :solve {}")
     fails("local inner = rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity { name = 'pull' }\n"
       .. "local outer = inner:solve { name = 'end' }\n"
       .. "return { a = outer, b = rapid.create {} :spawn { from = inner, count = 1 } :solve {} }",
-      'from = node "pull" comes before its solve; give "end", or a node after it')
+      'from = node "pull" comes before its solve; give "end" or a node after it')
     fails("local slow = rapid.create { fps = 12 } :solve {}\n"
       .. "return rapid.create {} :spawn { from = slow, count = 1 } :solve {}", "give both the same fps")
-    fails(with(":solve {}", "from = parents"), "nothing says how many points are born")
+    fails(with(":solve {}", "from = parents"), "the number of points is missing")
     fails(with(":solve {}", 'from = parents, on = "hits"'), 'on = "hits" is no event')
     fails(with(":solve {}", 'from = parents, on = "hit", rate = 3'), "rate and on are given together")
     fails(with(":solve {}", 'from = parents, count = 1, kill_parent = true'),
-      "kill_parent is for births at an event in a parent's life")
+      "kill_parent needs an event in a parent's life")
     fails(with(":solve {}", 'from = parents, count = 1, inherit = {"heta"}'),
       'node "emit1": inherit: the parents have no attribute "heta"')
     fails(with(":solve {}", 'from = parents, count = rapid.attr "n"'), 'no attribute "n"')
@@ -389,7 +389,7 @@ local chain = rapid.create {} :attribute { heat = 1 }
 return chain]]):format(emit)))
   end
   local function expect(call, emit)
-    assert.equal('scene.lua:5: node "emit1": source is a node, whose points :spawn takes; write ' .. call,
+    assert.equal('scene.lua:5: node "emit1": source is a node; :spawn emits from the points of a node: write ' .. call,
       refused(emit))
   end
 
@@ -435,7 +435,7 @@ return rapid.create {} :emit(given) :solve {}]]
     local message = scene.error [[
 local stars = rapid.create { points = two } :solve {}
 return rapid.create {} :emit { source = function() return stars end, count = 1 } :solve {}]]
-    assert.matches("source is a node, whose points are parents; give it to spawn", message, 1, true)
+    assert.matches("source is a node; to emit from its points, use", message, 1, true)
   end)
 end)
 

@@ -178,8 +178,8 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :attribut
   :points("ask", function(p) %s end) :solve {}]]):format(kernel), shape)
     end
     assert.matches('the mesh has no attribute "heet"', fault 'p.heat = square:closest(p.P, "heet")', 1, true)
-    assert.matches("takes the name of an attribute, of a mesh, not \"heat\"",
+    assert.matches("needs the name of an attribute of a mesh, not \"heat\"",
       fault 'p.heat = ball:closest(p.P, "heat")', 1, true)
-    assert.matches("shape:closest(P) takes a vec3, not 3", fault "p.heat = square:closest(3).x", 1, true)
+    assert.matches("shape:closest(P) needs a vec3, not 3", fault "p.heat = square:closest(3).x", 1, true)
   end)
 end)

@@ -74,7 +74,7 @@ TEST_CASE("write needs a file", "[write]")
 {
     CHECK(error_of([] {
               NodeTest("write", {{"file", ""}});
-          }) == "file = \"\" names no file; give a pattern such as \"points.####.vdb\"");
+          }) == "file = \"\" is empty; give a pattern such as \"points.####.vdb\"");
 }
 
 }  // namespace rapid

@@ -55,7 +55,7 @@ TEST_CASE("a run is asked to end where it takes more than its budget, and once m
     take(leaves, 130, true);
     CHECK(leaves.exceeded == 1);
     CHECK(leaves.overrun == 0);
-    CHECK_THAT(leaves.message, Contains("the run takes") && Contains("or set memory"));
+    CHECK_THAT(leaves.message, Contains("the run uses") && Contains("or set memory"));
     take(stays, 130, false);
     CHECK(stays.exceeded == 1);
     CHECK(stays.overrun == 1);

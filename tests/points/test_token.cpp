@@ -24,7 +24,7 @@ TEST_CASE("equal texts are one token, others are others, and the empty text is 0
     CHECK(Token().text() == "");
     CHECK(token_of_number(leaf.number) == leaf);
     CHECK_THAT(error_of([] { token_of_number(4'000'000'000); }),
-               Catch::StartsWith("no text has the number 4000000000"));
+               Catch::StartsWith("no string has the number 4000000000"));
 }
 
 TEST_CASE("a text is UTF-8 without zeros", "[points][token]")
@@ -36,7 +36,7 @@ TEST_CASE("a text is UTF-8 without zeros", "[points][token]")
          {"a\0b"s, "\x80"s, "\xc3"s, "\xc0\x80"s, "\xc1\xbf"s, "\xe0\x9f\xbf"s, "\xed\xa0\x80"s, "\xe2\x82"s,
           "\xf0\x8f\xbf\xbf"s, "\xf4\x90\x80\x80"s, "\xf8\x88\x80\x80\x80"s, "\xc3("s, "\xff"s}) {
         CAPTURE(wrong);
-        CHECK_THAT(error_of([&] { token_of(wrong); }), Catch::Contains("is no UTF-8 without zeros"));
+        CHECK_THAT(error_of([&] { token_of(wrong); }), Catch::Contains("is not valid UTF-8 without zero bytes"));
     }
 }
 
@@ -63,8 +63,8 @@ TEST_CASE("texts without end are an error of memory, not the end of the process"
     const std::string error = error_of([] {
         for (int k = 0; k < 10'000'000; ++k) token_of(fmt::format("one of too many texts, {}", k));
     });
-    CHECK_THAT(error, Catch::Contains("different texts of attributes would take") &&
-                          Catch::Contains("tell points apart by numbers"));
+    CHECK_THAT(error, Catch::Contains("different strings in attributes would need") &&
+                          Catch::Contains("use numbers to tell points apart"));
 }
 
 TEST_CASE("the list of types gives columns, values, names and numbers of components", "[points][token]")

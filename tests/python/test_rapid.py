@@ -259,7 +259,7 @@ class Scenes(unittest.TestCase):
                                 (lambda P: P[:, 1] + 1j, TypeError), (lambda P: None, TypeError)):
             scene = rapid.Scene("floor.lua", text=text,
                                 objects={"floor": rapid.Shape(lambda P, gradient, of=distance: of(P))})
-            with self.assertRaisesRegex(wrong, "the distance is of"):
+            with self.assertRaisesRegex(wrong, "the distance has the"):
                 scene.advance_to(3)
 
     def test_paths_are_a_list(self):

@@ -28,8 +28,9 @@ TEST_CASE("of warnings that differ in numbers ten are told, and the last of the 
         if (frame == 5) reported += warnings.add("node \"c\": 1", frame);
     }
     CHECK(reported == 12);
-    CHECK(warnings.suppressed() ==
-          std::vector<std::string>{"990 more of this kind, the last in frame 1000: node \"a\": off by 1000 m"});
+    CHECK(
+        warnings.suppressed() ==
+        std::vector<std::string>{"990 more warnings of this kind, the last in frame 1000: node \"a\": off by 1000 m"});
 }
 
 TEST_CASE("what was told is not told again, after others of its kind either", "[report]")
@@ -47,5 +48,5 @@ TEST_CASE("kinds of warnings without end are counted", "[report]")
     std::size_t reported = 0;
     for (int i = 0; i < 5000; ++i) reported += warnings.add(fmt::format("mesh \"{}\" is open", i), i);
     CHECK(reported == FrameWarnings::max_kinds);
-    CHECK(warnings.suppressed() == std::vector<std::string>{"4000 more of other kinds"});
+    CHECK(warnings.suppressed() == std::vector<std::string>{"4000 more warnings of other kinds"});
 }

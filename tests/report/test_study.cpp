@@ -72,7 +72,7 @@ TEST_CASE("the order is the slope of log error over log step, of rows above roun
     CHECK_FALSE(lines[2].order);
 }
 
-TEST_CASE("a knob that is no whole number is the step's own size", "[study]")
+TEST_CASE("a knob that is not a whole number is the step's own size", "[study]")
 {
     Study study;
     study.name = "cells";
@@ -128,11 +128,11 @@ TEST_CASE("a sweep whose step is in doubt, or with two equal rows, is refused", 
     Study study;
     study.sweep = {{"a", {1.0, 2.0}}, {"b", {1.0, 2.0}}};
     CHECK(complaint([&] { study.complete(); }) ==
-          "the knobs a, b are all left for the step along a line; name all but one in lines: lines = \"a\"");
+          "a line can vary only one of the knobs a, b; name the others in lines: lines = \"a\"");
     study.lines = {"c"};
     CHECK(complaint([&] { study.complete(); }) == "lines: the sweep has no knob \"c\"");
     study.sweep = {{"a", {1.0, 1.0}}};
-    CHECK(complaint([&] { study.complete(); }) == "sweep: a has the value 1 twice");
+    CHECK(complaint([&] { study.complete(); }) == "sweep: a has the value 1 twice; remove one");
 }
 
 TEST_CASE("a knob of texts alone gives a line to each value, without order", "[study]")

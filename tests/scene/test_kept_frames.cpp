@@ -61,7 +61,7 @@ TEST_CASE("a frame of another key, and a file that is none, are errors that name
     good(SceneInside::save(frame, folder / "frame", "one"));
     const SceneError other = SceneInside::load_frame(folder / "frame", "two").error();
     CHECK(other.kind == SceneError::WrongCall);
-    CHECK(other.text() == (folder / "frame").string() + ": it is of another run");
+    CHECK(other.text() == (folder / "frame").string() + ": it belongs to another run");
     CHECK_FALSE(SceneInside::load_frame(folder / "frame", ""));
     CHECK_FALSE(SceneInside::load_frame(folder / "missing", ""));
     CHECK_FALSE(SceneInside::load_frame(folder.write("text", "no frame"), ""));
@@ -86,7 +86,8 @@ TEST_CASE("a snapshot with a key is read by it alone", "[kept]")
     good(SceneInside::save(good(scene.save()), folder / "snapshot", "one"));
     CHECK(good(SceneInside::load_snapshot(folder / "snapshot", "one")).frame() == 2);
     CHECK(good(SceneSnapshot::read(folder / "snapshot")).frame() == 2);
-    CHECK_THAT(SceneInside::load_snapshot(folder / "snapshot", "two").error().text(), Contains("it is of another run"));
+    CHECK_THAT(SceneInside::load_snapshot(folder / "snapshot", "two").error().text(),
+               Contains("it belongs to another run"));
 }
 
 TEST_CASE("points alone are those of their frame, and have no statistics", "[kept]")

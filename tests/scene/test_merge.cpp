@@ -127,12 +127,12 @@ TEST_CASE("parts that are no whole are refused before anything is written", "[me
         CHECK(merged.error().kind == SceneError::WrongCall);
         return merged.error().text();
     };
-    CHECK_THAT(fault({}, whole), Contains("no parts are named"));
+    CHECK_THAT(fault({}, whole), Contains("no parts are given"));
     CHECK_THAT(fault({parts.folder / "x_part1of2.####.csv"}, whole), Contains("missing is part 2of2"));
     CHECK_THAT(fault({parts.folder / "y_part{part}.####.csv"}, whole),
-               Contains("no complete part of this name is there"));
-    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.####.png"), Contains("holds no points"));
-    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.csv"), Contains("several frames go to one file"));
+               Contains("there is no complete part with this name"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.####.png"), Contains("store points"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.csv"), Contains("several frames would go into one file"));
     CHECK_THAT(fault({parts.all()}, parts.folder / "x_part1of2.####.csv"), Contains("would replace"));
     std::filesystem::remove(parts.folder / "x_part2of2.0003.csv");
     CHECK_THAT(fault({parts.all()}, whole), Contains("a frame is missing: 3"));
@@ -187,7 +187,7 @@ TEST_CASE("a merge refuses files that are not those that their part has written"
         REQUIRE_FALSE(merged);
         CHECK(merged.error().kind == SceneError::FailedFrame);
         CHECK_THAT(merged.error().text(),
-                   Contains("x_part2of2.0002.csv") && Contains("is not the file that the part has written"));
+                   Contains("x_part2of2.0002.csv") && Contains("was changed after the part wrote it"));
         CHECK_FALSE(std::filesystem::exists(parts.folder / "whole.0002.csv"));
     }
 }

@@ -159,7 +159,7 @@ TEST_CASE("a program's shape without an outside ends no run: its points count as
     const SceneFrame now = good(scene.advance_to(4));
     CHECK(now.size() == 2);
     REQUIRE(now.warnings().size() == 1);
-    CHECK_THAT(now.warnings()[0], Contains("points are in a shape, with no way out"));
+    CHECK_THAT(now.warnings()[0], Contains("some points can't leave a shape"));
 }
 
 TEST_CASE("a setting puts a program's shape into the place of the scene's", "[offers]")
@@ -180,7 +180,7 @@ TEST_CASE("what is not offered is an error that says what is", "[offers]")
                Contains("offers.lua:3") && Contains("did you mean \"ball\""));
     CHECK_THAT(error_of(rain("rapid.host 'nothing'"), options).message, Contains("it offers ball, other"));
     CHECK_THAT(error_of(rain("rapid.host 'ball'"), {}).message, Contains("offers no objects"));
-    CHECK_THAT(error_of(rain("rapid.host(3)"), options).message, Contains("takes the name"));
+    CHECK_THAT(error_of(rain("rapid.host(3)"), options).message, Contains("needs the name"));
 }
 
 TEST_CASE("a program's force is Rapid's own law", "[offers]")
@@ -372,7 +372,7 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     CHECK_THAT(refused("cloud", points), Contains("it must be of vec3"));
     const std::uint32_t unknown[] = {4'000'000'000};
     points.columns = {{"P", ColumnType::Vec3, values}, {"name", ColumnType::String, unknown}};
-    CHECK_THAT(refused("cloud", points), Contains("P is nan") || Contains("no text has the number 4000000000"));
+    CHECK_THAT(refused("cloud", points), Contains("P is nan") || Contains("no string has the number 4000000000"));
     points.columns = {{"mass", ColumnType::Vec3, values}};
     CHECK_THAT(refused("cloud", points), Contains("mass"));
 
@@ -391,7 +391,7 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     CHECK_THAT(refused_node(node), Contains("no function"));
     node = pull();
     node.writes = {{"heat", ColumnType::Float}};
-    CHECK_THAT(refused_node(node), Contains("a force writes no columns"));
+    CHECK_THAT(refused_node(node), Contains("a force can't write columns"));
     node = pull();
     node.reads = {{"mass", ColumnType::Vec3}};
     CHECK_THAT(refused_node(node), Contains("mass"));
@@ -414,10 +414,10 @@ TEST_CASE("a callback that throws, writes NaN or past its array's end is an erro
     CHECK(threw.kind == SceneError::FailedFrame);
     CHECK(threw.node == "pull1");
     CHECK_THAT(threw.message, Contains("pull") && Contains("broken"));
-    CHECK_THAT(error_with([](const HostCall&) { throw 3; }).message, Contains("no std::exception"));
+    CHECK_THAT(error_with([](const HostCall&) { throw 3; }).message, Contains("not a std::exception"));
     CHECK_THAT(error_with([](const HostCall& now) { now.acceleration[4] = NAN; }).message, Contains("nan at place 1"));
     CHECK_THAT(error_with([](const HostCall& now) { now.acceleration[3 * now.count] = 1; }).message,
-               Contains("past the end"));
+               Contains("beyond the end"));
 
     HostShape shape = ball({0, 1, 0}, 0.5);
     shape.distance = [](std::size_t n, const double*, double* phi, double*) { std::fill_n(phi, n, NAN); };

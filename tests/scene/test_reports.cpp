@@ -76,7 +76,7 @@ TEST_CASE("a plan tells what it keeps and leaves out", "[reports]")
     CHECK_THAT(report.json, StartsWith(R"({"nodes":[{"name":"create2","type":"create","kept":true,)"));
     CHECK_THAT(report.json, Contains(R"("name":"spare","type":"create","kept":false)"));
     CHECK_THAT(report.json, Contains(R"({"name":"heat","simulation":"create2","kept":true,"bytes_per_point":4,)"));
-    CHECK_THAT(report.text, StartsWith("KEPT\n nodes\n") && Contains("LEFT OUT") && Contains("spare"));
+    CHECK_THAT(report.text, StartsWith("KEPT\n nodes\n") && Contains("PRUNED") && Contains("spare"));
 }
 
 TEST_CASE("the points behind a node are those before it, changed by its formula", "[reports]")
@@ -115,7 +115,7 @@ TEST_CASE("points behind no node, or before the first frame, are an error", "[re
         return points.error();
     };
     CHECK_THAT(fault("worm", 2).message, Contains("did you mean \"warm\""));
-    CHECK_THAT(fault("spare", 2).message, Contains("left out"));
+    CHECK_THAT(fault("spare", 2).message, Contains("is pruned"));
     CHECK_THAT(fault("warm", 0).message, Contains("before the scene's first"));
     CHECK(fault("worm", 2).kind == SceneError::WrongCall);
     const SceneError late = fault("solve1", 5);
@@ -148,7 +148,7 @@ TEST_CASE("the graph of a scene has its nodes, and an edge back from Solve", "[r
     CHECK_THAT(good(scene.graph(GraphForm::Svg)), Contains("<svg") && Contains("down"));
     const std::string json = good(scene.graph(GraphForm::Json));
     CHECK_THAT(json, Contains(R"("name":"down","type":"gravity")") && Contains(R"("x":)"));
-    CHECK_THAT(json, Contains(R"("why":"no output comes from it")"));
+    CHECK_THAT(json, Contains(R"("why":"leads to no output")"));
     CHECK(scene.graph(static_cast<GraphForm>(7)).error().kind == SceneError::WrongCall);
     CHECK(good(scene.advance()).number() == 1);  // inspection does not disturb the scene
 }
@@ -174,7 +174,7 @@ TEST_CASE("a life has birth, contacts and death at the moments of the formula", 
     REQUIRE(contact != std::string::npos);
     CHECK(std::stod(json.substr(contact + 23)) == Approx(std::sqrt(2 / 9.81)).epsilon(1e-6));
     CHECK_THAT(json, Contains(R"("death":{"frame":13,"time":0.5)"));
-    CHECK_THAT(trace.lives.text, StartsWith("point 0 of create1\n") && Contains("its life was over"));
+    CHECK_THAT(trace.lives.text, StartsWith("point 0 of create1\n") && Contains("its life ended"));
 }
 
 TEST_CASE("only the frames that are asked for are told", "[reports]")
@@ -274,7 +274,7 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
     REQUIRE_FALSE(scene);
     CHECK(scene.error().kind == SceneError::TooLong);
     CHECK(reported >= 1);
-    CHECK_THAT(text, Contains("runs for more than 0.2 s"));
+    CHECK_THAT(text, Contains("ran for more than 0.2 s"));
 }
 
 TEST_CASE("a program is told of the files that a scene reads, before they are read", "[reports]")

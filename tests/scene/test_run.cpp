@@ -104,7 +104,7 @@ void check_unprepared(const RunOptions& requested, const std::string& message,
     REQUIRE_FALSE(prepared);
     CHECK(prepared.error().kind == kind);
     CHECK_THAT(prepared.error().text(), Contains(message));
-    CHECK_THAT(run.prepare().error().message, Contains("make another one"));
+    CHECK_THAT(run.prepare().error().message, Contains("make a new one"));
     CHECK_FALSE(run.run());
     CHECK(run.first_frame() == 1);
 }
@@ -294,7 +294,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 1000 }
 
     const Result<RunOutcome> again = run.run();
     REQUIRE_FALSE(again);
-    CHECK_THAT(again.error().message, Contains("the run has been computed"));
+    CHECK_THAT(again.error().message, Contains("the run is already complete"));
 }
 
 TEST_CASE("a run is cancelled from another thread", "[run]")
@@ -359,14 +359,14 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     wrong([](RunOptions& o) { o.sample = 0; }, "sample = 0");
     wrong([](RunOptions& o) { o.sample = NAN; }, "sample = nan");
     wrong([](RunOptions& o) { o.cache.every = -1; }, "every = -1");
-    wrong([](RunOptions& o) { o.cache.again = true; }, "again says what to do with a cache");
-    wrong([](RunOptions& o) { o.claims = "claims"; }, "claims are known by the file of statistics");
-    wrong([](RunOptions& o) { o.files.pictures.camera.position = {1, NAN, 0}; }, "must be numbers that are finite");
+    wrong([](RunOptions& o) { o.cache.again = true; }, "again replaces the contents of a cache");
+    wrong([](RunOptions& o) { o.claims = "claims"; }, "claims need a statistics file");
+    wrong([](RunOptions& o) { o.files.pictures.camera.position = {1, NAN, 0}; }, "must be finite");
     wrong(
         [](RunOptions& o) {
             o.files.pictures.camera.position = o.files.pictures.camera.target = {1, 2, 3};
         },
-        "the camera looks at its own place");
+        "the camera\'s position and target are equal");
     wrong([](RunOptions& o) { o.files.pictures.size = {0, 10}; }, "a picture of 0x10");
     wrong([](RunOptions& o) { o.files.pictures.size.width = 1 << 20; }, "a picture of 1048576x720");
     wrong([](RunOptions& o) { o.files.pictures.camera.fov = 180; }, "fov = 180");
@@ -379,7 +379,8 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     cached.cache.folder = folder / "cache";
     const Result<SceneRun> offering = SceneRun::make("cloud.lua", scene, cached);
     REQUIRE_FALSE(offering);
-    CHECK_THAT(offering.error().message, Contains("a cache does not know when what the program offers has changed"));
+    CHECK_THAT(offering.error().message,
+               Contains("a cache can't see changes of the objects and nodes that the program offers"));
     CHECK(fs::is_empty(folder.path()));
 }
 
@@ -394,7 +395,7 @@ TEST_CASE("what is wrong with a scene and its files is found before the first fr
     };
     wrong([](RunOptions& o) { o.text = "local rapid = require 'rapid'\nreturn rapid.creat {}"; }, "cloud.lua:2: ");
     wrong([](RunOptions& o) { o.text = std::nullopt; }, "cloud.lua");
-    wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.csv"}; }, "several frames go to one file");
+    wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.csv"}; }, "several frames would go into one file");
     wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.####.xyz"}; }, "xyz");
     wrong([&](RunOptions& o) { o.files.outputs = {folder / "cloud.####.csv:heet"}; }, "heet");
     wrong([&](RunOptions& o) { o.files.outputs.push_back(o.files.outputs.front()); }, "written twice");
@@ -412,7 +413,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :conta
     SceneRun run = made(right);
     CHECK_THAT(run.run().error().message, Contains("call prepare() first"));
     good(run.prepare());
-    CHECK_THAT(run.prepare().error().message, Contains("the run is prepared"));
+    CHECK_THAT(run.prepare().error().message, Contains("the run is already prepared"));
 }
 
 TEST_CASE("advice that takes too long is none, and leaves a scene that runs", "[run]")

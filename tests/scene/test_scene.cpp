@@ -462,7 +462,7 @@ TEST_CASE("a call from a callback is refused, and what a callback throws is an e
     Scene scene = opened(cloud, options);
     running = &scene;
     CHECK_THAT(scene.advance_to(8).error().message, Contains("progress") && Contains("no more"));
-    CHECK_THAT(scene.advance_to(8).error().message, Contains("no std::exception"));
+    CHECK_THAT(scene.advance_to(8).error().message, Contains("not a std::exception"));
     running = &scene;
     CHECK(good(scene.advance()).number() == 5);
 }
@@ -528,7 +528,7 @@ TEST_CASE("limits of memory are errors of the scene that has them", "[scene]")
     SceneOptions narrow;
     narrow.memory = std::uint64_t{64} << 20;
     const SceneError process = Scene::open_text("grid.lua", grid, narrow).error();
-    CHECK_THAT(process.message, Contains("would take about"));
+    CHECK_THAT(process.message, Contains("would need about"));
     CHECK(process.kind == SceneError::OutOfMemory);
     good(Scene::open_text("grid.lua", grid));
 }
@@ -562,7 +562,7 @@ TEST_CASE("an error that a script catches and raises again keeps its kind", "[sc
             .error();
     };
     const SceneError memory = error("rapid.points.grid { size = {10, 10, 10}, spacing = 0.05 }");
-    CHECK_THAT(memory.message, Contains("again: ") && Contains("would take about"));
+    CHECK_THAT(memory.message, Contains("again: ") && Contains("would need about"));
     CHECK(memory.kind == SceneError::OutOfMemory);
     CHECK(error("rapid.points.grid { size = {10, 10, 10}, spacing = -1 }").kind == SceneError::WrongScene);
 }
@@ -582,7 +582,7 @@ TEST_CASE("a scene whose frames take more memory than it has is an error, and go
     options.set = {{"large", 1e6}};
     Scene scene = opened(growing, options);
     const SceneError error = scene.advance_to(9).error();
-    CHECK_THAT(error.message, Contains("the run takes") && Contains("or set memory"));
+    CHECK_THAT(error.message, Contains("the run uses") && Contains("or set memory"));
     CHECK(error.kind == SceneError::OutOfMemory);
     CHECK(error.node == "d");
     good(scene.set("large", 1.0));
@@ -697,7 +697,7 @@ TEST_CASE("a file that can't be read is an error that names it", "[scene]")
         return read.error().text();
     };
     CHECK_THAT(fault(folder / "nothing.bgeo"), StartsWith((folder / "nothing.bgeo").string()));
-    CHECK_THAT(fault(folder / "nothing.png"), Contains(".png file holds no points"));
+    CHECK_THAT(fault(folder / "nothing.png"), Contains("points can't be read from a .png file"));
     CHECK_THAT(fault(folder / "nothing.xyz"), Contains(".bgeo") && Contains(".csv"));
     CHECK_THAT(fault(""), Contains(".bgeo"));
     CHECK_THAT(fault(folder.write("torn.bgeo", "BgeoV")), Contains("torn.bgeo"));

@@ -25,10 +25,10 @@ TEST_CASE("a film that can't be is refused before its first picture", "[film]")
         return film.error().message;
     };
     CHECK(fault("film.avi") == "a film can't be a \".avi\"; it must be .mp4, .webm or .gif");
-    CHECK_THAT(fault("film.####.gif"), Contains("is a pattern of several"));
-    CHECK_THAT(fault("film_{output}.gif"), Contains("is a pattern of several"));
-    CHECK(fault("film.gif", {0, {64, 48}, {}}) == "0 frames a second; a film has from 1 to 1000");
-    CHECK(fault("film.gif", {std::nan(""), {64, 48}, {}}) == "nan frames a second; a film has from 1 to 1000");
+    CHECK_THAT(fault("film.####.gif"), Contains("is a pattern for several"));
+    CHECK_THAT(fault("film_{output}.gif"), Contains("is a pattern for several"));
+    CHECK(fault("film.gif", {0, {64, 48}, {}}) == "0 frames per second; a film can have from 1 to 1000");
+    CHECK(fault("film.gif", {std::nan(""), {64, 48}, {}}) == "nan frames per second; a film can have from 1 to 1000");
     CHECK_THAT(fault("film.gif", {24, {0, 48}, {}}), Contains("each side must be from 1 to 16384 pixels"));
     CHECK(fault("film.mp4", {24, {63, 48}, {}}) == "a .mp4 film of 63 x 48 can't be made; both edges must be even");
 }
@@ -40,7 +40,7 @@ TEST_CASE("a film has its name when it is finished, and is not there where it is
         "local rapid = require 'rapid'\nreturn rapid.create { points = rapid.points.grid {} } :gravity {} :solve {}");
     {
         SceneFilm film = good(SceneFilm::begin(folder / "film.gif", {24, {32, 24}, {}}));
-        CHECK(film.finish().error().message == "the film has no pictures; add() some first");
+        CHECK(film.finish().error().message == "the film has no pictures; call add() first");
         for (int k = 1; k <= 3; ++k) {
             const SceneFrame frame = good(scene.advance());
             good(film.add(frame, good(scene.shapes(frame.number()))));

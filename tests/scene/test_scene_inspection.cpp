@@ -146,11 +146,11 @@ TEST_CASE("a wrong frame or snapshot for the points behind nodes is refused", "[
     good(scene.advance_to(3));
     const SceneSnapshot third = good(scene.save());
     CHECK_THAT(SceneInside::points_after_nodes(scene, 3, third).error().message,
-               Contains("behind frame 3; frame 3 takes one"));
+               Contains("the snapshot is after frame 3; frame 3 needs an earlier one"));
     Scene other = opened("return rapid.create {} :solve {}");
     good(other.advance());
     CHECK_THAT(SceneInside::points_after_nodes(scene, 3, good(other.save())).error().message,
-               Contains("of another graph"));
+               Contains("to another graph"));
     CHECK(good(scene.advance()).number() == 4);
 }
 
@@ -190,7 +190,7 @@ TEST_CASE("a point of a merge that is not known by its place is an error that sa
 {
     Scene twice = opened(std::string(merged) + "return chain('a', 0):merge(chain('b', 0))");
     CHECK_THAT(SceneInside::origin(twice, good(twice.advance_to(2)), 0).error().message,
-               Contains("several points are at this place"));
+               Contains("several points have this position"));
     Scene moved =
         opened(std::string(merged) +
                "return chain('a', 0):merge(chain('b', 7)) :points('up', function(p) p.P = p.P + vec3(0, 0.3, 0) end)");

@@ -80,8 +80,8 @@ TEST_CASE("a scene that a test runs is stopped when its script takes too long, a
     good(run_scene_tests(file, options, reported.listener()));
     CHECK(reported.lines() ==
           std::vector<std::string>{"started ends", "failed ends", "started goes on", "passed goes on"});
-    CHECK_THAT(reported.events[1].message, Contains("runs for more than 0.2 s"));
-    CHECK_THAT(late, Contains("runs for more than 0.2 s"));
+    CHECK_THAT(reported.events[1].message, Contains("ran for more than 0.2 s"));
+    CHECK_THAT(late, Contains("ran for more than 0.2 s"));
 }
 
 TEST_CASE("a file that can't be run is broken, and wrong options are refused", "[tests]")

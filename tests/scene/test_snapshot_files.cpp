@@ -68,7 +68,7 @@ TEST_CASE("a file of a snapshot is described", "[snapshots]")
     CHECK_THAT(report.text, StartsWith(file + ": a snapshot, ") && Contains("of cloud.lua after frame 3\n"));
 }
 
-TEST_CASE("a snapshot of another graph is refused, from a file too", "[snapshots]")
+TEST_CASE("a snapshot to another graph is refused, from a file too", "[snapshots]")
 {
     const test::TemporaryFolder folder;
     Scene scene = opened();
@@ -79,7 +79,7 @@ TEST_CASE("a snapshot of another graph is refused, from a file too", "[snapshots
     const Result<Done> restored = other.restore(read);
     REQUIRE_FALSE(restored);
     CHECK(restored.error().kind == SceneError::WrongCall);
-    CHECK_THAT(restored.error().message, Contains("of another graph"));
+    CHECK_THAT(restored.error().message, Contains("to another graph"));
     CHECK(good(other.advance()).number() == 1);
 }
 

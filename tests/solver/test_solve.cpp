@@ -187,8 +187,7 @@ TEST_CASE("a point that is not finite stops the step, and is named", "[solve]")
 
     CHECK(solve_error(scene) ==
           "point 4500, frame 31: v is {0, " + text +
-              ", 1} before the step; a node before this one made it so; it has P = {0, 1, 0}, v = {0, " + text +
-              ", 1}");
+              ", 1} before the step; correct the node before this one; it has P = {0, 1, 0}, v = {0, " + text + ", 1}");
 }
 
 TEST_CASE("points at rest on which nothing acts stay, without a write", "[solve]")
@@ -206,7 +205,7 @@ TEST_CASE("points at rest on which nothing acts stay, without a write", "[solve]
         positions[4500] = {1, nan, 3};
         scene.points = points(positions);
         CHECK(solve_error(scene) ==
-              "point 4500, frame 4: P is {1, nan, 3} before the step; a node before this one made it so; it has P = "
+              "point 4500, frame 4: P is {1, nan, 3} before the step; correct the node before this one; it has P = "
               "{1, nan, 3}, v = {0, 0, 0}");
     }
     SECTION("and a force moves them")

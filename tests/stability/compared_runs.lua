@@ -27,7 +27,7 @@ local function is_error_of_node(message)
 end
 
 -- Removes the amount of free memory from a message, because it differs between runs.
-local function comparable(message) return (message:gsub(", and %S+ %wiB are free of %S+ %wiB", "")) end
+local function comparable(message) return (message:gsub(", but only %S+ %wiB of %S+ %wiB are free", "")) end
 
 local function outcome_of(way)
   local log = folder:read("ways/" .. way.name .. ".log")

@@ -201,7 +201,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {} 
         .. "shape = rapid.levelset.sphere { radius = 1, voxel = 0.1 } } :solve {}"):format(radius))
     end
     local text = 'scene.lua:1: node "collide1": points with a radius of %d m need a band of %d voxels of 0.1 m '
-      .. "around its level set, some %s in all; at most 1.3e+08 fit: give it a larger voxel"
+      .. "around its level set, about %s voxels; at most 1.3e+08 are possible: give it a larger voxel"
     assert.equal(text:format(400, 4002, "5.2e+11"), message(400))
     assert.equal(text:format(55, 552, "1.4e+09"), message(55))
   end)
@@ -318,7 +318,7 @@ local set = rapid.points.from { P = {{0, 1, 0}, {2, 1, 0}}, heat = {1, 7}, mass 
         { 'node "gravity1": g', "frame 4" },
       [':distance { within = 3 } ' ..
         ':attract { falloff = -60, strength = function(f) return f.number == 4 and 3e38 or 0 end } :solve {}'] =
-        { 'node "solve1": point 1, frame 4: P became {-inf, -inf, 0} in a sub-step', had },
+        { 'node "solve1": point 1, frame 4: P became {-inf, -inf, 0} in a substep', had },
     } do
       local result, folder = failing(chain)
       assert.equal(1, result.status, chain)

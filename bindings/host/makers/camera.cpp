@@ -24,7 +24,7 @@ struct MakeCamera {
     ObjectPtr make(MakeContext&) const
     {
         if (position && target && *position == *target)
-            throw Error("position and target are the same place; the camera must be elsewhere than what it looks at");
+            throw Error("position and target are equal; the camera needs a direction");
         auto camera = std::make_shared<CameraObject>();
         camera->position = position;
         camera->target = target;

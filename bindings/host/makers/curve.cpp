@@ -49,10 +49,8 @@ public:
         order_.last = files_.rbegin()->first;
         for (std::int64_t frame = order_.first; frame <= order_.last; ++frame)
             if (!files_.count(static_cast<int>(frame)))
-                throw Error(
-                    fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to "
-                                "{}",
-                                frame, name_, order_.first, order_.last));
+                throw Error(fmt::format("frame {} of \"{}\" is missing; each frame from {} to {} needs a file", frame,
+                                        name_, order_.first, order_.last));
         first_ = read(static_cast<int>(order_.first));
     }
     const CurvesPtr& first() const { return first_; }
@@ -82,8 +80,8 @@ private:
         CurvesPtr curves = read_curves(files_.at(frame), closed_);
         if (first_ && curves->lines()->after != first_->lines()->after)
             throw Error(
-                fmt::format("\"{}\" changes at frame {}: it has {} points there, and {} at frame {}, or other lines "
-                            "between them; a curve that deforms keeps its points",
+                fmt::format("\"{}\" changes at frame {}: it has {} points there and {} at frame {}, or other lines "
+                            "between them; a deforming curve must keep its points",
                             name_, frame, curves->points().size(), first_->points().size(), order_.first));
         return curves;
     }

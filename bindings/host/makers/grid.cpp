@@ -41,7 +41,7 @@ struct GridFromPoints : PointsOfGrid {
             std::vector<std::string> vectors;
             for (const auto& [name, any] : set.columns())
                 if (type_of(any) == AttributeType::Vec3) vectors.push_back(name);
-            throw Error(fmt::format("attribute = \"{}\": the points have no vec3 of that name{}", attribute,
+            throw Error(fmt::format("attribute = \"{}\": the points have no vec3 with this name{}", attribute,
                                     did_you_mean(attribute, vectors)));
         }
         std::vector<Vec3f> vectors(set.size());
@@ -76,7 +76,7 @@ struct WriteGrids {
                 throw Error(fmt::format("{} = {}; it must be a fog or a grid of vectors", name, describe(value)));
             objects[name] = *object;
         }
-        if (objects.empty()) throw Error("there is no grid to write; give { NAME = grid }");
+        if (objects.empty()) throw Error("there is no grid to write; give a table { NAME = grid }");
         require_vdb(path);
         if (context.may_write) write_grids(path, objects);
         return objects.begin()->second;

@@ -47,8 +47,7 @@ private:
         const auto* detailed = dynamic_cast<const DetailedMesh*>(&mesh);
         if (!detailed) return;
         for (const std::string& what : detailed->skipped)
-            context.warnings.push_back(
-                fmt::format("rapid.mesh.read: \"{}\": {} can't be read, and is left out", mesh.name, what));
+            context.warnings.push_back(fmt::format("rapid.mesh.read: \"{}\": not read: {}", mesh.name, what));
     }
 };
 RAPID_MAKER(ReadMesh);
@@ -107,7 +106,7 @@ struct GridMesh {
     ObjectPtr make(MakeContext&) const
     {
         const double x = size.empty() ? 1 : size[0], z = size.empty() ? 1 : size.back();
-        if (size.size() > 2 || !(x > 0) || !(z > 0)) throw Error("size is two lengths above 0, {x, z}");
+        if (size.size() > 2 || !(x > 0) || !(z > 0)) throw Error("size must be two lengths above 0, {x, z}");
         return make_grid(x, z, divisions, center);
     }
 };
@@ -139,8 +138,7 @@ std::map<std::string, Mesh::VertexValues> vertex_values(const std::map<std::stri
         const auto& name = named.first;
         const auto& list = named.second;
         if (name == "P" || name == "v" || name == "id")
-            throw Error(
-                fmt::format("values: {} is no attribute of vertices that births could have; take another name", name));
+            throw Error(fmt::format("values: newborn points can't have an attribute {}; choose another name", name));
         const Table* table = list.table();
         if (!table || table->list.size() != vertices)
             throw Error(fmt::format("values: {} has {}; it must be a list of {} values, one for each of `points`", name,
@@ -184,8 +182,8 @@ struct MeshFrom {
             std::vector<std::int32_t>& face = indices.emplace_back();
             for (const double corner : faces[f]) {
                 if (!(corner >= 1 && corner <= static_cast<double>(points.size())) || corner != std::floor(corner))
-                    throw Error(fmt::format("face {} has the corner {}; corners are whole, from 1 to {}", f + 1, corner,
-                                            points.size()));
+                    throw Error(fmt::format("face {} has the corner {}; a corner must be a whole number from 1 to {}",
+                                            f + 1, corner, points.size()));
                 face.push_back(static_cast<std::int32_t>(corner) - 1);
             }
         }

@@ -41,7 +41,7 @@ struct Rotate {
     }
     ObjectPtr make(MakeContext&) const
     {
-        if (axis.norm() == 0) throw Error("the axis has length 0; it needs a direction");
+        if (axis.norm() == 0) throw Error("the axis has length 0; give it a direction");
         const Turn turn{axis.normalized(), angle};
         return constant_motion({Vec3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn.axis))}, Turns{turn});
     }

@@ -60,8 +60,7 @@ private:
         const SkippedContents skipped;
         PointSet points = read_points(file);
         for (const std::string& what : skipped.list())
-            context.warnings.push_back(
-                fmt::format("rapid.points.read: \"{}\": {} can't be read, and is left out", file.string(), what));
+            context.warnings.push_back(fmt::format("rapid.points.read: \"{}\": not read: {}", file.string(), what));
         if (!has_ids(points)) return numbered(std::move(points));
         auto object = std::make_shared<PointsObject>();
         object->points = std::move(points);
@@ -98,13 +97,13 @@ struct GridPoints {
             throw Error(fmt::format("size = {}: each edge must be at least 0", describe(Value(size))));
         const double nx = along(0), ny = along(1), nz = along(2);
         if (!(nx * ny * nz <= 2147483648.0))
-            throw Error(fmt::format("size {} at spacing {} would make {:.3g} points; at most 2^31 can be",
+            throw Error(fmt::format("size {} with spacing {} would make {:.3g} points; at most 2^31 are possible",
                                     describe(Value(size)), spacing, nx * ny * nz));
         constexpr double bytes_per_point =
             2 * (sizeof(Vec3f) + sizeof(Vec3f) + sizeof(std::int64_t));  // with the state
         if (const double bytes = nx * ny * nz * bytes_per_point; !fits_in_memory(bytes))
             throw memory_exceeded(
-                fmt::format("size {} at spacing {}: {:.3g} points", describe(Value(size)), spacing, nx * ny * nz),
+                fmt::format("size {} with spacing {}: {:.3g} points", describe(Value(size)), spacing, nx * ny * nz),
                 bytes, "give a larger spacing");
         PointSet points;
         points.append(static_cast<std::size_t>(nx * ny * nz));
@@ -140,10 +139,10 @@ struct PointsFrom {
         points.P() = Column<Vec3f>(P);
         for (const auto& [name, value] : columns) {
             if (name == "P") continue;
-            if (name == "id") throw Error("id can't be given; ids count from 0 in order");
+            if (name == "id") throw Error("id can't be given; ids count from 0");
             const Table* table = value.table();
             if (!table || table->list.size() != P.size())
-                throw Error(fmt::format("{} has {}; it must be a list of {} values, as P is", name,
+                throw Error(fmt::format("{} has {}; it must be a list of {} values, like P", name,
                                         table ? fmt::format("{} values", table->list.size()) : describe(value),
                                         P.size()));
             if (name == "v")
@@ -181,7 +180,7 @@ struct PointsFrom {
                     read_value(param, list[i], given);
                     const T* same = std::get_if<T>(&given);
                     if (!same)
-                        throw Error(fmt::format("{}[{}] is {}; it must be a {}, as the first is", name, i + 1,
+                        throw Error(fmt::format("{}[{}] is {}; it must be a {}, like the first", name, i + 1,
                                                 describe(list[i]), type_name(type_of(AttributeValue(first)))));
                     values[i] = *same;
                 }

@@ -16,7 +16,7 @@ namespace rapid {
 inline std::map<int, std::filesystem::path> existing_files(const FramePattern& pattern)
 {
     auto files = pattern.existing();
-    if (files.empty()) throw Error(fmt::format("there is no file \"{}\", at any frame", pattern.text()));
+    if (files.empty()) throw Error(fmt::format("there is no file \"{}\" at any frame", pattern.text()));
     return files;
 }
 
@@ -46,14 +46,12 @@ struct SequenceOptions {
     void check(const std::string& path, bool is_sequence) const
     {
         if (offset && *offset != std::floor(*offset))
-            throw Error(fmt::format("offset = {} is not whole; it is a number of frames", *offset));
+            throw Error(fmt::format("offset = {} is not whole; it must be a number of frames", *offset));
         for (const auto& [given, name] : {std::pair(!before.empty(), "before"), std::pair(!after.empty(), "after"),
                                           std::pair(offset.has_value(), "offset")})
             if (given && !is_sequence)
-                throw Error(
-                    fmt::format("{} is for a sequence of files, and \"{}\" is one file; give a path with #### "
-                                "or $F4",
-                                name, path));
+                throw Error(fmt::format(
+                    "{} needs a sequence of files, but \"{}\" is one file; give a path with #### or $F4", name, path));
     }
 
     // Returns the file of a frame, or nothing if it has none. Throws Error if a file is missing between others.
@@ -67,8 +65,8 @@ struct SequenceOptions {
         if (!file) return std::nullopt;
         const auto found = files.find(static_cast<int>(*file));
         if (found == files.end())
-            throw Error(fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
-                                    *file, pattern.text(), frames.first, frames.last));
+            throw Error(fmt::format("frame {} of \"{}\" is missing; each frame from {} to {} needs a file", *file,
+                                    pattern.text(), frames.first, frames.last));
         return found->second;
     }
 

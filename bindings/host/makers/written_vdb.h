@@ -13,7 +13,8 @@ namespace rapid {
 inline void require_vdb(const std::string& path)
 {
     if (!path.ends_with(".vdb"))
-        throw Error(fmt::format("path = \"{}\": grids are written as .vdb; give a name such as \"surface.vdb\"", path));
+        throw Error(
+            fmt::format("path = \"{}\": grids can only be written as .vdb; give a name such as \"surface.vdb\"", path));
 }
 
 }  // namespace rapid

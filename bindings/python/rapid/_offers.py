@@ -50,7 +50,7 @@ def _numbers_of(array, name):
     """Converts an array of real numbers to float32."""
     array = numpy.asarray(array)
     if array.dtype.kind not in "fiub":
-        raise TypeError(f"{name} is of {array.dtype}; it must be of numbers")
+        raise TypeError(f"{name} has the type {array.dtype}; it must contain numbers")
     return numpy.ascontiguousarray(array, numpy.float32)
 
 
@@ -58,9 +58,9 @@ def _indices_of(array, name):
     """Converts an array of integers to int32."""
     array = numpy.asarray(array)
     if array.dtype.kind not in "iu" and array.size > 0:
-        raise TypeError(f"{name} are of {array.dtype}; they must be of integers")
+        raise TypeError(f"{name} have the type {array.dtype}; they must be integers")
     if array.size > 0 and not (array.min() >= -2**31 and array.max() < 2**31):
-        raise ValueError(f"{name} are from {array.min()} to {array.max()}; they must fit 32 bits")
+        raise ValueError(f"{name} are from {array.min()} to {array.max()}; they must fit into 32 bits")
     return numpy.ascontiguousarray(array, numpy.int32)
 
 
@@ -70,7 +70,7 @@ class Points:
     def __init__(self, P, columns):
         arrays = {"P": _numbers_of(P, "P"), **columns}
         if arrays["P"].ndim != 2 or arrays["P"].shape[1] != 3:
-            raise TypeError(f"P is of shape {arrays['P'].shape}; it must be (points, 3)")
+            raise TypeError(f"P has the shape {arrays['P'].shape}; it must be (points, 3)")
         self._count, self._arrays = len(arrays["P"]), {}
         for name, array in arrays.items():
             array = numpy.asarray(array)
@@ -81,7 +81,7 @@ class Points:
                 continue
             width = 1 if array.ndim == 1 else array.shape[-1]
             if array.ndim not in (1, 2) or len(array) != self._count or width not in _types.get(array.dtype, {}):
-                raise TypeError(f"{name} is of shape {array.shape} and {array.dtype}; it must be of ({self._count},), "
+                raise TypeError(f"{name} has the shape {array.shape} and the type {array.dtype}; it must be ({self._count},), "
                                 f"({self._count}, 3) or ({self._count}, 4), of floats, int32 or int64, or "
                                 f"({self._count},) of str")
             self._arrays[name] = (numpy.ascontiguousarray(array), _types[array.dtype][width])
@@ -107,7 +107,7 @@ class Mesh:
         self._triangles = _indices_of(triangles, "triangles")
         for what, array in (("positions", self._positions), ("triangles", self._triangles)):
             if array.ndim != 2 or array.shape[1] != 3:
-                raise TypeError(f"{what} are of shape {array.shape}; it must be (n, 3)")
+                raise TypeError(f"{what} have the shape {array.shape}; it must be (n, 3)")
 
     def offer(self, offers, name, _callbacks):
         call("offers_mesh", offers, encoded(name), self._positions.ctypes.data, len(self._positions),
@@ -133,9 +133,9 @@ class Shape:
             slope = arrays.add(gradient, (n, 3), output=True) if gradient else None
             distances = numpy.asarray(self._distance(arrays.add(P, (n, 3)), slope))
             if distances.dtype.kind not in "fiub":
-                raise TypeError(f"the distance is of {distances.dtype}; it must be of numbers")
+                raise TypeError(f"the distance has the type {distances.dtype}; it must contain numbers")
             if distances.shape not in ((), (n,)):
-                raise ValueError(f"the distance is of shape {distances.shape}; it must be ({n},), one of each place")
+                raise ValueError(f"the distance has the shape {distances.shape}; it must be ({n},), one for each position")
             numpy.ctypeslib.as_array(phi, shape=(n,))[:] = distances
             arrays.give_back()
             return 0
@@ -261,12 +261,12 @@ def make_offers(objects, nodes, guard):
         call("offers_on_release", offers, _forget, number)
         for name, thing in objects.items():
             if not isinstance(thing, (Points, Mesh, Shape)):
-                raise TypeError(f"{name} is a {type(thing).__name__}; it must be of rapid.from_numpy, rapid.Mesh or "
+                raise TypeError(f"{name} is a {type(thing).__name__}; it must be made by rapid.from_numpy, rapid.Mesh or "
                                 "rapid.Shape")
             thing.offer(offers, name, callbacks)
         for node in nodes:
             if not isinstance(node, _Node):
-                raise TypeError(f"a node is a {type(node).__name__}; it must be of rapid.Force, rapid.Edit or "
+                raise TypeError(f"a node is a {type(node).__name__}; it must be rapid.Force, rapid.Edit or "
                                 "rapid.Constraint")
             node.offer_node(offers, callbacks)
     except BaseException:

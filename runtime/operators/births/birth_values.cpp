@@ -55,13 +55,15 @@ BirthValue read_ramp(const Param& param, const Table& table)
     for (const Value& entry : table.list) {
         const double at = *entry.table()->list[0].get<double>();
         if (!(at >= 0 && at <= 1) || (!result.keys.empty() && at <= result.keys.back().at))
-            throw Error(fmt::format("{}: a key of the ramp is at {}; keys rise from 0 to 1", param.name, at));
+            throw Error(fmt::format("{}: a key of the ramp is at {}; keys must increase from 0 to 1", param.name, at));
         result.keys.push_back({at, read_one(param, entry.table()->list[1])});
         if (std::holds_alternative<Token>(result.first()))
-            throw Error(fmt::format("{}: nothing is between two texts; a choice of them is a list: {{\"a\", \"b\"}}",
-                                    param.name));
+            throw Error(
+                fmt::format("{}: strings can't be interpolated; to choose one at random, give a list: {{\"a\", \"b\"}}",
+                            param.name));
         if (result.keys.back().value.index() != result.first().index())
-            throw Error(fmt::format("{}: the keys of the ramp have values of two types", param.name));
+            throw Error(fmt::format("{}: the keys of the ramp have values of different types; give all the same type",
+                                    param.name));
     }
     return result;
 }
@@ -81,7 +83,7 @@ BirthValue read_birth_value(const Param& param, const Value& value)
         result.counts = true;
         if (*low > std::get<std::int32_t>(result.keys[1].value))
             throw Error(
-                fmt::format("{} = {} is the wrong way round; it must be {{min, max}}", param.name, describe(value)));
+                fmt::format("{} = {} is in the wrong order; it must be {{min, max}}", param.name, describe(value)));
     }
     return result;
 }

@@ -22,8 +22,7 @@ void read_value(const Param& param, const Value& value, Interval& field)
     read_value(param, table->list[0], field.min);
     read_value(param, table->list[1], field.max);
     if (field.min > field.max)
-        throw Error(
-            fmt::format("{} = {} is the wrong way round; it must be {{min, max}}", param.name, describe(value)));
+        throw Error(fmt::format("{} = {} is in the wrong order; it must be {{min, max}}", param.name, describe(value)));
     if (std::isinf(field.max) && !field.is_single())
         throw Error(fmt::format("{} = {} has no mean; both must be finite", param.name, describe(value)));
 }
@@ -54,10 +53,10 @@ void Newborn::use_newborn(Uses& uses) const
 void Newborn::check_attributes() const
 {
     for (const auto& [name, value] : attributes.of)
-        for (const auto& [own, remedy] : {std::pair{"age", "use age"},
-                                          {"life", "use life"},
-                                          {"birthtime", "it is the time of birth, where something reads it"}})
-            if (name == own) throw Error(fmt::format("attributes: \"{}\" has its own way; {}", name, remedy));
+        for (const auto& [own, remedy] : {std::pair{"age", "use the parameter age"},
+                                          {"life", "use the parameter life"},
+                                          {"birthtime", "Rapid sets it to the time of birth if something reads it"}})
+            if (name == own) throw Error(fmt::format("attributes: \"{}\" can't be given; {}", name, remedy));
 }
 
 std::vector<AttributeSpec> Newborn::given() const

@@ -183,11 +183,10 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
     const bool is_mesh =
         std::dynamic_pointer_cast<const Mesh>(object_) || std::dynamic_pointer_cast<const AnimatedMesh>(object_);
     if (!group_.empty() && !(is_mesh && (from_.empty() || from_ == "surface")))
-        throw Error(
-            fmt::format("source_group = \"{}\" is of the faces of a mesh, from its surface; leave it out", group_));
+        throw Error(fmt::format("source_group = \"{}\" needs a mesh and from = \"surface\"; remove it", group_));
     if (points || moving_points_) {
         if (!from_.empty() && from_ != "points")
-            throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of points take \"points\"", from_));
+            throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; for points give \"points\"", from_));
         take_points(points ? points->points : moving_points_->rest());
     } else if ((moving_mesh_ = std::dynamic_pointer_cast<const AnimatedMesh>(object_))) {
         take_mesh(moving_mesh_->rest());
@@ -204,11 +203,11 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
     } else if (const auto curves = std::dynamic_pointer_cast<const Curves>(object_)) {
         take_curves(*curves);
     } else if (std::dynamic_pointer_cast<const DeformingLevelSet>(object_)) {
-        throw Error("source = a deforming level set can't bear points; give the mesh that it was made from");
+        throw Error("source = a deforming level set can't emit points; give the mesh that it was made from");
     } else {
         throw Error(
-            fmt::format("source = {} can't bear points; it must be a mesh, a level set, a shape, a fog, "
-                        "a curve or points",
+            fmt::format("source = {} can't emit points; it must be a mesh, a level set, a shape, a fog, a curve, "
+                        "points or a position",
                         describe(object_)));
     }
 }
@@ -216,22 +215,21 @@ BirthSource::BirthSource(ObjectPtr object, std::string from, std::string density
 void BirthSource::take_fog(const DensityGrid& fog)
 {
     if (!from_.empty() && from_ != "volume")
-        throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; of a fog take \"volume\"", from_));
+        throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; for a fog give \"volume\"", from_));
     if (!density_.empty())
-        throw Error(
-            fmt::format("density = \"{}\" is an attribute of points or of a mesh's vertices; a fog bears by "
-                        "its own",
-                        density_));
+        throw Error(fmt::format(
+            "density = \"{}\" must be an attribute of points or of a mesh's vertices; a fog uses its own density",
+            density_));
     scatter_ = fog.scatter();
 }
 
 void BirthSource::take_curves(const Curves& curves)
 {
-    if (!from_.empty())
-        throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; along a curve leave it out", from_));
+    if (!from_.empty()) throw Error(fmt::format("from = \"{}\" needs a mesh or a shape; remove it for a curve", from_));
     if (!density_.empty())
-        throw Error(fmt::format("density = \"{}\" is of points or of a mesh's vertices; a curve bears evenly by length",
-                                density_));
+        throw Error(fmt::format(
+            "density = \"{}\" must be an attribute of points or of a mesh's vertices; a curve emits evenly by length",
+            density_));
     has_normals_ = true;
     mesh_ = curves.mesh();
     values_ = corners_of(*detailed(mesh_));
@@ -243,12 +241,12 @@ void BirthSource::take_shape(const ShapePtr& shape)
 {
     if (from_ == "points")
         throw Error(
-            fmt::format("from = \"points\" needs points or a mesh, and source is {}; take \"surface\" or "
-                        "\"volume\"",
+            fmt::format("from = \"points\" needs points or a mesh, but source is {}; give \"surface\" or \"volume\"",
                         describe(object_)));
     if (!density_.empty())
-        throw Error(fmt::format("density = \"{}\" is an attribute of points or of a mesh's vertices, and {} has none",
-                                density_, describe(object_)));
+        throw Error(
+            fmt::format("density = \"{}\" must be an attribute of points or of a mesh's vertices, and {} has none",
+                        density_, describe(object_)));
     has_normals_ = from_ != "volume";
     scatter_ = from_ == "volume" ? scatter_in_volume(shape) : scatter_on_surface(shape);
 }
@@ -271,9 +269,8 @@ void BirthSource::follow(const BirthSource& last)
     };
     if (is_curve(*this) && is_curve(last))
         throw Error(
-            "source: a function of the frame that returns another curve each time can't be followed between the "
-            "frames; give the function to rapid.curve.from: source = rapid.curve.from { points = function(frame) ... "
-            "end }");
+            "source: a function of the frame that returns a new curve each time can't be followed between frames; give "
+            "the function to rapid.curve.from: source = rapid.curve.from { points = function(frame) ... end }");
     if (!is_of_points_ || !last.is_of_points_ || moving_points_) return;
     before_ = last.values_;
     earlier_ = last.before_;
@@ -355,8 +352,8 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
     if (from_ == "volume") {
         if (!density_.empty())
             throw Error(
-                fmt::format("density = \"{}\" is an attribute of vertices, which a volume does not have; take "
-                            "from = \"surface\" or \"points\"",
+                fmt::format("density = \"{}\" is an attribute of vertices, which a volume does not have; give from = "
+                            "\"surface\" or \"points\"",
                             density_));
         scatter_ = scatter_in_volume(mesh);
         return;
@@ -413,14 +410,14 @@ std::vector<float> BirthSource::densities() const
         std::vector<std::string> floats;
         for (const auto& [name, any] : values_.columns())
             if (type_of(any) == AttributeType::Float) floats.push_back(name);
-        throw Error(fmt::format("density = \"{}\": the source has no float of that name{}", density_,
+        throw Error(fmt::format("density = \"{}\": the source has no float with this name{}", density_,
                                 floats.empty() ? "; it has none" : did_you_mean(density_, floats)));
     }
     std::vector<float> densities(values_.size());
     for (std::size_t i = 0; i < densities.size(); ++i) {
         densities[i] = (*column)[i];
         if (!(densities[i] >= 0 && std::isfinite(densities[i])))
-            throw Error(fmt::format("{} is {} at point {} of the source; a density must be at least 0, and finite",
+            throw Error(fmt::format("{} is {} at point {} of the source; a density must be finite and at least 0",
                                     density_, densities[i], i));
     }
     return densities;

@@ -79,12 +79,12 @@ void BirthAge::check(const BirthSource& source) const
     const auto* ages = column ? std::get_if<Column<float>>(column) : nullptr;
     if (!ages) {
         const std::string near = did_you_mean(attribute, source.values().column_names());
-        throw Error(fmt::format("age = rapid.attr \"{}\": the source has no float of that name{}", attribute,
-                                near.empty() ? "; give the source one, or a number" : near));
+        throw Error(fmt::format("age = rapid.attr \"{}\": the source has no float with this name{}", attribute,
+                                near.empty() ? "; give the source this attribute, or give age a number" : near));
     }
     for (std::size_t i = 0; i < ages->size(); ++i)
         if (!((*ages)[i] >= 0) || std::isinf((*ages)[i]))
-            throw Error(fmt::format("age = rapid.attr \"{}\": the source's point {} has {}; ages are at least 0",
+            throw Error(fmt::format("age = rapid.attr \"{}\": point {} of the source has {}; an age must be at least 0",
                                     attribute, i, (*ages)[i]));
 }
 

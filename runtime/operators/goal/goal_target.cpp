@@ -42,7 +42,7 @@ void read_value(const Param& param, const Value& value, GoalTarget& target)
     const bool known = target.is_points() || as<Mesh>(*object) || as<AnimatedMesh>(*object) || as<Shape>(*object) ||
                        as<AnimatedShape>(*object);
     if (!known)
-        throw Error(fmt::format("{} = {} has no places to go to; it must be a mesh, a shape, points, or rapid.attr",
+        throw Error(fmt::format("{} = {} can't be a target; it must be a mesh, a shape, points or rapid.attr",
                                 param.name, describe(*object)));
 }
 
@@ -216,7 +216,7 @@ public:
         : shape_(std::move(shape)), motion_(std::move(motion))
     {
         if (by == "id")
-            throw Error(fmt::format("by = \"id\": {} has no points of its own; take \"random\" or \"nearest\"",
+            throw Error(fmt::format("by = \"id\": {} has no points; give \"random\" or \"nearest\"",
                                     describe(ObjectPtr(shape_))));
         if (by == "random") scatter_ = scatter_on_surface(shape_);
     }

@@ -35,7 +35,7 @@ LevelSetPtr widened_to(const LevelSetPtr& shape, double needed, const Collider& 
     const double most = band > size.maxCoeff() ? max_voxels_of_wide_band : max_voxels;
     if (voxels > most)
         throw Error(fmt::format("points with a radius of {:.4g} m need a band of {:.0f} voxels of {:g} m around its "
-                                "level set, some {:.1e} in all; at most {:.1e} fit: give it a larger voxel",
+                                "level set, about {:.1e} voxels; at most {:.1e} are possible: give it a larger voxel",
                                 needed - 2 * shape->voxel(), band, shape->voxel(), voxels, most))
             .in_node(collider.node)
             .at(collider.location);
@@ -46,8 +46,8 @@ void warn_of_jump(const Collider& collider, const Jump& jump, double frame, cons
 {
     const auto number = static_cast<std::int64_t>(std::ceil(frame));
     now.warnings.push_back(
-        fmt::format("{}:{}: node \"{}\": the shape {}; nothing is swept along on the way (cut = {{{}}} says so, cut = "
-                    "{{}} that it is no jump)",
+        fmt::format("{}:{}: node \"{}\": the shape {}; it sweeps no points along on the way (to confirm, give cut = "
+                    "{{{}}}; if it is not a jump, cut = {{}})",
                     collider.location.file, collider.location.line, collider.node, describe(jump, number), number));
 }
 
@@ -409,9 +409,7 @@ void prepare(Step& step, ColliderShapes& shapes)
     if (step.is_coupled() && !flow.points.has("still")) flow.points.add({"still", 0.0f});
     if (StuckColumns::are_needed(flow.dynamics)) StuckColumns::add_to(flow.points);
     if (step.tolerance && step.is_coupled())
-        throw Error(
-            "a tolerance is for points that do not depend on one another, and there are constraints; give substeps "
-            "instead");
+        throw Error("a tolerance needs independent points, but there are constraints; give substeps instead");
     if (!flow.simulation->trial) resolve(step, changing);
 }
 

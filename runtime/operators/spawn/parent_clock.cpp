@@ -89,7 +89,7 @@ private:
                         fmt::format("on: \"{}\" is a quaternion, which can't be compared", comparison_.attribute));
                 else if constexpr (std::is_same_v<T, Token>)
                     throw Error(fmt::format(
-                        "on: \"{0}\" is a text; test it with a function: on = function(p) return p.{0} == \"a\" end",
+                        "on: \"{0}\" is a string; compare it in a function: on = function(p) return p.{0} == \"a\" end",
                         comparison_.attribute));
                 else if (comparison_.axis >= 0)
                     throw Error(fmt::format("on: \"{}\" is a number and has no components", comparison_.attribute));
@@ -121,7 +121,7 @@ std::vector<double> numbers_of(const PointSet& points, const std::string& attrib
 {
     const AnyColumn* column = points.find(attribute);
     if (!column)
-        throw Error(fmt::format("rapid.attr \"{}\": the parents have no attribute of that name{}", attribute,
+        throw Error(fmt::format("rapid.attr \"{}\": the parents have no attribute with this name{}", attribute,
                                 did_you_mean(attribute, points.column_names())));
     return std::visit(
         [&]<class T>(const Column<T>& c) {
@@ -201,7 +201,7 @@ void read_value(const Param& param, const Value& value, BirthEvent& field)
     const std::optional<AttributeComparison> comparison = text ? comparison_of(*text) : std::nullopt;
     if (!comparison)
         throw Error(
-            fmt::format("{} = {} is no event; it must be \"hit\", \"death\", \"birth\", a comparison of an "
+            fmt::format("{} = {} is not an event; it must be \"hit\", \"death\", \"birth\", a comparison of an "
                         "attribute with a number (\"age > 0.5\", \"P.y < 0\"), or a function of a point",
                         param.name, describe(value)));
     field.kind = BirthEvent::Compares;

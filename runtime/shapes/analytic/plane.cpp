@@ -87,9 +87,8 @@ ShapePtr make_plane(const Vec3d& normal, double offset)
     // Scales first, because the squares of the components may be beyond the range of a double.
     const double largest = normal.cwiseAbs().maxCoeff();
     if (!(largest > 0) || !std::isfinite(largest))
-        throw Error(
-            fmt::format("normal of a plane = {{{:g}, {:g}, {:g}}} has no direction; any length but zero is right",
-                        normal.x(), normal.y(), normal.z()));
+        throw Error(fmt::format("normal of a plane = {{{:g}, {:g}, {:g}}} has no direction; its length must be above 0",
+                                normal.x(), normal.y(), normal.z()));
     if (!std::isfinite(offset)) throw Error(fmt::format("offset of a plane = {:g}; it must be finite", offset));
     // An axis stays bit-identical, so that the weight of a point at rest on the plane has no tangential part.
     const Vec3d scaled = normal / largest;

@@ -49,13 +49,13 @@ void require_buildable(std::string_view what, double area, const Box3d& bounds, 
     };
     if (voxels > most || indexed > most)
         throw Error(
-            fmt::format("{} with voxel = {:g} m would make about {:.3g} voxels and an index of {:.3g} blocks, and "
-                        "2147483648 of each can be held; a voxel of at least {:.3g} m stays below that",
+            fmt::format("{} with voxel = {:g} m would make about {:.3g} voxels and an index of {:.3g} blocks, but at "
+                        "most 2147483648 of each are possible; use a voxel of at least {:.3g} m",
                         what, options.voxel, voxels, indexed, larger(voxels / most, indexed / most)));
     if (fits_in_memory(bytes)) return;
     const double memory = static_cast<double>(memory_budget());
     throw memory_exceeded(fmt::format("{} with voxel = {:g} m", what, options.voxel), bytes,
-                          fmt::format("a voxel of at least {:.3g} m fits", larger(bytes / memory, bytes / memory)));
+                          fmt::format("use a voxel of at least {:.3g} m", larger(bytes / memory, bytes / memory)));
 }
 
 }  // namespace rapid

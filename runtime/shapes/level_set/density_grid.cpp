@@ -78,10 +78,10 @@ ScatterPtr scatter_in_fog(const FloatGrid& grid)
         weights.push_back(double(*value) * std::pow(double(edge), 3));
     }
     if (cells.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
-        throw Error(fmt::format("grid \"{}\" has {} voxels with a density; at most 2^31 - 1 can be", grid.getName(),
-                                cells.size()));
+        throw Error(fmt::format("grid \"{}\" has {} voxels with a density; at most 2^31 - 1 are possible",
+                                grid.getName(), cells.size()));
     if (cells.empty())
-        throw Error(fmt::format("grid \"{}\" has no density above 0; nothing can be born in it", grid.getName()));
+        throw Error(fmt::format("grid \"{}\" has no density above 0, so it can't emit points", grid.getName()));
     const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
     return std::make_shared<ScatterInFog>(grid.constTransformPtr(), std::move(cells), AliasTable(weights, sum));
 }
@@ -111,7 +111,8 @@ openvdb::GridBase::Ptr choose_fog(const std::string& path, const std::string& na
     if (fogs.size() == 1) return fogs[0];
     if (fogs.empty())
         throw Error(fmt::format("there is no fog of floats in \"{}\"; its grids are {}", path, grids_of(grids)));
-    throw Error(fmt::format("there are {} fogs in \"{}\": {}; name one by grid", fogs.size(), path, grids_of(fogs)));
+    throw Error(
+        fmt::format("there are {} fogs in \"{}\": {}; choose one with grid", fogs.size(), path, grids_of(fogs)));
 }
 
 FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::string& name)
@@ -123,8 +124,8 @@ FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::strin
         const auto chosen = choose_fog(path, name, file.grids());
         if (!is_fog(*chosen))
             throw Error(fmt::format(
-                "grid \"{}\" of \"{}\" is {}{}; it must be a fog of floats: rapid.levelset.read takes "
-                "level sets, rapid.grid.read vectors",
+                "grid \"{}\" of \"{}\" is {}{}; it must be a fog of floats; rapid.levelset.read reads level sets, and "
+                "rapid.grid.read vectors",
                 chosen->getName(), path, chosen->getGridClass() == openvdb::GRID_LEVEL_SET ? "a level set of " : "",
                 chosen->valueType()));
         return openvdb::gridPtrCast<FloatGrid>(file.read(chosen));

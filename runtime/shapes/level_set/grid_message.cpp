@@ -17,7 +17,7 @@ openvdb::math::Transform::Ptr transform_of(const openvdb::Mat4R& map, const std:
 {
     const double volume = map.getMat3().det();
     if (!map.isFinite() || !std::isnormal(volume))
-        throw Error(fmt::format("the map of grid \"{}\" has no inverse: its voxels are of {} m³", name, volume));
+        throw Error(fmt::format("the transform of grid \"{}\" has no inverse: its voxels have {} m³", name, volume));
     if (!is_uniform(map)) return openvdb::math::Transform::createLinearTransform(map);
     auto transform = openvdb::math::Transform::createLinearTransform(map(0, 0));
     const openvdb::Vec3d translation = map.getTranslation();
@@ -33,10 +33,9 @@ void check_extent(const openvdb::CoordBBox& leaves, const std::string& name)
     for (int axis = 0; axis < 3; ++axis)
         blocks *= (static_cast<double>(leaves.max()[axis]) - static_cast<double>(leaves.min()[axis])) / 8 + 1;
     if (blocks > most)
-        throw Error(
-            fmt::format("the values of grid \"{}\" are spread over {:.3g} boxes of 8 x 8 x 8 voxels; they must "
-                        "be within {:.3g}",
-                        name, blocks, most));
+        throw Error(fmt::format(
+            "the values of grid \"{}\" are spread over {:.3g} boxes of 8 x 8 x 8 voxels; at most {:.3g} are possible",
+            name, blocks, most));
 }
 
 }  // namespace rapid

@@ -32,8 +32,8 @@ void send_grid(const typename Grid::Ptr& grid, MessageWriter& message)
     using Tree = typename Grid::TreeType;
     using Value = typename Grid::ValueType;
     if (!grid->transform().isLinear())
-        throw Error(
-            fmt::format("the map of grid \"{}\" is not linear; resample it to voxels along the axes", grid->getName()));
+        throw Error(fmt::format(
+            "the transform of grid \"{}\" is not linear; resample the grid to voxels along the axes", grid->getName()));
     const openvdb::Mat4R map = grid->transform().baseMap()->getAffineMap()->getMat4();
     message.put_text(grid->getName());
     message.put(static_cast<std::int32_t>(grid->getGridClass()));
@@ -82,7 +82,7 @@ typename Grid::Ptr receive_grid(MessageReader& message)
                                     at.y(), at.z()));
     };
     while (const auto level = message.take<std::uint8_t>()) {
-        if (level >= Grid::TreeType::DEPTH) throw Error("its reader went wrong; it must be damaged");
+        if (level >= Grid::TreeType::DEPTH) throw Error("the reader failed, so it must be damaged");
         const bool on = message.take<std::uint8_t>() != 0;
         const openvdb::Coord origin(message.take<openvdb::Vec3i>());
         const auto value = message.take<Value>();

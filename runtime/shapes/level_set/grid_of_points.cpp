@@ -46,15 +46,14 @@ public:
     {
         const double r = radius(i);
         if (!points_.P[i].allFinite() || !(position(i).cwiseAbs().maxCoeff() + r < (1 << 30)))
-            throw Error(
-                fmt::format("point {} is at ({}, {}, {}); a place must be finite, and within 2^30 voxels of the "
-                            "origin",
-                            i, points_.P[i].x(), points_.P[i].y(), points_.P[i].z()));
+            throw Error(fmt::format(
+                "point {} is at ({}, {}, {}); a position must be finite and within 2^30 voxels of the origin", i,
+                points_.P[i].x(), points_.P[i].y(), points_.P[i].z()));
         if (!(given_radius(i) > 0) || !std::isfinite(r))
             throw Error(
-                fmt::format("point {} has the radius {:g} m; it must be above 0, and finite", i, given_radius(i)));
+                fmt::format("point {} has the radius {:g} m; it must be finite and above 0", i, given_radius(i)));
         if (!(weight(i) >= 0) || !std::isfinite(weight(i)))
-            throw Error(fmt::format("point {} has the weight {:g}; it must be at least 0, and finite", i, weight(i)));
+            throw Error(fmt::format("point {} has the weight {:g}; it must be finite and at least 0", i, weight(i)));
     }
 
     Eigen::Vector3i first(std::size_t i) const { return (position(i).array() - radius(i)).ceil().cast<int>().matrix(); }
@@ -167,7 +166,7 @@ template <class Grid, class F>
 typename Grid::Ptr grid_of(const SpreadPoints& given, const char* name, const F& value)
 {
     using Leaf = typename Grid::TreeType::LeafNodeType;
-    if (given.P.empty()) throw Error("there are no points to make a grid of");
+    if (given.P.empty()) throw Error("a grid needs points, and there are none");
     initialize_openvdb();
     const Spread points(given);
     const std::vector<Reach> reaches = reaches_of(points);

@@ -30,7 +30,7 @@ openvdb::GridBase::Ptr choose_level_set(const std::string& path, const std::stri
     if (level_sets.size() == 1) return level_sets[0];
     if (level_sets.empty())
         throw Error(fmt::format("there is no level set in \"{}\"; its grids are {}", path, grids_of(grids)));
-    throw Error(fmt::format("there are {} level sets in \"{}\": {}; name one by grid", level_sets.size(), path,
+    throw Error(fmt::format("there are {} level sets in \"{}\": {}; choose one with grid", level_sets.size(), path,
                             grids_of(level_sets)));
 }
 
@@ -44,14 +44,14 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
         VdbFile file(file_path);
         const auto chosen = choose_level_set(path, name, file.grids());
         if (!is_level_set(*chosen))
-            throw Error(fmt::format("grid \"{}\" of \"{}\" is {} of class \"{}\"; it must be a float level set",
+            throw Error(fmt::format("grid \"{}\" of \"{}\" is {} with the class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
                                     openvdb::GridBase::gridClassToString(chosen->getGridClass())));
         // Exact, because a rotation, a shear or unequal scales would require resampling.
         if (!is_uniform(chosen->transform()))
             throw Error(
-                fmt::format("the map of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample it "
-                            "to cubic voxels along the axes",
+                fmt::format("the transform of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample "
+                            "the grid to cubic voxels along the axes",
                             chosen->getName(), path));
         const auto grid = openvdb::gridPtrCast<FloatGrid>(file.read(chosen));
         if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles(/*threaded=*/false);
@@ -76,8 +76,9 @@ LevelSetPtr level_set_of_file(const std::filesystem::path& path, const std::stri
 
     const auto level_set = level_set_of(grid, [grid](double half_width) { return widened(*grid, half_width); });
     if (!level_set->has_surface())
-        throw Error(fmt::format("grid \"{}\" of \"{}\" has {} active voxels and no surface; a level set changes sign",
-                                grid->getName(), path.string(), grid->activeVoxelCount()));
+        throw Error(
+            fmt::format("grid \"{}\" of \"{}\" has {} active voxels but no surface; a level set must change its sign",
+                        grid->getName(), path.string(), grid->activeVoxelCount()));
     return level_set;
 }
 

@@ -25,8 +25,8 @@ std::shared_ptr<const BakedLevelSet> build(const MeshPtr& mesh, bool balanced, c
     if (const double farthest = bounds.min().cwiseAbs().cwiseMax(bounds.max().cwiseAbs()).maxCoeff();
         !(farthest <= far * options.voxel))
         throw Error(
-            fmt::format("mesh \"{}\" reaches {:g} m from the origin, more than 2^31 voxels of {:g} m; put it "
-                        "nearer, and move what is made of it",
+            fmt::format("mesh \"{}\" reaches {:g} m from the origin, more than 2^31 voxels of {:g} m; move it nearer "
+                        "to the origin, and move the level set back",
                         mesh->name, farthest, options.voxel));
     require_buildable(fmt::format("mesh \"{}\"", mesh->name), mesh->area(), bounds, options);
     const VoxelFrame frame = frame_around(bounds, options.voxel);
@@ -71,31 +71,28 @@ void warn(const Mesh& mesh, const Mesh::Openness& open, const LevelSetOptions& o
 {
     if (open.unbalanced_edges > 0)
         warnings.push_back(fmt::format(
-            "mesh \"{}\" is not closed: {} edges have one face, and {} have more than two or two that look "
-            "different ways; holes smaller than a voxel ({:g} m) are closed, through larger ones its inside "
-            "counts as outside",
+            "mesh \"{}\" is not closed: {} edges have one face, and {} have more than two or two that face different "
+            "ways; holes smaller than a voxel ({:g} m) are closed; with larger ones the inside counts as outside",
             mesh.name, open.boundary_edges, open.non_manifold_edges, options.voxel));
     else if (const double volume = mesh.signed_volume(); volume < 0)
         warnings.push_back(
-            fmt::format("mesh \"{}\" is turned inside out: its volume is {:.4g} m³; its faces are taken to "
-                        "look outwards",
+            fmt::format("mesh \"{}\" is inside out: its volume is {:.4g} m³; its faces are assumed to point outwards",
                         mesh.name, volume));
     const std::vector<Box3f> pieces = pieces_of(mesh);
     const auto thin = std::count_if(pieces.begin(), pieces.end(),
                                     [&](const Box3f& bounds) { return bounds.sizes().minCoeff() < options.voxel; });
     if (thin > 0)
         warnings.push_back(
-            fmt::format("{} of the {} pieces of mesh \"{}\" are thinner than a voxel ({:g} m) and may be "
-                        "missing; a smaller voxel keeps them",
+            fmt::format("{} of the {} pieces of mesh \"{}\" are thinner than a voxel ({:g} m) and may be missing; use "
+                        "a smaller voxel",
                         thin, pieces.size(), mesh.name, options.voxel));
     Box3f bounds;
     for (const Box3f& piece : pieces) bounds.extend(piece);
     if (const double size = bounds.isEmpty() ? 0 : bounds.sizes().maxCoeff();
         2 * options.voxel >= size * (1 - 1e-6) && size > 0)  // sizes are floats
-        warnings.push_back(
-            fmt::format("a voxel of {:g} m is half as large as mesh \"{}\" or larger: it is {:g} m long; a voxel of "
-                        "{:.1g} m shows its form",
-                        options.voxel, mesh.name, size, size / 30));
+        warnings.push_back(fmt::format(
+            "a voxel of {:g} m is at least half as large as mesh \"{}\", which is {:g} m long; use a voxel of {:.1g} m",
+            options.voxel, mesh.name, size, size / 30));
 }
 
 }  // namespace
@@ -107,8 +104,7 @@ LevelSetPtr level_set_of_same_faces(const MeshPtr& mesh, const LevelSetOptions& 
     if (!level_set->has_surface()) {
         if (!balanced)
             throw Error(
-                fmt::format("mesh \"{}\" encloses nothing with voxel = {:g} m: {} of its edges have one face, and "
-                            "outside reaches its inside through them; {}",
+                fmt::format("mesh \"{}\" has no inside with voxel = {:g} m, because {} of its edges have one face; {}",
                             mesh->name, options.voxel, open.boundary_edges, open_mesh_remedy));
         const Vec3f size = mesh->bounds().sizes();
         if (size.minCoeff() == 0)

@@ -36,7 +36,7 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
 {
     constexpr double least = 1.5;  // voxels; a smaller ball may contain no voxel centre
     require_legal(options);
-    if (P.empty()) throw Error("there are no points to make a level set of");
+    if (P.empty()) throw Error("a level set needs points, and there are none");
     initialize_openvdb();
     auto balls = std::make_shared<Balls>();
     balls->P.assign(P.begin(), P.end());
@@ -48,12 +48,12 @@ LevelSetPtr from_points(std::span<const Vec3f> P, std::span<const float> radius,
         const double r = balls->radius_of(i);
         if (!(r >= least * options.voxel) || !std::isfinite(r))
             throw Error(
-                fmt::format("point {} has the radius {:g} m, and with voxel = {:g} m it must be at least {:g} "
-                            "voxels; use a voxel of at most {:.3g} m",
+                fmt::format("point {} has the radius {:g} m; with voxel = {:g} m it must be at least {:g} voxels; use "
+                            "a voxel of at most {:.3g} m",
                             i, r, options.voxel, least, std::max(r, 0.0) / least));
         if (!P[i].allFinite())
             throw Error(
-                fmt::format("point {} is at ({}, {}, {}); places must be finite", i, P[i].x(), P[i].y(), P[i].z()));
+                fmt::format("point {} is at ({}, {}, {}); positions must be finite", i, P[i].x(), P[i].y(), P[i].z()));
         bounds.extend(Vec3d(P[i].cast<double>() - Vec3d::Constant(r)));
         bounds.extend(Vec3d(P[i].cast<double>() + Vec3d::Constant(r)));
         area += 4 * std::numbers::pi * r * r;

@@ -120,8 +120,8 @@ LevelSetPtr combined(const LevelSetPtr& a, const LevelSetPtr& b, Combine how, st
 {
     if (std::abs(a->voxel() - b->voxel()) > same_size * a->voxel())
         warnings.push_back(
-            fmt::format("the second level set has a voxel of {:g} m and the first of {:g} m; it is "
-                        "resampled to that (:resample says which is wanted)",
+            fmt::format("the second level set has a voxel of {:g} m and the first of {:g} m; the second is resampled "
+                        "(use :resample to choose the voxel)",
                         b->voxel(), a->voxel()));
     const BakedPtr first = on_axes(a);
     const auto build = [=](double half_width) { return combine(first, b, how, half_width); };

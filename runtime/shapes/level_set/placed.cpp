@@ -124,7 +124,7 @@ ShapePtr placed(const ShapePtr& rest, const Pose& pose)
     for (const Shape* shape = rest.get(); const auto* outer = dynamic_cast<const PlacedOf<Shape>*>(shape); ++moves)
         shape = outer->rest().get();
     if (moves > most)
-        throw Error(fmt::format("a {} that is moved more than {} times; move it once, by a product of the motions",
+        throw Error(fmt::format("a {} is moved more than {} times; move it once, with a product of the motions",
                                 rest->kind(), most));
     return std::make_shared<PlacedOf<Shape>>(rest, pose);
 }

@@ -67,8 +67,8 @@ public:
         readHeader(stream_);
         if (fileVersion() < first_version)
             throw Error(
-                fmt::format("can't be read: its format is version {}, from before OpenVDB was published; it "
-                            "must be at least {}",
+                fmt::format("can't be read: its format has version {}, which is older than the first public OpenVDB; "
+                            "it must be at least {}",
                             fileVersion(), first_version));
         of_file_->setSeekable(true);
         vdb::io::setStreamMetadataPtr(stream_, of_file_, /*transfer=*/false);
@@ -113,8 +113,9 @@ private:
         const auto size = static_cast<std::int64_t>(file_.bytes().size());
         const std::int64_t begin = descriptor.getGridPos(), end = descriptor.getEndPos();
         if (end > size)
-            throw Error(fmt::format("can't be read: it is cut: its grid \"{}\" ends at byte {}, the file at byte {}",
-                                    GridDescriptor::nameAsString(descriptor.uniqueName()), end, size));
+            throw Error(
+                fmt::format("can't be read: it is cut off: its grid \"{}\" ends at byte {}, but the file at byte {}",
+                            GridDescriptor::nameAsString(descriptor.uniqueName()), end, size));
         if (begin < stream_.tellg() || end < begin) throw damaged_vdb();
         grids_.push_back(begin_grid(descriptor));
         descriptors_.push_back(descriptor);
@@ -161,9 +162,10 @@ private:
             return other.uniqueName() == instance.instanceParentName() && !other.isInstance();
         });
         if (found == descriptors_.end())
-            throw Error(fmt::format("can't be read: the grid \"{}\", whose values the grid \"{}\" has, is missing",
-                                    GridDescriptor::nameAsString(instance.instanceParentName()),
-                                    GridDescriptor::nameAsString(instance.uniqueName())));
+            throw Error(
+                fmt::format("can't be read: the grid \"{}\" is missing, which the grid \"{}\" shares values with",
+                            GridDescriptor::nameAsString(instance.instanceParentName()),
+                            GridDescriptor::nameAsString(instance.uniqueName())));
         return *found;
     }
 
@@ -180,7 +182,7 @@ private:
         else if (grid.isType<vdb::FloatGrid>() || has_points)
             values.bytes = sizeof(float);
         else
-            throw Error(fmt::format("can't be read: grids of the type {} can't", grid.type()));
+            throw Error(fmt::format("can't be read: grids of the type {} are not supported", grid.type()));
         values.stored_bytes = is_half ? values.bytes / 2 : values.bytes;
         const std::vector<std::uint16_t> active = check_topology(cursor, values);
         if (has_points)

@@ -20,7 +20,7 @@
 namespace rapid {
 
 // Returns the error for a file that ends too early or contradicts itself.
-inline Error damaged_vdb() { return Error("can't be read: it is cut or damaged"); }
+inline Error damaged_vdb() { return Error("can't be read: it is cut off or damaged"); }
 
 // A position in the file. Every function throws Error if it would read past the end of the file.
 class VdbCursor {

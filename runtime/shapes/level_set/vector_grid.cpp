@@ -25,7 +25,7 @@ openvdb::GridBase::Ptr choose_vectors(const std::string& path, const std::string
     if (vectors.empty())
         throw Error(
             fmt::format("there is no grid of vectors (vec3s) in \"{}\"; its grids are {}", path, grids_of(grids)));
-    throw Error(fmt::format("there are {} grids of vectors in \"{}\": {}; name one by grid", vectors.size(), path,
+    throw Error(fmt::format("there are {} grids of vectors in \"{}\": {}; choose one with grid", vectors.size(), path,
                             grids_of(vectors)));
 }
 
@@ -38,8 +38,8 @@ Vec3SGrid::Ptr read_vectors(const std::filesystem::path& file_path, const std::s
         const auto chosen = choose_vectors(path, name, file.grids());
         if (!chosen->isType<Vec3SGrid>())
             throw Error(
-                fmt::format("grid \"{}\" of \"{}\" is {}; it must be of vectors (vec3s): three grids of floats are "
-                            "merged into one where they are made",
+                fmt::format("grid \"{}\" of \"{}\" is {}; it must have vectors (vec3s); merge three grids of floats "
+                            "into one in the program that writes them",
                             chosen->getName(), path, chosen->valueType()));
         return openvdb::gridPtrCast<Vec3SGrid>(file.read(chosen));
     } catch (const openvdb::Exception& e) {

@@ -16,7 +16,7 @@ openvdb::GridBase::ConstPtr named(const std::string& name, const ObjectPtr& obje
         return named_grid(*fog->grid(), name);
     if (const auto vectors = std::dynamic_pointer_cast<const OpenVectorGrid>(object))
         return named_grid(*vectors->grid(), name);
-    throw Error(fmt::format("{} = {}; what is written must be a fog or a grid of vectors of one moment", name,
+    throw Error(fmt::format("{} = {}; it must be a fog or a grid of vectors at one frame", name,
                             object ? object->kind() : "nothing"));
 }
 

@@ -97,7 +97,7 @@ private:
         const auto uri = document_.at("buffers").at(number).at("uri").get<std::string>();
         if (uri.starts_with(data)) {
             const std::size_t begin = uri.find(encoding);
-            if (begin == std::string::npos) throw Error(fmt::format("buffer {} is no base64", number));
+            if (begin == std::string::npos) throw Error(fmt::format("buffer {} is not valid base64", number));
             found->second = from_base64(std::string_view(uri).substr(begin + encoding.size()));
         } else {
             const InputFile file(folder_ / uri);
@@ -128,7 +128,7 @@ private:
             (vertices > 0 &&
              (bytes.size() - first - inner < value ||
               (vertices - 1) > (bytes.size() - first - inner - value) / std::max<std::size_t>(stride, 1))))
-            throw Error(fmt::format("an accessor of {} values leads out of its buffer", vertices));
+            throw Error(fmt::format("an accessor of {} values goes beyond its buffer", vertices));
         const double scale = accessor.value("normalized", false) ? 1 / component->largest : 1;
         const auto number = [&](std::size_t i, std::size_t c) {
             const unsigned char* at = bytes.data() + first + inner + i * stride + c * scalar_bytes(component->type);

@@ -92,7 +92,8 @@ void append_list(const std::string& name, const std::vector<T>& list, std::size_
     Mesh::VertexValues& values = corners.values.try_emplace(name, std::vector<T>()).first->second;
     auto* known = std::get_if<std::vector<T>>(&values);
     if (!known)
-        return add_skipped(corners.skipped, fmt::format("\"{}\" of a part, which has another type in others", name));
+        return add_skipped(corners.skipped,
+                           fmt::format("\"{}\" of a part, which has another type in other parts", name));
     known->resize(first, zero<T>());
     known->insert(known->end(), list.begin(), list.end());
 }

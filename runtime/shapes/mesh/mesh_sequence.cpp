@@ -21,11 +21,11 @@ constexpr double same_corner = 1e-6;
 MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order)
     : files_(std::move(files)), name_(std::move(name)), order_(order)
 {
-    if (files_.empty()) throw Error(fmt::format("there is no mesh file \"{}\", at any frame", name_));
+    if (files_.empty()) throw Error(fmt::format("there is no mesh file \"{}\" at any frame", name_));
     for (int frame = first(); frame < last(); ++frame)
         if (!files_.count(frame))
-            throw Error(fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {}",
-                                    frame, name_, first(), last()));
+            throw Error(fmt::format("frame {} of \"{}\" is missing; each frame from {} to {} needs a file", frame,
+                                    name_, first(), last()));
     order_.first = first();
     order_.last = last();
     const MeshFile file = read_mesh_file(files_.begin()->second);
@@ -64,16 +64,16 @@ MeshPtr MeshSequence::read(int frame) const
     };
     if (file.positions.size() != corners_ || file.triangles.size() != faces_)
         throw Error(fmt::format(
-            "\"{}\" changes at frame {}: it has {} there, and {} at frame {}; a sequence deforms one "
-            "mesh, whose vertices and faces stay the same",
+            "\"{}\" changes at frame {}: it has {} there and {} at frame {}; a sequence must keep the vertices and "
+            "faces of its mesh",
             name_, frame, counts(file.positions.size(), file.triangles.size()), counts(corners_, faces_), first()));
     MeshPtr mesh = joined(file, vertex_of_, path.string());
     const auto other =
         std::mismatch(mesh->triangles.begin(), mesh->triangles.end(), rest_->triangles.begin(), rest_->triangles.end());
     if (other.first != mesh->triangles.end())
         throw Error(
-            fmt::format("\"{}\" changes at frame {}: it has as many faces as at frame {} ({}), but face {} joins "
-                        "other vertices; a sequence deforms one mesh, whose faces stay the same",
+            fmt::format("\"{}\" changes at frame {}: it has as many faces as at frame {} ({}), but face {} joins other "
+                        "vertices; a sequence must keep the faces of its mesh",
                         name_, frame, first(), faces_, other.first - mesh->triangles.begin()));
 
     const double near = same_corner * mesh->bounds().sizes().maxCoeff();
@@ -81,8 +81,8 @@ MeshPtr MeshSequence::read(int frame) const
         const double apart = (file.positions[corner] - mesh->positions[vertex_of_[corner]]).norm();
         if (!(apart <= near))
             throw Error(
-                fmt::format("corner {} of \"{}\" leaves the vertex that it shares at frame {} by {:.3g} m at frame "
-                            "{}; begin the sequence at a frame where what can part does not touch",
+                fmt::format("corner {} of \"{}\" shares a vertex at frame {} and is {:.3g} m away from it at frame {}; "
+                            "begin the sequence at a frame in which separate parts do not touch",
                             corner, name_, first(), apart, frame));
     }
     return mesh;

@@ -5,6 +5,6 @@ namespace rapid {
 
 // Part of error messages.
 inline constexpr char open_mesh_remedy[] =
-    "close it: a ground, by a copy of its outer edge lower down, faces between the two, and a bottom";
+    "close it: for a ground, add a copy of its outer edge lower down, faces between the two, and a bottom";
 
 }  // namespace rapid

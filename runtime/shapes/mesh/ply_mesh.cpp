@@ -124,7 +124,7 @@ void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
 {
     if (vertex.has_lists()) throw Error("vertices with list properties can't be read");
     if (vertex.count > std::numeric_limits<std::int32_t>::max())
-        throw Error(fmt::format("{} vertices are more than a mesh can have", vertex.count));
+        throw Error(fmt::format("{} vertices are too many for a mesh", vertex.count));
     const PlyRecords records = file.read_records(vertex);
     const Properties properties(vertex, records);
     const Property x = properties.find("x"), y = properties.find("y"), z = properties.find("z");
@@ -237,10 +237,8 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
         // A face with one or two corners is a point or a line and has no surface.
         const std::size_t before = mesh.triangles.size();
         if (corners.size() >= 3 && !cutter.append(mesh.positions, corners, mesh.triangles))
-            throw Error(
-                fmt::format("face {} has {} corners, too many in too winding a line to be cut into triangles; "
-                            "divide it",
-                            row, corners.size()));
+            throw Error(fmt::format("face {} has {} corners in a line too winding to be cut into triangles; divide it",
+                                    row, corners.size()));
         values.append(file, mesh.triangles.size() - before);
         ++row;
     });
@@ -266,7 +264,7 @@ MeshFile read_ply_mesh(const std::filesystem::path& path)
             read_vertices(file, element, mesh);
             has_vertices = true;
         } else if (element.name == "face" && !has_faces) {
-            if (!has_vertices) throw Error("the faces are before the vertices");
+            if (!has_vertices) throw Error("the faces come before the vertices");
             read_faces(file, element, mesh);
             has_faces = true;
         } else {

@@ -69,7 +69,7 @@ MeshFile receive_mesh(MessageReader& message)
 {
     const auto positions = message.take<std::size_t>(), colours = message.take<std::size_t>(),
                triangles = message.take<std::size_t>();
-    if (colours != 0 && colours != positions) throw Error("its reader went wrong; it must be damaged");
+    if (colours != 0 && colours != positions) throw Error("the reader failed, so it must be damaged");
     MeshFile mesh;
     mesh.positions = message.take_vector<Vec3f>(positions);
     mesh.colours = message.take_vector<Vec3f>(colours);
@@ -133,8 +133,8 @@ MeshFile read_mesh_file(const std::filesystem::path& path)
     static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
     const std::string extension = lower_case(path.extension().string());
     if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
-        throw Error(fmt::format(
-            "\"{}\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
+        throw Error(
+            fmt::format("\"{}\" can't be read as a mesh; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));
 
     MeshFile file;
     try {
@@ -199,7 +199,7 @@ MeshPtr joined(const MeshFile& file, const std::vector<std::int32_t>& vertex_of,
         kept.push_back(f);
     }
     if (mesh->triangles.empty())
-        throw Error(fmt::format("the mesh \"{}\" has {} vertices and no faces; a mesh needs at least one triangle",
+        throw Error(fmt::format("the mesh \"{}\" has {} vertices but no faces; a mesh needs at least one triangle",
                                 mesh->name, mesh->positions.size()));
 
     if (std::any_of(alphas.begin(), alphas.end(), [](float alpha) { return alpha != 1.0f; }))

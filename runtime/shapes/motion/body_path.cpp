@@ -201,10 +201,10 @@ double root_mean_square(const Mesh& a, const Mesh& b)
 
 std::string describe(const Jump& jump, std::int64_t frame)
 {
-    return fmt::format("jumps by {:.3g} m to frame {}, {}", jump.distance, frame,
-                       jump.usual > 0
-                           ? fmt::format("{:.3g} times as far as in the frames around", jump.distance / jump.usual)
-                           : std::string("and is at rest in the frames around"));
+    return fmt::format(
+        "jumps by {:.3g} m to frame {}, {}", jump.distance, frame,
+        jump.usual > 0 ? fmt::format("{:.3g} times as far as in the neighbouring frames", jump.distance / jump.usual)
+                       : std::string("and is at rest in the neighbouring frames"));
 }
 
 FramePath FramePath::find(std::int64_t frame, const FrameRange& range, const PathOptions& options, double size,

@@ -111,8 +111,7 @@ void check_curves(std::span<const Vec3f> points, const CurveLines& lines)
         if (!points[i].allFinite()) throw Error(fmt::format("point {} of the curve is not finite", i + 1));
     for (const CurveLines::Line& line : lines.lines)
         if (points[static_cast<std::size_t>(line.a)] == points[static_cast<std::size_t>(line.b)])
-            throw Error(fmt::format("points {} and {} are at one place; a curve goes from place to place", line.a + 1,
-                                    line.b + 1));
+            throw Error(fmt::format("points {} and {} have the same position; remove one", line.a + 1, line.b + 1));
 }
 
 }  // namespace
@@ -134,7 +133,7 @@ CurveLines::CurveLines(std::span<const std::size_t> counts, bool closed)
 Curves::Curves(std::vector<Vec3f> points, const std::vector<std::size_t>& counts, bool closed,
                std::map<std::string, Mesh::VertexValues> values, std::string name)
 {
-    if (counts.empty()) throw Error("there is no point; a curve needs at least two");
+    if (counts.empty()) throw Error("there are no points; a curve needs at least two");
     for (std::size_t k = 0; k < counts.size(); ++k)
         if (counts[k] < 2)
             throw Error(fmt::format("{} {} {}; a curve needs at least two",

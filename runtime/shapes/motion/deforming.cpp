@@ -75,7 +75,7 @@ Deformation::Interval Deformation::over(const FrameClock& clock, double from, do
         band_ = band;
         return body_->at(clock, whole, band);
     };
-    if (!std::isfinite(band_)) throw Error("a band without end: the snapshot is of another graph, or damaged");
+    if (!std::isfinite(band_)) throw Error("an endless band: the snapshot belongs to another graph or is damaged");
     if (!at_end_ && end_ == from) at_end_ = build(mesh.at(clock, static_cast<std::int64_t>(from)), band_);
     if (path.kind == FramePath::Still) {
         if (!(at_end_ && end_ == from && at_end_->band() >= band)) at_end_ = at_frame(frame);

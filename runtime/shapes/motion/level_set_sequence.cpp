@@ -106,8 +106,8 @@ LevelSetPtr LevelSetSequence::at(std::int64_t frame) const
     if (!file) return nullptr;
     if (!files_.files.count(*file))
         throw Error(
-            fmt::format("frame {} of \"{}\" is missing; there must be a file for each frame from {} to {} where "
-                        "what asks is not a collider or a force",
+            fmt::format("frame {} of \"{}\" is missing; each frame from {} to {} needs a file, unless a collider or a "
+                        "force uses it",
                         *file, name_, files_.files.begin()->first, files_.files.rbegin()->first));
     return read(*file);
 }

@@ -61,8 +61,8 @@ public:
         constexpr double most = 1000;
         if (factors_ > most)
             throw Error(
-                fmt::format("a product of {:g} motions, of which some vary; at most {} are taken: compute them "
-                            "in one function of the frame",
+                fmt::format("a product has {:g} motions, some of which vary; at most {} are possible: compute them in "
+                            "one function of the frame",
                             factors_, most));
     }
     Pose at(const Frame& frame) const override { return first_->at(frame) * second_->at(frame); }
@@ -277,7 +277,7 @@ MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys) { return keyed_motion(
 
 MotionPtr keyed_motion(std::map<std::int64_t, Pose> keys, std::map<std::int64_t, Turns> turns)
 {
-    if (keys.empty()) throw Error("a motion by keys has none; give a motion at one frame at least, {[1] = ...}");
+    if (keys.empty()) throw Error("a motion by keys has no keys; give a motion for at least one frame, {[1] = ...}");
     if (keys.size() == 1) return constant_motion(keys.begin()->second);
     return std::make_shared<KeyedMotion>(std::move(keys), std::move(turns));
 }

@@ -8,14 +8,14 @@ namespace rapid {
 
 ScatterPtr Shape::surface_scatter() const
 {
-    throw Error(
-        fmt::format("a {} has no finite surface to be born on; use a mesh, a level set, a sphere or a box", kind()));
+    throw Error(fmt::format(
+        "a {} has no finite surface that could emit points; use a mesh, a level set, a sphere or a box", kind()));
 }
 
 ScatterPtr Shape::volume_scatter() const
 {
     throw Error(fmt::format(
-        "a {} has no finite volume to be born in; use a closed mesh, a level set, a sphere or a box", kind()));
+        "a {} has no finite volume that could emit points; use a closed mesh, a level set, a sphere or a box", kind()));
 }
 
 ScatterPtr scatter_on_surface(const ShapePtr& shape) { return shape->surface_scatter(); }

@@ -73,9 +73,9 @@ ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> densit
         }
     }
     if (!(area > 0))
-        throw Error(fmt::format("mesh \"{}\" has {} faces and no area; nothing can be born on it", mesh->name,
+        throw Error(fmt::format("mesh \"{}\" has {} faces but no area, so it can't emit points", mesh->name,
                                 mesh->triangles.size()));
-    if (!(sum > 0)) throw Error("the density is 0 wherever the mesh has area; it must be above 0 somewhere");
+    if (!(sum > 0)) throw Error("the density is 0 everywhere on the mesh; it must be above 0 somewhere");
     return std::make_shared<ScatterByDensity>(mesh, AliasTable(weights, sum));
 }
 

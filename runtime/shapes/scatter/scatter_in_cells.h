@@ -43,7 +43,7 @@ public:
     {
         if (!(volume > min_part * cells_.volume()))
             throw Error(
-                fmt::format("the volume of {}, {:.3g} m³, is too thin to be born in: it is less than {:g} of the "
+                fmt::format("the volume of {}, {:.3g} m³, is too thin to emit points: it is less than {:g} of the "
                             "cells around it; use its surface",
                             what, volume, min_part));
     }
@@ -75,7 +75,7 @@ private:
             const Vec3f P = (cells_.low(cells_.cells[n]) + in_cell).template cast<float>();
             if (n < cells_.whole || inside_(P)) return P;
         }
-        throw Error("no place was found in a volume that is too thin to be born in; use its surface");
+        throw Error("no position was found in a volume that is too thin to emit points; use its surface");
     }
 
     ScatterCells cells_;

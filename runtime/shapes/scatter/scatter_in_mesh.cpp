@@ -85,14 +85,14 @@ ScatterPtr scatter_in_volume(const MeshPtr& mesh)
     const Mesh::Openness open = mesh->openness();
     if (open.odd_edges > 0)
         throw Error(fmt::format(
-            "{} bounds no volume: {} of its edges have an odd number of faces; close it, or use its surface", what,
+            "{} encloses no volume: {} of its edges have an odd number of faces; close it, or use its surface", what,
             open.odd_edges));
     InMesh inside{RayCrossings(mesh), open.unbalanced_edges == 0};
     ScatterCells cells = cells_of(*mesh, inside);
     // Pieces of opposite orientation reduce the signed volume, but not the number of cells that are wholly inside.
     const double volume = std::max(std::abs(mesh->signed_volume()), double(cells.whole) * cells.edge.prod());
     if (!(volume > 0))
-        throw Error(fmt::format("{} has {} faces and no volume; use its surface", what, mesh->triangles.size()));
+        throw Error(fmt::format("{} has {} faces but no volume; use its surface", what, mesh->triangles.size()));
     return std::make_shared<ScatterInCells<InMesh>>(std::move(cells), std::move(inside), volume, what);
 }
 

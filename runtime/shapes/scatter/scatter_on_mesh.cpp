@@ -70,7 +70,7 @@ ScatterPtr scatter_on_surface(const MeshPtr& mesh)
         sum += areas.back();
     }
     if (!(sum > 0))
-        throw Error(fmt::format("mesh \"{}\" has {} faces and no area; nothing can be born on it", mesh->name,
+        throw Error(fmt::format("mesh \"{}\" has {} faces but no area, so it can't emit points", mesh->name,
                                 mesh->triangles.size()));
     return std::make_shared<ScatterOnMesh>(std::move(faces), AliasTable(areas, sum));
 }

@@ -127,7 +127,8 @@ void ContactSearch::require_room(const PairUse& use) const
     const double found = estimate_pairs(grids_, spheres_);
     if (fit(found)) return;
     const std::string what = fmt::format("{}: about {:.2g} pairs of {} points", use.what, found, spheres_.P.size());
-    if (found > max_numbers) throw Error(fmt::format("{}; there can be {:.2g}; {}", what, max_numbers, use.remedy));
+    if (found > max_numbers)
+        throw Error(fmt::format("{}; at most {:.2g} are possible; {}", what, max_numbers, use.remedy));
     throw memory_exceeded(what, found * use.bytes_per_pair, use.remedy);
 }
 
@@ -233,8 +234,8 @@ void ContactSearch::sort(Pairs& pairs, std::size_t points)
     std::size_t all = 0;
     for (const Found* found : sources) all += found->size();
     if (static_cast<double>(all) > max_numbers)
-        throw Error(
-            fmt::format("{} pairs of points touch; there can be {:.2g}; give a smaller radius", all, max_numbers));
+        throw Error(fmt::format("{} pairs of points touch; at most {:.2g} are possible; give a smaller radius", all,
+                                max_numbers));
     const std::size_t each_size = bucket_size(points), buckets = points / each_size + 1, chunks = sources.size();
     starts_.assign(buckets * chunks + 1, 0);
     const auto each = [&](const auto& f) {

@@ -53,8 +53,8 @@ std::string text_of(const Resolution& resolution)
 {
     if (!resolution.loses_motion && resolution.spacing < coarse) return {};
     return fmt::format(
-        "rounding positions at {:.3g} m are {:.1e} m apart in single precision: motion below {:.1e} m/s is lost there; "
-        "nearer to the origin they are closer\n",
+        "rounding positions at {:.3g} m are {:.1e} m apart in single precision, so motion below {:.1e} m/s is lost "
+        "there; move the scene nearer to the origin\n",
         resolution.coordinate, resolution.spacing, 0.5 * resolution.spacing / resolution.h);
 }
 

@@ -75,9 +75,9 @@ describe("attributes at birth", function()
 
   it("refuse ramps that go back, and types that differ", function()
     assert.truthy(scene.error([[return rapid.create {} :emit { source = rapid.mesh.sphere {}, count = 1,
-      attributes = { heat = {{0, 1}, {0, 2}} } } :solve {}]]):find("keys rise from 0 to 1", 1, true))
+      attributes = { heat = {{0, 1}, {0, 2}} } } :solve {}]]):find("keys must increase from 0 to 1", 1, true))
     assert.truthy(scene.error([[return rapid.create {} :emit { source = rapid.mesh.sphere {}, count = 1,
-      attributes = { heat = {{0, 1}, {1, {1, 2, 3}}} } } :solve {}]]):find("values of two types", 1, true))
+      attributes = { heat = {{0, 1}, {1, {1, 2, 3}}} } } :solve {}]]):find("values of different types", 1, true))
   end)
 end)
 

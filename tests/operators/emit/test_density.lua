@@ -60,7 +60,7 @@ describe("emit by a density", function()
     scene.folder:write("square.ply", square)
     local read = 'rapid.mesh.read "square.ply"'
     assert.truthy(error_of(read, 'density = "haet"')
-      :find('the source has no float of that name; did you mean "heat"?', 1, true))
+      :find('the source has no float with this name; did you mean "heat"?', 1, true))
     assert.truthy(error_of("rapid.shape.sphere {}", 'density = "heat"'):find("is an attribute of points", 1, true))
     assert.truthy(error_of(read, 'density = "heat", from = "volume"'):find("which a volume does not have", 1, true))
     assert.truthy(error_of("rapid.points.from { P = {{0, 0, 0}}, w = {-1} }", 'density = "w"')

@@ -55,7 +55,7 @@ describe("points that are a function of the frame", function()
       assert.near({x, x == 5 and math.max(5, 5 + y - 1) or y, x == 5 and 5 or 0}, p.P, 1e-5)
     end
     assert.equal(1, #result.warnings)
-    assert.truthy(result.warnings[1]:find("1 of 3 points of the source were not in it at the frame before 2", 1, true))
+    assert.truthy(result.warnings[1]:find("1 of 3 points of the source are new in frame 2", 1, true))
   end)
 
   it("jump where cut says so", function()

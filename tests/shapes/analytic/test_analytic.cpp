@@ -86,7 +86,7 @@ TEST_CASE("shapes without a size are refused, with the value given", "[analytic]
 {
     CHECK(message_of([] {
               make_plane({0, 0, 0}, 1);
-          }) == "normal of a plane = {0, 0, 0} has no direction; any length but zero is right");
+          }) == "normal of a plane = {0, 0, 0} has no direction; its length must be above 0");
     CHECK(message_of([] {
               make_sphere_shape(0, {0, 0, 0});
           }) == "radius of a sphere = 0 is out of range; it must be above 0");

@@ -113,9 +113,9 @@ TEST_CASE("what is no fog is an error that says what is, and what is in the file
     CHECK_THAT(folder.error({one}, "smok"), Catch::Contains("did you mean \"smoke\"?"));
     CHECK_THAT(folder.error({surface}), Catch::Contains("there is no fog of floats"));
     CHECK_THAT(folder.error({surface}, "surface"),
-               Catch::Contains("is a level set of float; it must be a fog of floats: rapid.levelset.read takes level"));
+               Catch::Contains("is a level set of float; it must be a fog of floats; rapid.levelset.read reads level"));
     CHECK_THAT(folder.error({negative}),
                Catch::EndsWith("grid \"density\" is -1 at voxel 1 2 3; a density must be at least 0"));
-    CHECK_THAT(folder.error({empty}), Catch::EndsWith("has no density above 0; nothing can be born in it"));
+    CHECK_THAT(folder.error({empty}), Catch::EndsWith("has no density above 0, so it can't emit points"));
     CHECK_THAT(error_of([&] { read_density_grid(folder / "none.vdb", ""); }), Catch::Contains("there is no file"));
 }

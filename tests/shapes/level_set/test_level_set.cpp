@@ -200,9 +200,9 @@ TEST_CASE("a level set from a mesh is negative inside, whichever way its faces l
     const auto wrong = level_set_from_mesh(turned(sphere), {0.05, 3}, warnings);
     CHECK(none.empty());
     REQUIRE(warnings.size() == 1);
-    CHECK_THAT(warnings[0],
-               Equals("mesh \"sphere\" is turned inside out: its volume is -4.172 m³; its faces are taken to "
-                      "look outwards"));
+    CHECK_THAT(
+        warnings[0],
+        Equals("mesh \"sphere\" is inside out: its volume is -4.172 m³; its faces are assumed to point outwards"));
     for (const Vec3d& P : random_points(2000, cube(1.3))) {
         REQUIRE(sample_at(*right, P).phi == sample_at(*wrong, P).phi);
         if (std::abs(P.norm() - 1) > 0.01) REQUIRE((sample_at(*right, P).phi < 0) == (P.norm() < 1));
@@ -252,10 +252,11 @@ TEST_CASE("a hole smaller than a voxel is closed, with a warning", "[level set]"
     const auto sphere = level_set_from_mesh(holed, {0.1, 3}, warnings);
     CHECK(sample_at(*sphere, Vec3d::Zero()).phi < 0);
     REQUIRE(warnings.size() == 1);
-    CHECK_THAT(warnings[0],
-               Equals("mesh \"sphere\" is not closed: 3 edges have one face, and 0 have more than two or two that look "
-                      "different ways; holes smaller than a voxel (0.1 m) are closed, through larger ones its inside "
-                      "counts as outside"));
+    CHECK_THAT(
+        warnings[0],
+        Equals(
+            "mesh \"sphere\" is not closed: 3 edges have one face, and 0 have more than two or two that face different "
+            "ways; holes smaller than a voxel (0.1 m) are closed; with larger ones the inside counts as outside"));
 }
 
 TEST_CASE("pieces thinner than a voxel are named in a warning", "[level set]")
@@ -264,9 +265,8 @@ TEST_CASE("pieces thinner than a voxel are named in a warning", "[level set]")
     level_set_from_mesh(joined(make_sphere(1, 48, Vec3d::Zero()), make_box({1, 1, 0.01}, {3, 0, 0.02})), {0.1, 3},
                         warnings);
     REQUIRE(warnings.size() == 1);
-    CHECK_THAT(warnings[0],
-               Equals("1 of the 2 pieces of mesh \"both\" are thinner than a voxel (0.1 m) and may be missing; "
-                      "a smaller voxel keeps them"));
+    CHECK_THAT(warnings[0], Equals("1 of the 2 pieces of mesh \"both\" are thinner than a voxel (0.1 m) and may be "
+                                   "missing; use a smaller voxel"));
 }
 
 TEST_CASE("meshes that can't become a level set are refused with the numbers, before it is built", "[level set]")
@@ -296,8 +296,7 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
             level_set_sphere(1, o, {1e-5, 3});
         }),
         Equals("a level set sphere of radius 1 m with voxel = 1e-05 m would make about 7.54e+11 voxels and an index "
-               "of 1.56e+13 blocks, and 2147483648 of each can be held; a voxel of at least 0.000198 m stays below "
-               "that"));
+               "of 1.56e+13 blocks, but at most 2147483648 of each are possible; use a voxel of at least 0.000198 m"));
     CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(sphere, {1e-5, 3}, w);
                }),
@@ -317,9 +316,8 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
     CHECK_THAT(test::error_of([&] {
                    level_set_from_mesh(make_grid(2, 2, 4, {0, 0.02, 0}), {0.1, 3}, w);
                }),
-               Equals("mesh \"grid\" encloses nothing with voxel = 0.1 m: 16 of its edges have one face, and outside "
-                      "reaches its inside through them; close it: a ground, by a copy of its outer edge lower down, "
-                      "faces between the two, and a bottom"));
+               Equals("mesh \"grid\" has no inside with voxel = 0.1 m: 16 of its edges have one face; close it: for a "
+                      "ground, add a copy of its outer edge lower down, faces between the two, and a bottom"));
 }
 
 TEST_CASE("a wider band is the same surface with exact distances farther out", "[level set]")
@@ -343,7 +341,7 @@ TEST_CASE("a wider band is the same surface with exact distances farther out", "
         }
     }
     CHECK_THAT(test::error_of([&] { from_formula->with_band(1e6); }),
-               Catch::Matchers::Contains("stays below that") || Catch::Matchers::Contains("are free of"));
+               Catch::Matchers::Contains("are possible; use a voxel") || Catch::Matchers::Contains("are free; "));
 }
 
 TEST_CASE("a level set far from the origin is as good as one at it", "[level set]")

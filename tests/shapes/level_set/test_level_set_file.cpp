@@ -95,7 +95,8 @@ TEST_CASE("a file's other grids are left alone, and a grid is found by its name"
                "float); did you mean \"surface\"?"));
     CHECK_THAT(
         folder.message_of([&] { read_level_set(file, "density"); }),
-        Equals("grid \"density\" of \"both.vdb\" is float of class \"fog volume\"; it must be a float level set"));
+        Equals(
+            "grid \"density\" of \"both.vdb\" is float with the class \"fog volume\"; it must be a float level set"));
 }
 
 TEST_CASE("level sets that share their values, and files without offsets, are read", "[level set][file]")
@@ -130,7 +131,7 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
     folder.write_grids("two.vdb", {sphere_grid("a"), sphere_grid("b")});
     CHECK_THAT(refusal("two.vdb", ""),
                Equals("there are 2 level sets in \"two.vdb\": \"a\" (level set of float), \"b\" "
-                      "(level set of float); name one by grid"));
+                      "(level set of float); choose one with grid"));
 
     auto empty = openvdb::FloatGrid::create(0.3f);
     empty->setName("empty");
@@ -142,16 +143,17 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
     auto positive = empty->deepCopy();
     positive->tree().setValue({0, 0, 0}, 0.1f);
     folder.write_grids("positive.vdb", {positive});
-    CHECK_THAT(refusal("positive.vdb", ""),
-               Equals("grid \"empty\" of \"positive.vdb\" has 1 active voxels and no surface; "
-                      "a level set changes sign"));
+    CHECK_THAT(
+        refusal("positive.vdb", ""),
+        Equals(
+            "grid \"empty\" of \"positive.vdb\" has 1 active voxels but no surface; a level set must change its sign"));
 
     auto turned = sphere_grid("turned");
     turned->transform().postRotate(0.5, openvdb::math::Y_AXIS);
     folder.write_grids("turned.vdb", {turned});
     CHECK_THAT(refusal("turned.vdb", ""),
-               Equals("the map of grid \"turned\" of \"turned.vdb\" is not a uniform scale and a "
-                      "translation; resample it to cubic voxels along the axes"));
+               Equals("the transform of grid \"turned\" of \"turned.vdb\" is not a uniform scale and a translation; "
+                      "resample the grid to cubic voxels along the axes"));
 
     folder.write_grids("fog.vdb", {[] {
                            auto fog = openvdb::FloatGrid::create(0);

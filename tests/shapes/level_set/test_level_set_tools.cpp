@@ -199,7 +199,7 @@ TEST_CASE("an operation that leaves nothing, or can't be built, is refused with 
     CHECK_THAT(test::error_of([&] {
                    level_set_from_points(P, std::vector<float>{0.1f}, {0.1, 3});
                }),
-               Contains("point 0 has the radius 0.1 m, and with voxel = 0.1 m it must be at least 1.5 voxels"));
+               Contains("point 0 has the radius 0.1 m; with voxel = 0.1 m it must be at least 1.5 voxels"));
     CHECK_THAT(test::error_of([&] {
                    level_set_from_points(P, std::vector<float>{1.0f}, {0.1, 3});
                }),

@@ -54,5 +54,5 @@ TEST_CASE("an accessor of glTF is read within its buffer, or refused", "[mesh][r
         CHECK_THAT(error_of([&, &count = count, &stride = stride, &offset = offset] {
                        folder.read(heat(count, stride, offset));
                    }),
-                   Catch::Matchers::Contains("leads out of its buffer"));
+                   Catch::Matchers::Contains("goes beyond its buffer"));
 }

@@ -316,9 +316,9 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
     };
     CHECK_THAT(refusal("none.obj", nullptr), Equals("there is no mesh file \"none.obj\""));
     CHECK_THAT(refusal("scene.fbx", "x"),
-               Equals("\"scene.fbx\" is not a mesh file that can be read; it must be .obj, .ply, .stl, .gltf or .glb"));
+               Equals("\"scene.fbx\" can't be read as a mesh; it must be .obj, .ply, .stl, .gltf or .glb"));
     CHECK_THAT(refusal("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 1\nf 1 2 2\n"),
-               Equals("the mesh \"points.obj\" has 2 vertices and no faces; a mesh needs at least one triangle"));
+               Equals("the mesh \"points.obj\" has 2 vertices but no faces; a mesh needs at least one triangle"));
     CHECK_THAT(refusal("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"),
                Equals("vertex 1 of the mesh \"nan.obj\" is at (nan, 0, 0); coordinates must be finite"));
     CHECK_THAT(refusal("broken.ply", "ply\nthis is no header\n"),
@@ -346,7 +346,7 @@ TEST_CASE("a small file of parts without number is refused for its memory or its
     // The address sanitizer maps more than any limit, so there the time limit ends the reader.
     using Catch::Matchers::Contains;
     CHECK_THAT(test::error_of([&] { read_mesh(path); }),
-               Contains("it takes more than 1024 MB of memory") || Contains("it takes its reader longer than 5 s"));
+               Contains("it needs more than 1024 MB of memory") || Contains("it takes longer than 5 s"));
 }
 
 TEST_CASE("a scanned mesh and an animated one are read as their makers describe them", "[mesh][read]")

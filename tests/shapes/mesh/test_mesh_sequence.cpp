@@ -103,7 +103,7 @@ TEST_CASE("a sequence whose topology changes is refused, with the frame and both
     const MeshSequence sequence = folder.sequence(1, 3);
     CHECK_THAT(
         test::error_of([&] { sequence.at(2); }),
-        Contains("changes at frame 2: it has 6 corners and 2 faces there, and 12 corners and 4 faces at frame 1"));
+        Contains("changes at frame 2: it has 6 corners and 2 faces there and 12 corners and 4 faces at frame 1"));
     // Corners in another order keep their vertices.
     CHECK_THAT(test::error_of([&] { sequence.at(3); }), Contains("at frame 3"));
 }
@@ -115,5 +115,5 @@ TEST_CASE("a sequence without a file, or with a gap, says which frame is missing
     folder.tetrahedron(1, 1);
     folder.tetrahedron(3, 1);
     CHECK_THAT(test::error_of([&] { folder.sequence(1, 3); }),
-               Contains("frame 2 of \"body.####.obj\" is missing; there must be a file for each frame from 1 to 3"));
+               Contains("frame 2 of \"body.####.obj\" is missing; each frame from 1 to 3"));
 }

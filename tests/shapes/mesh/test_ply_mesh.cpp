@@ -63,12 +63,12 @@ TEST_CASE("a damaged mesh .ply is an error that says how", "[mesh][ply]")
 {
     const PlyFolder folder;
     CHECK(folder.error(square_file("3", "3 0 1 2\n3 0 2 3\n")) ==
-          "face 2 of 3: there is no vertex_indices; the file ends early or is damaged");
+          "face 2 of 3: vertex_indices is missing; the file ends early or is damaged");
     CHECK_THAT(folder.error(square_file("1000000", "3 0 1 2\n")),
-               Catch::StartsWith("the file ends early: its header promises"));
+               Catch::StartsWith("the file ends early: its header announces"));
     CHECK(folder.error(
               "ply\nformat ascii 1.0\nelement face 0\nproperty list uchar int vertex_indices\nelement vertex 0\n" +
-              xyz + "end_header\n") == "the faces are before the vertices");
+              xyz + "end_header\n") == "the faces come before the vertices");
     CHECK(folder.error("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n") ==
           "the vertices have no x y z");
     CHECK(folder.error("ply\nformat ascii 1.0\nelement vertex 0\n" + xyz +
@@ -168,7 +168,7 @@ TEST_CASE("a polygon whose cutting takes too long is an error that names the fac
 {
     const PlyFolder folder;
     CHECK(folder.error(Spiral(100000).file(0, 1)) ==
-          "face 0 has 100000 corners, too many in too winding a line to be cut into triangles; divide it");
+          "face 0 has 100000 corners in a line too winding to be cut into triangles; divide it");
 }
 
 TEST_CASE("every number of the vertices of a PLY is a value of the mesh; three that belong together are a vec3",

@@ -252,25 +252,28 @@ TEST_CASE("sources without area or volume are refused with the numbers", "[scatt
     CHECK_THAT(test::error_of([&] {
                    scatter_on_surface(make_mesh({{0, 0, 0}, {1, 0, 0}}, {{0, 1, 1}}));
                }),
-               Equals("mesh \"points and faces\" has 1 faces and no area; nothing can be born on it"));
+               Equals("mesh \"points and faces\" has 1 faces but no area, so it can't emit points"));
     CHECK_THAT(
         test::error_of([&] { scatter_in_volume(make_grid(1, 1, 2, o)); }),
-        Equals("mesh \"grid\" bounds no volume: 8 of its edges have an odd number of faces; close it, or use its "
+        Equals("mesh \"grid\" encloses no volume: 8 of its edges have an odd number of faces; close it, or use its "
                "surface"));
     CHECK_THAT(
         test::error_of([&] { scatter_in_volume(both(make_grid(1, 1, 2, o), make_grid(1, 1, 2, o), true)); }),
-        Equals("mesh \"grid\" bounds no volume: 16 of its edges have an odd number of faces; close it, or use its "
+        Equals("mesh \"grid\" encloses no volume: 16 of its edges have an odd number of faces; close it, or use its "
                "surface"));
     CHECK_THAT(test::error_of([&] {
                    scatter_in_volume(make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}));
                }),
-               Equals("mesh \"points and faces\" has 2 faces and no volume; use its surface"));
-    CHECK_THAT(test::error_of([&] {
-                   scatter_on_surface(make_plane({0, 1, 0}, 0));
-               }),
-               Equals("a plane has no finite surface to be born on; use a mesh, a level set, a sphere or a box"));
-    CHECK_THAT(test::error_of([&] {
-                   scatter_in_volume(make_plane({0, 1, 0}, 0));
-               }),
-               Equals("a plane has no finite volume to be born in; use a closed mesh, a level set, a sphere or a box"));
+               Equals("mesh \"points and faces\" has 2 faces but no volume; use its surface"));
+    CHECK_THAT(
+        test::error_of([&] {
+            scatter_on_surface(make_plane({0, 1, 0}, 0));
+        }),
+        Equals("a plane has no finite surface that could emit points; use a mesh, a level set, a sphere or a box"));
+    CHECK_THAT(
+        test::error_of([&] {
+            scatter_in_volume(make_plane({0, 1, 0}, 0));
+        }),
+        Equals(
+            "a plane has no finite volume that could emit points; use a closed mesh, a level set, a sphere or a box"));
 }

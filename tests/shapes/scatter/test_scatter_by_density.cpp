@@ -86,5 +86,5 @@ TEST_CASE("nothing is born where the density is 0, whatever batch a birth is in"
     scatter->place(RandomKey(1, "emit1"), 4000, later);
     for (std::size_t i = 0; i < later.size(); ++i) CHECK(later[i].P == all[4000 + i].P);
     CHECK(error_of([&] { scatter_by_density(mesh, uniform(*mesh, 0)); }) ==
-          "the density is 0 wherever the mesh has area; it must be above 0 somewhere");
+          "the density is 0 everywhere on the mesh; it must be above 0 somewhere");
 }

@@ -25,7 +25,7 @@ describe("the limit of impacts", function()
     end
     assert.is_true(limits >= 4 and impacts < 4 * 24 * 2010, ("%d, %d"):format(limits, impacts))
     assert.matches("points reached the limit of contacts", result.stdout)
-    assert.matches("rest where they are", result.stderr)
+    assert.matches("were stopped for the rest of it", result.stderr)
   end)
 
   it("lets what is jammed rest where it is", function()

@@ -290,9 +290,9 @@ describe("a collide node", function()
       return scene.error(("return rapid.create {} :collide { shape = rapid.shape.plane {}, %s } :solve {}")
         :format(options))
     end
-    assert.match('adhesion is for points that stick or slide, and response is "bounce"; give response = "stick"',
+    assert.match('adhesion needs points that stick or slide, but response is "bounce"; give response = "stick"',
       message "adhesion = 3")
-    assert.match('viscosity is for points that slide or stick, and response is "die"; give response = "slide"',
+    assert.match('viscosity needs points that slide or stick, but response is "die"; give response = "slide"',
       message "viscosity = 3, response = 'die'")
     assert.match("adhesion = %-1 is out of range", message "adhesion = -1, response = 'stick'")
   end)

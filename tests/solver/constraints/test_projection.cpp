@@ -27,8 +27,8 @@ TEST_CASE("points that become infinite within a frame stop it before neighbours 
     scene.force([huge](const Chunk& chunk, std::size_t i) { return Vec3d(chunk.P[i].x() > 1 ? huge : 0, 0, 0); });
     scene.substeps(8);
     CHECK(projection_error(scene) ==
-          "point 2, frame 1: P became {inf, 0, 0} in a sub-step; the frame was not written; weaker forces or more "
-          "sub-steps would keep it finite; it had P = {5, 0, 0}, v = {0, 0, 0}, pscale = 0.2");
+          "point 2, frame 1: P became {inf, 0, 0} in a substep; the frame was not written; use weaker forces or more "
+          "substeps; it had P = {5, 0, 0}, v = {0, 0, 0}, pscale = 0.2");
 }
 
 }  // namespace

@@ -30,7 +30,10 @@ def main():
     suite = loader.loadTestsFromModule(importlib.import_module(pathlib.Path(file).stem))
     result = unittest.TextTestRunner(resultclass=Timed, verbosity=0).run(suite)
     failed = len(result.failures) + len(result.errors)
-    print(f"{result.testsRun - failed} passed, {failed} failed", flush=True)
+    skipped = len(result.skipped)
+    for test, reason in result.skipped:
+        print(f"skipped: {test.id().rpartition('.')[2]}: {reason}")
+    print(f"{result.testsRun - failed - skipped} passed, {failed} failed, {skipped} skipped", flush=True)
 
 
 main()

@@ -175,3 +175,15 @@ def grown(thing, frames):
 def files_of(thing):
     """Returns the time of change of each file of points."""
     return {path.name: path.stat().st_mtime_ns for path in bake.folder_of(thing).glob("points_*.npz")}
+
+
+def in_new_process(blend, code="", environment=(), arguments=()):
+    """Opens a file in another Blender with the add-on, and runs code, then arguments of the command line."""
+    bindings = pathlib.Path(handlers.__file__).parents[2]
+    folders = [str(bindings / "blender"), str(bindings / "python")]
+    head = (f"import sys\nsys.dont_write_bytecode = True\nsys.path[:0] = {folders}\n"
+            "import bpy, rapid_blender\nrapid_blender.register()\n"
+            f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n")
+    return subprocess.run(["blender", "--background", "--factory-startup", "--python-expr", head + code, *arguments],
+                          env={**os.environ, **dict(environment)}, text=True, check=False, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT)

@@ -1,14 +1,11 @@
 """Saving, loading, moving, linking and undoing a .blend with a simulation."""
-import os
-import pathlib
 import shutil
-import subprocess
 
 import bpy
 import numpy
 
 from rapid_blender import bake, handlers
-from scenes import EMIT, Case, added, files_of, moved, values
+from scenes import EMIT, Case, added, files_of, in_new_process, moved, values
 
 
 class Files(Case):
@@ -128,7 +125,7 @@ class Library(Case):
         self.bake(thing)
         count = len(self.points(thing, 8)["P"])
         bpy.ops.wm.save_mainfile()
-        said = in_new_process(self.blend, {"RAPID_LIBRARY": "/nowhere/librapid_host.so"}, """
+        said = in_new_process(self.blend, environment={"RAPID_LIBRARY": "/nowhere/librapid_host.so"}, code="""
 bpy.context.scene.frame_set(8)
 thing = bpy.data.objects["Rapid"]
 print("COUNT", len(thing.data.vertices))
@@ -137,18 +134,6 @@ try:
     bpy.ops.rapid.bake()
 except RuntimeError as error:
     print("REFUSED", error)
-""")
+""").stdout
         self.assertIn(f"COUNT {count}", said)
         self.assertRegex(said, "REFUSED .*cannot be loaded: /nowhere/librapid_host.so")
-
-
-def in_new_process(blend, environment, code):
-    """Returns the output of code in another Blender with the add-on and a file."""
-    bindings = pathlib.Path(handlers.__file__).parents[2]
-    folders = [str(bindings / "blender"), str(bindings / "python")]
-    head = (f"import sys\nsys.dont_write_bytecode = True\nsys.path[:0] = {folders}\n"
-            "import bpy, rapid_blender\nrapid_blender.register()\n"
-            f"bpy.ops.wm.open_mainfile(filepath={str(blend)!r})\n")
-    done = subprocess.run(["blender", "--background", "--factory-startup", "--python-expr", head + code], check=True,
-                          env={**os.environ, **environment}, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    return done.stdout

@@ -1,7 +1,7 @@
 // clump: points that have touched stick together until they are torn apart (paper, figure 7: wet sand, snow, dirt).
 //
 //   C = |P_i - P_j| - rest, with rest the distance at first contact, at least the sum of the radii;
-//   breaks if the pull exceeds `strength` (N)
+//   pulls with at most `strength` (N), and breaks if more is needed
 //
 // A broken bond is removed. The points stick again after they have separated and touched once more. A bond only pulls;
 // contact keeps points from penetrating each other.
@@ -26,12 +26,13 @@ struct Bond {
     static constexpr bool one_sided = true;  // C = rest - distance >= 0: pulls only
     static constexpr bool rests = true;
 
-    double rest = 0;  // m
+    double rest = 0;      // m
+    double strength = 0;  // N
 
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(rest);
+        keep(rest, strength);
     }
 
     double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
@@ -75,7 +76,7 @@ public:
     void solve_velocities(Substep& step) override
     {
         Rows<Bond>::solve_velocities(step);
-        break_above(strength, step, [&](const Ids& ids) { broken_pairs.insert(ids); });
+        break_overloaded([&](const Ids& ids) { broken_pairs.insert(ids); });
     }
 };
 
@@ -89,6 +90,7 @@ public:
         bond(points);
         memory->follow(points, group);
         if (strength < std::exchange(memory->strength, strength)) memory->wake_all();
+        memory->for_each([&](const auto&, Bond& row) { row.strength = strength; });
         return memory;
     }
 
@@ -125,7 +127,7 @@ private:
                     touching.insert(pair);
                 } else if (!memory->has(pair)) {
                     const double touch_at = double(given[i]) + double(given[j]);
-                    memory->add(pair, {std::max(touch_at, (at[i] - at[j]).norm())}, 0);
+                    memory->add(pair, {std::max(touch_at, (at[i] - at[j]).norm()), strength}, 0);
                 }
             }
         memory->broken_pairs = std::move(touching);

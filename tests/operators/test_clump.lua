@@ -34,4 +34,18 @@ return rapid.create { fps = 24, points = rapid.points.from {
     assert.near(0.2, (p[1].P - p[2].P):length(), 5e-3)
     assert.near(0, p[1].P.x + p[2].P.x, 1e-5) -- momentum
   end)
+
+  it("takes no more than its strength from points that tear apart", function()
+    for _, substeps in ipairs({1, 4, 16}) do
+      for _, other in ipairs({"", ":collide { shape = rapid.shape.plane { offset = -100 } }", ":drag { linear = 0 }"}) do
+        local p = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from {
+    P = {{0, 1, 0}, {0.2, 1, 0}}, v = {{0, 0, 0}, {1, 0, 0}}, pscale = {0.1, 0.1} } }
+  :clump { strength = 0.2 } %s :solve { substeps = %d }]]):format(other, substeps), { frames = {1, 4} })[4]
+        local impulse = 0.2 / 24 / substeps
+        assert.near(impulse, p[1].v.x, 1e-6)
+        assert.near(1 - impulse, p[2].v.x, 1e-6)
+      end
+    end
+  end)
 end)

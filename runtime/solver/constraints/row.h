@@ -32,6 +32,8 @@ struct FunctionTraits {
         if constexpr (requires { Function::rests; }) return Function::rests;
         return false;
     }();
+
+    static constexpr bool limited = one_sided && requires(Function f) { f.strength; };
 };
 
 // Returns the change of a spring's C divided by dt, per N s of impulses of others on its points, 1/kg.
@@ -53,6 +55,7 @@ struct Row {
     Ids ids;
     Points points = filled(IdIndex::none);
     double impulse = 0;          // N s along the gradient, of the last substep; at least 0 if one-sided
+    bool is_overloaded = false;  // in this substep: to satisfy C takes more than the strength of a one-sided row
     double first = 0;            // C at the beginning of the substep
     double reference = 0;        // target of C after the row's own force has acted
     double added = 0;            // N s, the part of the impulse due to others, as far as it moves positions
@@ -165,6 +168,7 @@ struct Row {
         reference = compliance > 0 ? 0 : std::min(0.0, function.residual(P, direction));
         softness = compliance / (step.dt * step.dt);
         residual(step, direction);
+        if constexpr (Traits::limited) impulse = std::min(impulse, function.strength * step.dt);
         added = 0.5 * impulse;  // velocities get this part with the positions (Projection::advance)
         for (int k = 0; k < arity; ++k) {
             ProjectedPoint& point = step.points[points[k]];
@@ -188,7 +192,10 @@ struct Row {
         const double stiffness = softness + std::max(along, 0.5 * inverse_mass(step, gradient));
         const double total = Traits::one_sided ? impulse : added;
         double change = (-C / step.dt - softness * total) / stiffness;
-        if (Traits::one_sided) change = std::max(change, -added);
+        if (Traits::one_sided) {
+            is_overloaded = false;
+            change = limited(std::max(change, -added), step.dt);
+        }
         take(change);
         for (int k = 0; k < arity; ++k) {
             ProjectedPoint& point = step.points[points[k]];
@@ -213,7 +220,7 @@ struct Row {
         double change = -rate(step, gradient) / W;
         if (Traits::one_sided) {
             if (!(impulse > 0 || C < 0)) return;
-            change = std::max(change, -impulse);
+            change = limited(std::max(change, -impulse), step.dt);
         }
         impulse += change;
         for (int k = 0; k < arity; ++k) step.v[points[k]] += step.points[points[k]].w * change * gradient[k];
@@ -222,7 +229,7 @@ struct Row {
     // Moves the points to C = 0 without adding velocity.
     void correct_position(Substep& step) const
     {
-        if (compliance > 0) return;
+        if (compliance > 0 || is_overloaded) return;
         Vectors gradient;
         const double C = residual(step, gradient), W = inverse_mass(step, gradient);
         if (!(W > 0) || (Traits::one_sided && !(C < 0))) return;
@@ -242,6 +249,16 @@ struct Row {
     }
 
 private:
+    // Returns the part of a change of the impulse that the strength of the row allows.
+    double limited(double change, double dt)
+    {
+        if constexpr (Traits::limited) {
+            const double allowed = function.strength * dt - impulse;
+            if (change != 0) is_overloaded = change > allowed;
+            change = std::min(change, allowed);
+        }
+        return change;
+    }
     static Vectors zero()
     {
         Vectors result;

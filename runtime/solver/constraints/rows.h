@@ -7,6 +7,7 @@
 //       static constexpr bool one_sided = true;   if C >= 0 satisfies it (pushes only); default false
 //       bool breaks(double residual, double pull) const;   optional; called at the end of every substep; pull: the
 //                                                          force against the gradient, N
+//       double strength;                          optional, of a one-sided function: the largest force, N
 //       static constexpr bool rests = true;       if its points may sleep (sleep.h): the residual depends only on their
 //                                                 positions and its own members; default false
 //       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
@@ -174,15 +175,13 @@ public:
         std::sort(known_.begin(), known_.end());
     }
 
-    // Removes the rows that acted with more than `force` (N) in the substep, and calls removed(ids) for each.
+    // Removes the rows whose strength was exceeded in the substep, and calls removed(ids) for each.
     template <class F>
-    void break_above(double force, const Substep& step, const F& removed)
+    void break_overloaded(const F& removed)
     {
-        const double most = force * step.dt;
-        remove([&](const Row& row) {
-            if (!row.active || row.asleep || !(std::abs(row.impulse) > most)) return false;
+        break_rows([&](const Row& row) {
+            if (!row.is_overloaded) return false;
             removed(row.ids);
-            sleep_.release(row);
             return true;
         });
     }
@@ -244,6 +243,7 @@ public:
     {
         for (const Row& row : rows_)
             if (row.active && !row.asleep) islands.link(row.points);
+        for (const typename Row::Points& points : broken_points_) islands.link(points);
     }
 
     void yield(Substep& step, std::span<const std::uint8_t> points) override
@@ -264,6 +264,7 @@ public:
     void move_kinematic(Substep& step) override
     {
         keep_impulses(step.dt);
+        broken_points_.clear();
         for (Row& row : rows_) {
             row.asleep = sleep_.is_asleep(row, step);
             if (row.asleep)
@@ -338,11 +339,9 @@ public:
             for (const Row& row : rows_) sleep_.wake_by_load(row, step);
         }
         if constexpr (requires { &Function::breaks; })
-            remove([&](const Row& row) {
-                if (!row.active || row.asleep) return false;
+            break_rows([&](const Row& row) {
                 typename Row::Vectors gradient;
                 if (!row.function.breaks(row.residual(step, gradient), -row.impulse / step.dt)) return false;
-                sleep_.release(row);
                 ++broken_;
                 if (step.log)
                     for (const std::uint32_t i : row.points)
@@ -403,6 +402,18 @@ private:
         if (std::erase_if(rows_, gone) > 0) changed_ = true, known_is_complete_ = false;
     }
 
+    // Removes the acting rows for which breaks(row) is true.
+    template <class F>
+    void break_rows(const F& breaks)
+    {
+        remove([&](const Row& row) {
+            if (!row.active || row.asleep || !breaks(row)) return false;
+            sleep_.release(row);
+            broken_points_.push_back(row.points);
+            return true;
+        });
+    }
+
     // Rebuilds the schedule if rows were added or removed, or points became fixed or free.
     void schedule(const Substep& step)
     {
@@ -423,8 +434,10 @@ private:
     std::vector<Ids> known_;          // sorted
     bool known_is_complete_ = false;  // all rows are in known_
     bool changed_ = true;             // after the schedule was built
-    std::uint64_t broken_ = 0;        // rows broken in this frame
-    double dt_ = 0;                   // s, of the last substep
+    // The points of rows that broke in this substep: they have exchanged energy.
+    std::vector<typename Row::Points> broken_points_;
+    std::uint64_t broken_ = 0;  // rows broken in this frame
+    double dt_ = 0;             // s, of the last substep
     std::vector<std::uint8_t> fixed_;
     RowSchedule schedule_;
     SystemMotion<Function> system_;

@@ -143,7 +143,7 @@ describe("where points act on one another, the error is told, and bits are the s
           :format(nodes, substeps)
         local run = scene.command("run", text, "-f 1-12 --stats stats.json -o told.##.csv")
         assert.equal(0, run.status, run.stderr)
-        assert.match("\nerror    95 %% of the positions within [%d.]+ %S*m, all within [%d.]+ %S*m\n", run.stdout)
+        assert.match("\nerror    [^\n]*all[%a ]* within [%d.]+ %S*m\n", run.stdout)
         local frames = json.decode(scene.folder:read "stats.json").frames
         assert.truthy(frames[12].error.position_max > 1e-6, frames[12].error.position_max)
         assert.falsy(frames[12].left_out_of_errors)

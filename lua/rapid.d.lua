@@ -860,6 +860,7 @@ function Node:detail(params) end
 ---@field compliance? number  stretch per force; 0 makes a rigid rod [number, m/N, at least 0, default 0, constant]
 ---@field strain? number  breaks a spring that is stretched by more than this fraction of its distance; no load stretches a rod [number, above 0, constant]
 ---@field strength? number  breaks a pair that pulls with a larger force; an impact counts as a force over its substep, so more substeps break more [number, N, above 0, constant]
+---@field collide? boolean  lets the two points of a pair collide; by default they pass through each other, as beads of a rope do [boolean, default false, constant]
 ---@field name? string  name of the node in messages [string]
 
 ---Keeps pairs of points at a distance: rods, ropes, springs.

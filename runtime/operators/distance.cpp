@@ -43,11 +43,12 @@ struct Tie {
     double rest = 0;                                            // m
     double most = std::numeric_limits<double>::infinity();      // m, of stretch; above it the pair breaks
     double strength = std::numeric_limits<double>::infinity();  // N, of pull; above it the pair breaks
+    bool collides = false;                                      // with each other, where there are contacts
 
     template <class Archive>
     void serialize(Archive& keep)
     {
-        keep(rest, most, strength);
+        keep(rest, most, strength, collides);
     }
 
     double residual(const std::array<Vec3d, 2>& P, std::array<Vec3d, 2>& gradient) const
@@ -86,6 +87,7 @@ struct Distance {
     std::vector<PointPair> pairs;
     std::optional<double> within, rest, strain, strength;
     double compliance;
+    bool collide;
     std::string group;
 
     static NodeType declare()
@@ -113,6 +115,10 @@ struct Distance {
             .param(&Distance::strength, "strength", Value(), above(0), "N",
                    "breaks a pair that pulls with a larger force; an impact counts as a force over its substep, so "
                    "more substeps break more")
+            .constant()
+            .param(
+                &Distance::collide, "collide", false, any_number(), "",
+                "lets the two points of a pair collide; by default they pass through each other, as beads of a rope do")
             .constant();
     }
 
@@ -159,6 +165,7 @@ private:
         const Strided<Vec3f> P = points.P().read();
         const auto add = [&](std::size_t i, std::size_t j) {
             Tie made;
+            made.collides = collide;
             made.rest = rest ? *rest : (P[i].cast<double>() - P[j].cast<double>()).norm();
             if (strain) made.most = *strain * made.rest;
             if (strength) made.strength = *strength;

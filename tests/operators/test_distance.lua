@@ -266,6 +266,37 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, ma
   end)
 end)
 
+describe("a rope of beads that overlap", function()
+  local function rope(contact, collide)
+    return scene.run(([[
+local P, pairs = {}, {}
+for k = 1, 20 do P[k] = {0.09 * k, 2, 0}; if k > 1 then pairs[k - 1] = {k - 1, k} end end
+return rapid.create { points = rapid.points.from { P = P } } :attribute { pscale = 0.06 }
+  :group { name = "hook", where = function(p) return p.id == 0 end }
+  :gravity {} :drag { linear = 1 } :pin { group = "hook" } :distance { pairs = pairs, collide = %s } %s
+  :solve { substeps = 10 }]]):format(collide, contact), { frames = {1, 72} })
+  end
+
+  it("moves as without contacts between the two beads of a pair, which do not collide unless asked to", function()
+    local without, with = rope("", "false")[72], rope(":contact {}", "false")[72]
+    for i = 1, 20 do assert.near(without[i].P, with[i].P, 1e-3) end
+    local pushed = rope(":contact {}", "true")
+    assert.truthy((pushed[72][20].P - without[20].P):length() > 0.1)
+    assert.truthy(#pushed.warnings > 0)
+  end)
+
+  it("gains nothing out of rest from springs in an overlap", function()
+    for _, substeps in ipairs { 1, 16, 64 } do
+      local result = scene.run(([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0,0,0}, {1,0,0}, {0.5,0.9,0.1}},
+    pscale = {0.6, 0.6, 0.6} } }
+  :distance { compliance = 1e-5, within = 1.2 } :contact { spin = true, bounce = 0.5, friction = 0.3 }
+  :solve { substeps = %d }]]):format(substeps), { frames = {1, 72} })
+      for i = 1, 3 do assert.near(0, result[72][i].v:length(), 1e-3) end
+    end
+  end)
+end)
+
 describe("a tolerance", function()
   it("is refused where points are coupled", function()
     local errors = scene.error "return rapid.create { points = two } :contact {} :solve { tolerance = 1e-3 }"

@@ -45,3 +45,21 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}, {5,
     assert.near(0, points[2].P.y, 1e-6)
   end)
 end)
+
+describe("grains that lie on a collider with their centers", function()
+  it("come to rest in a stack, as those that lie on it with their surface", function()
+    for _, radius in ipairs { 0, 0.005, 0.05 } do
+      local result = scene.run(([[
+local P = {}
+for i = 0, 4 do P[i + 1] = {0, %g + 0.1 * i, 0} end
+return rapid.create { fps = 24, points = rapid.points.from { P = P } } :gravity {}
+  :collide { shape = rapid.shape.plane {}, radius = %g, bounce = 0 } :contact { radius = 0.05, friction = 0.5 }
+  :solve { substeps = 10 }]]):format(radius, radius), { frames = {1, 96} })
+      for i = 1, 5 do
+        local p = result[96][i]
+        assert.near(0, p.v:length(), 1e-6)
+        assert.near(radius + 0.1 * (i - 1), p.P.y, 0.01 * 0.05 * i)
+      end
+    end
+  end)
+end)

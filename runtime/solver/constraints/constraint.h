@@ -23,6 +23,7 @@
 // Most constraints need only a residual and its gradient: rows.h builds a Coupling from these.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -106,6 +107,8 @@ public:
     // Returns the radii of the points whose contact forces it records and 0 for others; empty if it records none.
     virtual std::span<const float> recorded() const { return {}; }
 
+    // Returns the radii at which its points meet one another, m; empty if they do not.
+    virtual std::span<const float> radii() const { return {}; }
     // Returns the material by which it turns points; null if it turns none.
     virtual const ContactMaterial* turns() const { return nullptr; }
 
@@ -120,6 +123,8 @@ public:
     // Adds the energy stored in its rows, J times the factor, to one point of each row; at the beginning of the
     // substep or at the current positions.
     virtual void add_stored_energy(const Substep&, std::span<const Vec3d>, double, std::span<double>) const {}
+    // Adds the pairs of points, the lower index first, that it joins so that contacts leave them alone.
+    virtual void add_joined(std::vector<std::array<std::uint32_t, 2>>&) const {}
     // Links the points that have exchanged energy in the substep.
     virtual void link(EnergyIslands&) const {}
     // Drops the row forces on marked points, which something else has moved, and moves these towards positions that

@@ -304,6 +304,9 @@ bool Contacts::may_touch(std::uint32_t pair, const Substep& step) const
 {
     const auto [i, j] = impulses_.pairs[pair];
     if (!step.lives(i) || !step.lives(j)) return false;
+    if (!excluded_.empty() &&
+        std::binary_search(excluded_.begin(), excluded_.end(), ContactPair{std::min(i, j), std::max(i, j)}))
+        return false;
     if (step.points[i].w + step.points[j].w > 0) return true;
     // A moving point of infinite mass wakes a sleeper that it touches.
     if (step.v[i] != step.v[j]) sleep_.wake_both(i, j);

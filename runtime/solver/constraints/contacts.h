@@ -92,10 +92,12 @@ public:
     bool only_dissipates() const override { return !material_.turns(); }  // except by mass scaling
     bool keeps_momentum() const override { return !scaling_.is_set(); }
     std::span<const float> recorded() const override;
+    std::span<const float> radii() const override { return material_.radius; }
     void link(EnergyIslands& islands) const override;
     void detect(Substep& step) override;
     bool solve_impacts(Substep& step, std::uint32_t sweep) override;
     void follow_rods(std::span<const std::uint32_t> islands) override { rods_ = islands; }
+    void exclude(std::span<const ContactPair> pairs) override { excluded_ = pairs; }
     void warm_start(Substep& step) override;
     void project(Substep& step) override;
     void solve_velocities(Substep& step) override;
@@ -159,12 +161,13 @@ private:
     ContactSleep sleep_;
 
     bool begins_frame_ = true, list_is_stale_ = true, backwards_ = false;
-    bool impacts_moved_ = false;            // impacts moved points after their contacts were found
-    double per_dt_ = 0;                     // 1/s, in the last substep
-    double search_seconds_ = 0;             // in this frame
-    std::vector<Vec3d> before_;             // positions before the warm start
-    std::span<const std::uint32_t> rods_;   // by point: its island of rods; empty if there are no rods
-    std::vector<std::uint32_t> disturbed_;  // points that changed, or that lost a neighbour pressing on them
+    bool impacts_moved_ = false;             // impacts moved points after their contacts were found
+    double per_dt_ = 0;                      // 1/s, in the last substep
+    double search_seconds_ = 0;              // in this frame
+    std::vector<Vec3d> before_;              // positions before the warm start
+    std::span<const std::uint32_t> rods_;    // by point: its island of rods; empty if there are no rods
+    std::span<const ContactPair> excluded_;  // sorted, joined by rods
+    std::vector<std::uint32_t> disturbed_;   // points that changed, or that lost a neighbour pressing on them
 };
 
 }  // namespace rapid

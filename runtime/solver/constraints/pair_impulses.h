@@ -22,6 +22,9 @@ public:
     // Is called before warm_start(). islands: by point; points linked by rods and springs share a number. Empty if
     // there are no rods or springs. Valid for the substep.
     virtual void follow_rods(std::span<const std::uint32_t> islands) = 0;
+    // Is called before the first substep of a frame. pairs: sorted, those that rods and springs join; they do not
+    // collide. Valid for the frame.
+    virtual void exclude(std::span<const std::array<std::uint32_t, 2>> pairs) = 0;
 };
 
 using ContactPair = std::array<std::uint32_t, 2>;  // indices of points

@@ -42,13 +42,28 @@ Projection::Projection(std::span<const LocalConstraint> constraints, std::span<c
     // Rods and springs fix their reference before contacts push their points, whichever node comes first.
     std::stable_partition(constraints_.begin(), constraints_.end(),
                           [](const LocalConstraint& local) { return local.coupling->has_forces(); });
-    if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sleep);
+    if (!obstacles.empty() && !constraints_.empty()) shapes_.emplace(obstacles, step.size(), sizes(), sleep);
     if (shapes_ && loads && step.dt > 0) shapes_->recall(*loads, errors_.ids(), step.dt);
     for (const LocalConstraint& local : constraints_) {
         local.coupling->join(sleep);
         if (auto* holding = dynamic_cast<Holding*>(local.coupling.get())) holdings_.push_back(holding);
         if (auto* carrying = dynamic_cast<CarriedImpulses*>(local.coupling.get())) carrying_.push_back(carrying);
+        local.coupling->add_joined(joined_);
     }
+    std::sort(joined_.begin(), joined_.end());
+    for (CarriedImpulses* carrying : carrying_) carrying->exclude(joined_);
+}
+
+// Returns the largest of the constraints' radii by point, m; empty if they have none.
+std::vector<float> Projection::sizes() const
+{
+    std::vector<float> sizes;
+    for (const LocalConstraint& local : constraints_) {
+        const std::span<const float> radii = local.coupling->radii();
+        if (sizes.empty()) sizes.assign(radii.begin(), radii.end());
+        for (std::size_t i = 0; i < radii.size(); ++i) sizes[i] = std::max(sizes[i], radii[i]);
+    }
+    return sizes;
 }
 
 template <class F>

@@ -61,6 +61,7 @@ private:
     double energy_of_positions(const Substep& step) const;
     void require_finite(const Substep& step) const;
     void begin_support(Substep& step);
+    std::vector<float> sizes() const;
     void follow_rods(const Substep& step);
     void solve_impacts(Substep& step);
 
@@ -87,6 +88,7 @@ private:
     std::vector<std::uint8_t> support_, next_support_;  // Substep::support
     std::vector<Vec3d> support_v_, next_support_v_;     // Substep::support_v
     std::vector<std::uint32_t> rods_;                   // by point: its island of rods and springs
+    std::vector<ContactPair> joined_;                   // sorted: pairs that do not collide
 };
 
 }  // namespace rapid

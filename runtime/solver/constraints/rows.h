@@ -8,6 +8,8 @@
 //       bool breaks(double residual, double pull) const;   optional; called at the end of every substep; pull: the
 //                                                          force against the gradient, N
 //       double strength;                          optional, of a one-sided function: the largest force, N
+//       bool collides;                            optional, of two points: whether contacts act between them;
+//                                                 default true
 //       static constexpr bool rests = true;       if its points may sleep (sleep.h): the residual depends only on their
 //                                                 positions and its own members; default false
 //       void discrete_gradient(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to,
@@ -238,6 +240,13 @@ public:
             if (Traits::one_sided) C = std::min(C, 0.0);
             energy[*one] += factor * 0.5 * C * C / row.compliance;
         }
+    }
+    void add_joined(std::vector<std::array<std::uint32_t, 2>>& pairs) const override
+    {
+        if constexpr (requires(Function f) { f.collides; })
+            for (const Row& row : rows_)
+                if (row.active && !row.function.collides)
+                    pairs.push_back({std::min(row.points[0], row.points[1]), std::max(row.points[0], row.points[1])});
     }
     void link(EnergyIslands& islands) const override
     {

@@ -82,9 +82,14 @@ constexpr double push = 0.5;
 
 }  // namespace
 
+float ShapeQuery::size(const Obstacle& obstacle, std::size_t i) const
+{
+    return sizes.empty() ? obstacle.radius[i] : std::max(obstacle.radius[i], sizes[i]);
+}
+
 double ShapeQuery::reach(const Obstacle& obstacle, std::size_t i) const
 {
-    return push * obstacle.radius[i] + moved[i - begin];
+    return push * size(obstacle, i) + moved[i - begin];
 }
 
 ShapeClearance::ShapeClearance(std::span<const Obstacle> obstacles, std::size_t size)
@@ -176,7 +181,7 @@ void ShapeClearance::close(const ShapeQuery& query, std::size_t o)
     const float* clearance = clearance_.data() + o * size_;
     for (const std::uint32_t i : query.open)
         if (obstacle.members[i])
-            room_[i] = std::min(room_[i], clearance[i] - static_cast<float>(push) * obstacle.radius[i]);
+            room_[i] = std::min(room_[i], clearance[i] - static_cast<float>(push) * query.size(obstacle, i));
 }
 
 namespace {
@@ -208,7 +213,8 @@ double friction_of(const Obstacle& obstacle, std::uint32_t i)
 
 }  // namespace
 
-ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep)
+ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, std::vector<float> sizes,
+                             const Sleep* sleep)
     : obstacles_(obstacles),
       size_(size),
       sleep_(sleep),
@@ -224,6 +230,7 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
     for (const ShapeLoads::Load& load : loads.loads) {
         const std::uint32_t i = index[load.id];
         if (i == IdIndex::none || load.obstacle >= obstacles_.size()) continue;
+      sizes_(std::move(sizes)),
         ShapeContact contact{};
         contact.i = i;
         contact.obstacle = load.obstacle;
@@ -344,6 +351,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
         const std::size_t first = contacts.size();
         for (std::size_t k = 0; k < query.queried.size(); ++k) {
             const std::uint32_t i = query.queried[k];
+    query.sizes = sizes_;
             if (query.phi[k] - obstacle.radius[i] > query.reach(obstacle, i) || !(query.gradient[k].norm() > 0))
                 continue;
             ShapeContact made = contact(query, k, o, step);
@@ -416,7 +424,7 @@ void ShapeContacts::solve_velocities(Substep& step)
         for (ShapeContact& contact : contacts_[c]) {
             const std::uint32_t i = contact.i;
             if (!(step.points[i].w > 0)) continue;
-            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i]) {
+            if (is_flush(contact, step)) {
                 step.next_support[i] = 255;
                 if (!step.next_support_v.empty()) step.next_support_v[i] = contact.vc;
             }
@@ -437,6 +445,13 @@ void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
             Drive by;
             double rolling = 0;
             if (obstacle.moves) {
+bool ShapeContacts::is_flush(const ShapeContact& contact, const Substep& step) const
+{
+    const float radius = obstacles_[contact.obstacle].radius[contact.i];
+    const double size = sizes_.empty() ? radius : std::max(radius, sizes_[contact.i]);
+    return contact.n.dot(step.points[contact.i].P) - contact.level < flush * size;
+}
+
                 const Vec3d before = obstacle.shape->velocity_at(step.points[i].P, now - step.dt);
                 const Vec3d after = obstacle.shape->velocity_at(step.points[i].P, now);
                 by = Drive::of(contact.vc - (after - before), contact.vc, step.dt);
@@ -542,8 +557,7 @@ void ShapeContacts::add_forces(const Substep& step) const
             step.forces->add(i, normal, tangential.norm());
             step.forces->add_work(i, contact.friction > 0 ? tangential.dot(slip) : 0,
                                   (normal * contact.n + tangential).dot(contact.vc));
-            if (contact.n.dot(step.points[i].P) - contact.level < flush * obstacles_[contact.obstacle].radius[i])
-                step.forces->count(i);
+            if (is_flush(contact, step)) step.forces->count(i);
         }
     });
 }

@@ -54,7 +54,10 @@ struct ShapeQuery {
     std::vector<std::uint32_t> queried;  // points queried for one shape
     std::vector<Vec3d> P, gradient;      // of the queried points
     std::vector<double> phi, time;       // m, s
+    std::span<const float> sizes;        // m: radii at which points meet one another; empty if they do not
 
+    // Returns the radius by which a push on the point is measured, m: it may lie on the shape with its center.
+    float size(const Obstacle& obstacle, std::size_t i) const;
     // Returns the distance that a point may move in a substep, m. Contacts that are farther away are skipped.
     double reach(const Obstacle& obstacle, std::size_t i) const;
 };
@@ -96,8 +99,9 @@ struct ShapeLoads {
 
 class ShapeContacts {
 public:
-    // sleep: null if no point may sleep.
-    ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, const Sleep* sleep);
+    // sizes: m, the radii at which points meet one another, shape [size]; empty if they do not. sleep: null if no point
+    // may sleep.
+    ShapeContacts(std::span<const Obstacle> obstacles, std::size_t size, std::vector<float> sizes, const Sleep* sleep);
 
     void recall(const ShapeLoads& loads, const Column<std::int64_t>& ids, double dt);
     void remember(ShapeLoads& loads, const Column<std::int64_t>& ids, const Substep& step) const;
@@ -136,6 +140,7 @@ private:
         return std::pair(a.obstacle, a.i) < std::pair(b.obstacle, b.i);
     }
 
+    bool is_flush(const ShapeContact& contact, const Substep& step) const;
     void find(Batch& contacts, const Batch& before, const Substep& step, std::span<const Vec3d> free, std::size_t begin,
               std::size_t end);
     ShapeContact contact(const ShapeQuery& query, std::size_t k, std::size_t obstacle, const Substep& step) const;
@@ -156,6 +161,7 @@ private:
     std::size_t size_;
     const Sleep* sleep_;
     ShapeClearance clearance_;
+    std::vector<float> sizes_;              // m: the largest of the constraints' radii; empty if they have none
     std::vector<Batch> contacts_, before_;  // by chunk of points
 };
 

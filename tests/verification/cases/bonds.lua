@@ -10,7 +10,7 @@ local function contradicted(u, pin)
 local v = vec3(%g, 0, 0)
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0.1, 0, 0}, {0.05, 0.1, 0}},
     v = {v, v, v} } }
-  :attribute { pscale = 0.1 } :distance { pairs = {{1, 2}, {2, 3}, {1, 3}} } :contact {}
+  :attribute { pscale = 0.1 } :distance { pairs = {{1, 2}, {2, 3}, {1, 3}}, collide = true } :contact {}
   %s:solve { substeps = %d, sleep = math.huge }]]):format(u, pin or "", substeps), { frames = {1, 49} })
     for _, points in result:frames() do
       local energy = 0

@@ -206,6 +206,17 @@ Vec3d turning_of(const Obstacle& obstacle, const Vec3d& P, double length, double
     return 0.5 * Vec3d(along[1].z() - along[2].y(), along[2].x() - along[0].z(), along[0].y() - along[1].x());
 }
 
+// Returns the displacement by a constant force throughout the substep, per velocity that it would give a free point, s:
+// dt/2 or, on a spring to a surface, (1 - cos Ω dt) / (Ω² dt). A spring that turns the point by many radians in the
+// substep would store more energy in the displacement of a free point than friction takes.
+double time_of_force(const Substep& step, std::uint32_t i)
+{
+    const double w2 = step.surface_springs.empty() ? 0 : step.surface_springs[i].w2;
+    if (!(w2 > 0)) return 0.5 * step.dt;
+    const double half = std::sin(0.5 * std::sqrt(w2) * step.dt);
+    return 2 * half * half / (w2 * step.dt);
+}
+
 double friction_of(const Obstacle& obstacle, std::uint32_t i)
 {
     return obstacle.response == Response::Stick ? std::numeric_limits<double>::max() : double(obstacle.friction[i]);
@@ -219,6 +230,7 @@ ShapeContacts::ShapeContacts(std::span<const Obstacle> obstacles, std::size_t si
       size_(size),
       sleep_(sleep),
       clearance_(obstacles, size),
+      sizes_(std::move(sizes)),
       contacts_((size + points_per_chunk - 1) / points_per_chunk),
       before_(contacts_.size())
 {
@@ -230,7 +242,6 @@ void ShapeContacts::recall(const ShapeLoads& loads, const Column<std::int64_t>& 
     for (const ShapeLoads::Load& load : loads.loads) {
         const std::uint32_t i = index[load.id];
         if (i == IdIndex::none || load.obstacle >= obstacles_.size()) continue;
-      sizes_(std::move(sizes)),
         ShapeContact contact{};
         contact.i = i;
         contact.obstacle = load.obstacle;
@@ -340,6 +351,7 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
     ShapeQuery& query = *kept;
     query.free = free;
     query.begin = begin;
+    query.sizes = sizes_;
     query.since = (step.index + 1) * step.dt;
     clearance_.open(query, step, end);
     contacts.clear();
@@ -351,7 +363,6 @@ void ShapeContacts::find(Batch& contacts, const Batch& before, const Substep& st
         const std::size_t first = contacts.size();
         for (std::size_t k = 0; k < query.queried.size(); ++k) {
             const std::uint32_t i = query.queried[k];
-    query.sizes = sizes_;
             if (query.phi[k] - obstacle.radius[i] > query.reach(obstacle, i) || !(query.gradient[k].norm() > 0))
                 continue;
             ShapeContact made = contact(query, k, o, step);
@@ -434,6 +445,13 @@ void ShapeContacts::solve_velocities(Substep& step)
     });
 }
 
+bool ShapeContacts::is_flush(const ShapeContact& contact, const Substep& step) const
+{
+    const float radius = obstacles_[contact.obstacle].radius[contact.i];
+    const double size = sizes_.empty() ? radius : std::max(radius, sizes_[contact.i]);
+    return contact.n.dot(step.points[contact.i].P) - contact.level < flush * size;
+}
+
 void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
 {
     const double now = (step.index + 1) * step.dt;
@@ -445,13 +463,6 @@ void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const
             Drive by;
             double rolling = 0;
             if (obstacle.moves) {
-bool ShapeContacts::is_flush(const ShapeContact& contact, const Substep& step) const
-{
-    const float radius = obstacles_[contact.obstacle].radius[contact.i];
-    const double size = sizes_.empty() ? radius : std::max(radius, sizes_[contact.i]);
-    return contact.n.dot(step.points[contact.i].P) - contact.level < flush * size;
-}
-
                 const Vec3d before = obstacle.shape->velocity_at(step.points[i].P, now - step.dt);
                 const Vec3d after = obstacle.shape->velocity_at(step.points[i].P, now);
                 by = Drive::of(contact.vc - (after - before), contact.vc, step.dt);
@@ -582,7 +593,7 @@ void ShapeContacts::solve_velocity(ShapeContact& contact, Substep& step)
     if (size > most) tangential *= most / size;
     const Vec3d change = w * (tangential - contact.tangential_impulse);
     v += change;
-    step.points[contact.i].P += 0.5 * step.dt * change;
+    step.points[contact.i].P += time_of_force(step, contact.i) * change;
     contact.tangential_impulse = tangential;
 }
 
@@ -613,7 +624,7 @@ void ShapeContacts::solve_spinning(ShapeContact& contact, Substep& step)
     const Vec3d change = friction.solve(step.spins[contact.i], w, contact.n, v - contact.vc, contact.turning,
                                         contact.friction, contact.normal_impulse + contact.free_impulse);
     v += change;
-    step.points[contact.i].P += 0.5 * step.dt * change;
+    step.points[contact.i].P += time_of_force(step, contact.i) * change;
     contact.tangential_impulse = friction.tangential;
     contact.rolling_impulse = friction.rolling;
 }

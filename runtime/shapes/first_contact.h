@@ -144,8 +144,9 @@ private:
             tracing_.begin(i, walk.time(), walk.here().height, start.slope, level);
     }
 
-    // Returns the contact of a path that starts inside. If the field has no gradient there (beyond a level set's band),
-    // the point moves straight back, against its velocity (paper §4.1), until the field has one or it is outside.
+    // Returns the contact of a path that starts inside. If the field has no gradient there, the point moves towards the
+    // nearest voxel at the surface of a level set. In another field it moves straight back, against its velocity (paper
+    // §4.1), until the field has a gradient or it is outside.
     Contact inside(const Path& path, double f, const Vec3d& gradient) const
     {
         Contact contact;
@@ -154,9 +155,21 @@ private:
         const double slope = gradient.norm();
         if (slope > 0) {
             contact.n = gradient / slope;
-            contact.depth /= slope;  // to first order; exact if the field is a distance
+            // To first order; exact if the field is a distance. At the edge of a level set's band the field flattens,
+            // so that its slope says nothing about the distance, which is at least |φ|.
+            bool flattens = false;
+            if constexpr (requires { sampler_.band(); })
+                flattens = -f - path.radius > sampler_.band() - std::sqrt(3.0) * sampler_.smallest_feature();
+            if (!flattens) contact.depth /= slope;
             return contact;
         }
+        if constexpr (requires { sampler_.nearest_inside(path.P); })
+            if (const std::optional<Vec3d> nearest = sampler_.nearest_inside(path.P)) {
+                const Vec3d displacement = *nearest - path.P;
+                contact.depth = displacement.norm();
+                contact.n = displacement / contact.depth;
+                return contact;
+            }
         const double speed = path.v.norm();
         if (!(speed > 0)) return contact;
         const Box3d bounds = sampler_.bounds();

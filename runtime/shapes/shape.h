@@ -31,9 +31,10 @@ struct Contact {
     double curvature = 0;      // 1/m, of the surface in the direction of the path; positive if the surface falls away
     bool flat = false;         // the surface is an infinite plane
 
-    // Positive if the path starts inside (time is then 0): the distance along n, m, to the level distance = radius. If
-    // the field has no gradient, n is zero. `back` is then the time by which the point, moving straight back relative
-    // to the surface, has left the shape or found a gradient. It is infinite if the point moves with the surface.
+    // Positive if the path starts inside (time is then 0): the distance along n, m, to the level distance = radius, or,
+    // deep inside a level set, to where it has a gradient. If the field has no gradient, n is zero. `back` is then the
+    // time by which the point, moving straight back relative to the surface, has left the shape or found a gradient. It
+    // is infinite if the point moves with the surface.
     double depth = 0;
     double back = none;
 };

@@ -179,17 +179,21 @@ TEST_CASE("a path that starts inside has the depth and the direction out of the 
     CHECK(in_plane.n == Vec3d(0, 1, 0));
 }
 
-TEST_CASE("deep in a level set a path goes back the way it came", "[first_contact]")
+TEST_CASE("deep in a level set the way out leads towards the nearest surface", "[first_contact]")
 {
-    const ShapePtr ball = level_set_sphere(1, {0, 0, 0}, {0.05, 3});
-    const Contact contact = meet(ball, {{0, 0, 0.2}, {0, 0, -4}, {0, 0, 0}, 1, 0});
-    CHECK(contact.time == 0);
-    CHECK(contact.depth > 0);
-    CHECK(contact.n == Vec3d(0, 0, 0));
-    const double z = 0.2 + 4 * contact.back;  // there the field has a gradient, or the point is outside
-    CHECK(z > 0.8);
-    CHECK(z < 1.3);
-    CHECK(meet(ball, {{0, 0, 0.2}, {0, 0, 0}, {0, 0, 0}, 1, 0}).back == Contact::none);
+    const Vec3d center(0.1, 0.2, 0.3);
+    const ShapePtr ball = level_set_sphere(1, center, {0.05, 3});
+    Random random(5);
+    for (int k = 0; k < 200; ++k) {
+        const Vec3d P = center + random.in(0, 0.7) * random.direction();
+        const Contact contact = meet(ball, {P, {0, 0, -4}, {0, 0, 0}, 1, 0});
+        CHECK(contact.time == 0);
+        // One voxel inside the surface at most, and no farther from P than the surface, up to a voxel across.
+        const double r = (P + contact.depth * contact.n - center).norm();
+        CHECK(r > 1 - 1.01 * 0.05);
+        CHECK(r < 1);
+        CHECK(contact.depth < 1 - (P - center).norm() + 0.02);
+    }
 }
 
 TEST_CASE("paths meet a level set where they first touch its field", "[first_contact]")

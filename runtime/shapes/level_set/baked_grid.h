@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "runtime/math/vec.h"
@@ -60,6 +61,7 @@ public:
           block_width_(BakedGrid::block * grid.voxel),
           background_(grid.background),
           slope_(grid.slope),
+          blocks_x_(grid.blocks.x()),
           blocks_y_(grid.blocks.y()),
           blocks_z_(grid.blocks.z()),
           index_(grid.index.data()),
@@ -117,6 +119,10 @@ public:
             slope[i] = per_voxel * (double(dx) * vx[i] + double(dy) * vy[i] + double(dz) * vz[i]);
         });
     }
+
+    // Returns the inside voxel at the surface from which, with its own distance, the surface is the shortest way from
+    // P, to within a voxel; none if no voxel is inside. Its cost grows with the number of blocks that are as near.
+    std::optional<Vec3d> nearest_inside(const Vec3d& P) const;
 
     // Returns the largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where
     // the bands of two surfaces meet, anything for a field that is not a distance. At least 1, the slope of the bounds
@@ -179,7 +185,7 @@ private:
 
     Vec3d origin_, extent_, last_;  // size of the box in voxels, index of its last voxel
     double per_voxel_, voxel_, block_width_, background_, slope_;
-    std::int64_t blocks_y_, blocks_z_;
+    std::int64_t blocks_x_, blocks_y_, blocks_z_;
     const std::int32_t* index_;
     const float* values_;
     Box3d surface_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/shapes/contact_walk.h"
 
@@ -22,7 +23,9 @@ Contact first_contact_of(const Body& body, const Path& path)
         contact.time = 0;
         contact.n = unit_normal(start.gradient, path.v - start.vc);
         contact.vc = start.vc;
-        contact.depth = slope > 0 ? -f / slope : -f;
+        // At the edge of the band the field flattens (first_contact.h).
+        const bool flattens = -start.phi > body.band() - std::sqrt(3.0) * body.voxel();
+        contact.depth = slope > 0 && !flattens ? -f / slope : -f;
         return contact;
     }
     // A point slightly below the surface by rounding uses its own height as the level to touch at.

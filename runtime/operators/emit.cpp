@@ -443,10 +443,14 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
     const bool own_age = !ages.common();
     if (own_age || velocities.is_random() || !newborn.life.empty()) uniform4(now.random, numbers, draw_use, draws);
     source_.place(now.random, numbers, /*in_order=*/!rate, birthplaces);
+    if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), birthplaces, draws, L);
+    std::array<double, batch_size> times;  // in the interval, from 0 to 1
+    const std::span<double> t = std::span(times).first(source_.moves() ? size : 0);
+    for (std::size_t i = 0; i < t.size(); ++i) t[i] = at_beginning_ ? 0 : std::max(0.0, 1 - L[i] / now.frame.dt);
+    if (source_.redraws() && !ages.are_of_places()) source_.redraw(now.random, numbers, t, birthplaces);
     for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, birthplaces);
     for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, numbers);
 
-    if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), birthplaces, draws, L);
     if (own_age) {
         for (std::size_t i = 0; i < size; ++i) {
             const double gamma = std::min(L[i], ages.frame_length());
@@ -457,10 +461,7 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
     }
     std::array<Vec3d, batch_size> source_motion;  // m/s, of the birthplaces
     if (source_.moves()) {
-        std::array<double, batch_size> t;
-        for (std::size_t i = 0; i < size; ++i) t[i] = at_beginning_ ? 0 : std::max(0.0, 1 - L[i] / now.frame.dt);
-        source_.path().carry(std::span(t).first(size), velocities.needs_normals(), birthplaces,
-                             std::span(source_motion).first(size));
+        source_.path().carry(t, velocities.needs_normals(), birthplaces, std::span(source_motion).first(size));
         for (std::size_t i = 0; i < size; ++i) source_motion[i] /= now.frame.dt;
     }
     for (std::size_t i = 0; i < size; ++i) newborn.P[first + i] = birthplaces[i].P;

@@ -276,7 +276,7 @@ TEST_CASE("age can be an attribute of the source", "[emit]")
     CHECK(refusal(from) ==
           "age = rapid.attr \"delya\": the source has no float with this name; did you mean \"delay\"?");
     from.set("delya", Column<float>(2, -1.0f));
-    CHECK(refusal(from) == "age = rapid.attr \"delya\": point 0 has -1; an age must be at least 0");
+    CHECK(refusal(from) == "age = rapid.attr \"delya\": point 0 of the source has -1; an age must be at least 0");
 }
 
 TEST_CASE("births on a moving mesh are the same bits on any number of threads", "[emit]")
@@ -290,6 +290,37 @@ TEST_CASE("births on a moving mesh are the same bits on any number of threads", 
         return std::pair(values_of<Vec3f>(born, "P"), values_of<Vec3f>(born, "v"));
     };
     CHECK(born_on(1) == born_on(4));
+}
+
+TEST_CASE("births on a deforming mesh are uniform by its area at their own times", "[emit]")
+{
+    // One face shrinks to a fifth of its length while the other grows from there to its own.
+    TemporaryFolder folder;
+    std::map<int, std::filesystem::path> files;
+    for (const int frame : {1, 2}) {
+        const double a = frame == 1 ? 1 : 0.2, b = 1.2 - a;
+        files[frame] = folder.write(fmt::format("{}.obj", frame),
+                                    fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 5 0 0\nv {1} 0 0\nv 5 {2} 0\n"
+                                                "f 1 2 3\nf 4 5 6\n",
+                                                a, 5 + b, b));
+    }
+    const auto mesh =
+        std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "#.obj"), constant_motion({}));
+    NodeTest emit("emit", {{"source", ObjectPtr(mesh)}, {"rate", 20000.0 * fps}, {"motion", "linear"}});
+    const PointSet born = emit(2);
+    REQUIRE(born.size() == 20000);
+    // At t the sides are a = 1 - 0.8 t and b = 0.2 + 0.8 t, and the first face has births with the probability
+    // a²/(a² + b²).
+    std::array<double, 4> first{}, all{};
+    for (std::size_t i = 0; i < born.size(); ++i) {
+        const double t = std::min(0.9999, 1 - double((*std::as_const(born).find<float>("dt"))[i]) * fps);
+        const auto quarter = static_cast<std::size_t>(4 * t);
+        all[quarter] += 1;
+        first[quarter] += born.P()[i].x() < 2.5f;
+    }
+    const double early = 0.89355, late = 0.65804;  // means of the probability over the first two quarters
+    const double expected[] = {early, late, 1 - late, 1 - early};
+    for (std::size_t k = 0; k < 4; ++k) CHECK(first[k] / all[k] == Approx(expected[k]).margin(0.025));
 }
 
 }  // namespace rapid

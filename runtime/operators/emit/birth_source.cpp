@@ -18,7 +18,7 @@
 namespace rapid {
 namespace {
 
-constexpr std::uint64_t pick_use = 17;
+constexpr std::uint64_t pick_use = 17, accept_use = 18;
 
 // Returns the vertices of a mesh with their attributes, as points.
 PointSet vertices_of(const Mesh& mesh)
@@ -336,8 +336,9 @@ BirthSource::Move BirthSource::move_to(const FrameClock& simulation, std::int64_
         const BirthDomain on = from_ == "volume"   ? BirthDomain::Volume
                                : from_ == "points" ? BirthDomain::Vertices
                                                    : BirthDomain::Faces;
-        take_mesh(moving_mesh_->at(clock, end));
         path_ = deforming_path(*moving_mesh_, clock, end, path, on);
+        largest_areas_ = path_->largest_areas();
+        take_mesh(moving_mesh_->at(clock, end));
     }
     if (parts > 1) {
         const double length = 1.0 / static_cast<double>(parts);
@@ -373,7 +374,7 @@ void BirthSource::take_mesh(const MeshPtr& mesh)
 // Scatters by the density at the corners of faces, with 0 on faces outside the group.
 ScatterPtr BirthSource::scatter_on(const MeshPtr& mesh) const
 {
-    if (density_.empty() && group_.empty()) return scatter_on_surface(mesh);
+    if (density_.empty() && group_.empty()) return scatter_on_surface(mesh, largest_areas_);
     const std::vector<float> values = density_.empty() ? std::vector<float>() : densities();
     const std::vector<std::uint8_t>* members = nullptr;
     if (!group_.empty()) {
@@ -400,7 +401,7 @@ ScatterPtr BirthSource::scatter_on(const MeshPtr& mesh) const
             const float density = values.empty() ? 1 : values[place];
             corners.push_back(members && !(*members)[f] ? 0 : density);
         }
-    return scatter_by_density(mesh, corners);
+    return scatter_by_density(mesh, corners, largest_areas_);
 }
 
 std::vector<float> BirthSource::densities() const
@@ -488,6 +489,21 @@ void BirthSource::place(RandomKey key, const Items& births, bool in_order, std::
         out[i] = {P[point], has_normals_ ? direction(N[point]) : Vec3f(Vec3f::Zero()),
                   static_cast<std::int32_t>(point)};
     }
+}
+
+// Rejection sampling: a place drawn by the bound on its face's area stays with the probability that its area is of it.
+void BirthSource::redraw(RandomKey key, const Items& births, std::span<const double> t, std::span<Birthplace> out) const
+{
+    constexpr std::uint64_t max_trials = 256;  // the last one stays: at this time the mesh has next to no area
+    for (std::size_t i = 0; i < out.size(); ++i)
+        for (std::uint64_t trial = 0; trial < max_trials; ++trial) {
+            const double largest = largest_areas_[static_cast<std::size_t>(out[i].element)];
+            const double u = uniform4(key, births[i], accept_use | trial << 32)[0];
+            if (u * largest < path_->area(out[i].element, t[i])) break;
+            RandomKey next = key;
+            next.value += trial + 1;
+            scatter_->place(next, births[i], out.subspan(i, 1));
+        }
 }
 
 }  // namespace rapid

@@ -70,6 +70,12 @@ public:
     // order, cyclically, or at random; with a density always at random. Draws from the uses 0 to 15 and 17 of the key.
     void place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const;
 
+    // Returns true if births are on faces that deform. redraw() then replaces places that are less likely at the time t
+    // of their birth, from 0 to 1 in the interval, than at others, so that births are uniform by the area at their own
+    // times. Draws from the use 18 of the key and, under other keys, from those of place().
+    bool redraws() const { return !largest_areas_.empty(); }
+    void redraw(RandomKey key, const Items& births, std::span<const double> t, std::span<Birthplace> out) const;
+
     // Returns a column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
     template <class T>
     T value(const Strided<T>& column, const Birthplace& place) const
@@ -104,7 +110,7 @@ private:
     void take_curves(const Curves& curves);
     void take_points(PointSet points);
     std::vector<float> densities() const;
-    ScatterPtr scatter_on(const MeshPtr& mesh) const;
+    ScatterPtr scatter_on(const MeshPtr& mesh) const;  // uses largest_areas_
     void take_chances();
     Move move_points_to(const FrameClock& clock, std::int64_t step, const PathOptions& options);
     FramePath path_at(const FrameClock& clock, std::int64_t step, const PathOptions& options) const;
@@ -115,8 +121,9 @@ private:
     std::shared_ptr<const AnimatedShape> moving_shape_;  // likewise
     std::shared_ptr<const MovingCurves> moving_curves_;  // likewise
     BodyPathPtr path_;
-    ScatterPtr scatter_;  // null: births are at the points of values_
-    MeshPtr mesh_;        // birthplaces refer to its triangles
+    std::vector<double> largest_areas_;  // m², of the faces of mesh_ in the interval, if they deform
+    ScatterPtr scatter_;                 // null: births are at the points of values_
+    MeshPtr mesh_;                       // birthplaces refer to its triangles
     PointSet values_;
     bool is_of_corners_ = false;  // values_ has three per triangle of mesh_
     Column<Vec3f> normals_;       // of the points

@@ -79,7 +79,42 @@ public:
         }
     }
 
+    // The cross product of two edges, cubics in t, is a polynomial of degree six: a convex combination of its Bernstein
+    // coefficients.
+    std::vector<double> largest_areas() const override
+    {
+        if (on_ != BirthDomain::Faces) return {};
+        constexpr double of_three[] = {1, 3, 3, 1}, of_six[] = {1, 6, 15, 20, 15, 6, 1};  // binomials
+        std::vector<double> areas;
+        areas.reserve(mesh_->triangles.size());
+        for (const Mesh::Triangle& triangle : mesh_->triangles) {
+            const auto ab = bernstein(corner(triangle, 0), corner(triangle, 1));
+            const auto ac = bernstein(corner(triangle, 0), corner(triangle, 2));
+            double largest = 0;
+            for (int k = 0; k <= 6; ++k) {
+                Vec3d sum = Vec3d::Zero();
+                for (int i = std::max(0, k - 3); i <= std::min(3, k); ++i)
+                    sum += of_three[i] * of_three[k - i] / of_six[k] * ab[i].cross(ac[k - i]);
+                largest = std::max(largest, sum.norm() / 2);
+            }
+            areas.push_back(largest);
+        }
+        return areas;
+    }
+    double area(std::int32_t face, double t) const override
+    {
+        const Mesh::Triangle& triangle = mesh_->triangles[static_cast<std::size_t>(face)];
+        const Vec3d A = corner(triangle, 0).at(t);
+        return (corner(triangle, 1).at(t) - A).cross(corner(triangle, 2).at(t) - A).norm() / 2;
+    }
+
 private:
+    // Returns the Bernstein coefficients of the edge from a to b.
+    static std::array<Vec3d, 4> bernstein(const Cubic<Vec3d>& a, const Cubic<Vec3d>& b)
+    {
+        const Vec3d c0 = b.c0 - a.c0, c1 = b.c1 - a.c1, c2 = b.c2 - a.c2, c3 = b.c3 - a.c3;
+        return {c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3};
+    }
     const Cubic<Vec3d>& corner(const Mesh::Triangle& triangle, int k) const
     {
         return curves_[static_cast<std::size_t>(triangle[k])];
@@ -164,6 +199,8 @@ public:
         path_->carry(of_whole, normals, births, velocity);
         for (Vec3d& v : velocity.first(births.size())) v *= length_;
     }
+    std::vector<double> largest_areas() const override { return path_->largest_areas(); }
+    double area(std::int32_t face, double t) const override { return path_->area(face, begin_ + length_ * t); }
 
 private:
     BodyPathPtr path_;

@@ -107,6 +107,15 @@ public:
     // velocities in metres per frame. All have shape [n]. Thread-safe.
     virtual void carry(std::span<const double> t, bool normals, std::span<Birthplace> births,
                        std::span<Vec3d> velocity) const = 0;
+
+    // Returns bounds on the area of each face in the interval, m²; empty unless births are on faces that deform.
+    virtual std::vector<double> largest_areas() const { return {}; }
+    // Returns the area of a face that deforms at time t, m².
+    virtual double area(std::int32_t face, double t) const
+    {
+        static_cast<void>(face), static_cast<void>(t);
+        return 0;
+    }
 };
 
 using BodyPathPtr = std::shared_ptr<const BodyPath>;

@@ -32,8 +32,9 @@ public:
 
 using ScatterPtr = std::shared_ptr<const Scatter>;
 
-// Samples uniformly by area; N is the face normal. Throws Error if the mesh has no area.
-ScatterPtr scatter_on_surface(const MeshPtr& mesh);
+// Samples uniformly by area; N is the face normal. areas: of the faces, m², in place of those of the mesh; may be
+// empty. Throws Error if the mesh has no area.
+ScatterPtr scatter_on_surface(const MeshPtr& mesh, std::span<const double> areas = {});
 // Samples uniformly by volume, over the points with a nonzero winding number. Throws Error if the mesh has edges with
 // an odd number of faces, or no volume (with the numbers).
 ScatterPtr scatter_in_volume(const MeshPtr& mesh);

@@ -56,7 +56,7 @@ private:
 
 }  // namespace
 
-ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> density)
+ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> density, std::span<const double> areas)
 {
     std::vector<double> weights;
     weights.reserve(3 * mesh->triangles.size());
@@ -65,7 +65,7 @@ ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> densit
         const Vec3d a = mesh->positions[static_cast<std::size_t>(t[0])].cast<double>();
         const Vec3d ab = mesh->positions[static_cast<std::size_t>(t[1])].cast<double>() - a;
         const Vec3d ac = mesh->positions[static_cast<std::size_t>(t[2])].cast<double>() - a;
-        const double face = ab.cross(ac).norm() / 2;
+        const double face = areas.empty() ? ab.cross(ac).norm() / 2 : areas[weights.size() / 3];
         area += face;
         for (int c = 0; c < 3; ++c) {
             weights.push_back(face * double(density[weights.size()]));

@@ -7,8 +7,8 @@
 
 namespace rapid {
 
-// Samples by area times the density: shape [triangles, 3], at least 0, linear on each face. Throws Error if the mesh
-// has no area or the density is 0 everywhere.
-ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> density);
+// Samples by area times the density: shape [triangles, 3], at least 0, linear on each face. areas: of the faces, m², in
+// place of those of the mesh; may be empty. Throws Error if the mesh has no area or the density is 0 everywhere.
+ScatterPtr scatter_by_density(const MeshPtr& mesh, std::span<const float> density, std::span<const double> areas = {});
 
 }  // namespace rapid

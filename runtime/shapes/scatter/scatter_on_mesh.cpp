@@ -54,7 +54,7 @@ private:
 
 }  // namespace
 
-ScatterPtr scatter_on_surface(const MeshPtr& mesh)
+ScatterPtr scatter_on_surface(const MeshPtr& mesh, std::span<const double> given)
 {
     std::vector<Face> faces;
     std::vector<double> areas;
@@ -66,7 +66,7 @@ ScatterPtr scatter_on_surface(const MeshPtr& mesh)
         const Vec3d ab = mesh->positions[t[1]].cast<double>() - a, ac = mesh->positions[t[2]].cast<double>() - a;
         const Vec3d twice_area = ab.cross(ac);
         faces.push_back({a, ab, ac, twice_area.normalized().cast<float>()});
-        areas.push_back(twice_area.norm() / 2);
+        areas.push_back(given.empty() ? twice_area.norm() / 2 : given[areas.size()]);
         sum += areas.back();
     }
     if (!(sum > 0))

@@ -71,7 +71,7 @@ int require_memory(State& state)
     const double bytes = lua_tonumber(state.lua(), 2);
     const std::string what = text_at(state.lua(), 1), remedy = text_at(state.lua(), 3);
     if (const auto most = static_cast<double>(state.host().options().script_memory); bytes > most)
-        throw Error(fmt::format("{} would take about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set {}", what,
+        throw Error(fmt::format("{} would need about {:.0f} MiB of Lua's memory, which has {:.0f}; {}, or set {}", what,
                                 bytes / 0x1p20, most / 0x1p20, remedy, name_of(Setting::ScriptMemory)),
                     ErrorKind::OutOfMemory);
     if (!fits_in_memory(bytes)) throw memory_exceeded(what, bytes, remedy);

@@ -119,7 +119,7 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
             const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
             text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
             if (parsed.ec != std::errc() || (!text.empty() && xml_space.find(text[0]) == std::string_view::npos))
-                throw Error(fmt::format("the array lacks the number of its {}", i));
+                throw Error(fmt::format("its number {} is not a number of its type", i));
             std::memcpy(bytes.data() + i * sizeof number, &number, sizeof number);
         }
         if (!without_space(text).empty()) throw Error(fmt::format("the array has more than its {} numbers", count));

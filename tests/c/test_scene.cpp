@@ -270,7 +270,7 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     type.kind = 9;
     refused("type->kind = 9", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
     CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
-    refused("no open offers", [&](rapid_error** e) { return rapid_offers_release(offers, e); });
+    refused("does not belong to an open offers", [&](rapid_error** e) { return rapid_offers_release(offers, e); });
 }
 
 TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
@@ -349,7 +349,7 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
     {
         OwnedError error;
         CHECK(rapid_frame_column(reinterpret_cast<rapid_frame*>(scene), "P", &column, error) == RAPID_WRONG_CALL);
-        CHECK_THAT(error.message(), Contains("no open frame"));
+        CHECK_THAT(error.message(), Contains("does not belong to an open frame"));
     }
     int local = 0;
     CHECK(rapid_scene_restart(reinterpret_cast<rapid_scene*>(&local), nullptr) == RAPID_WRONG_CALL);

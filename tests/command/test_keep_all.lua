@@ -18,7 +18,7 @@ local function same_files(folder, scene, arguments, outputs)
     if other then
       compared = compared + 1
       assert.equal(folder:read(name), folder:read("all/" .. other), name)
-      assert.equal(folder:read(name), folder:read("asked/" .. other), name)
+      assert.equal(folder:read(name), folder:read("requested/" .. other), name)
     end
   end
   assert.truthy(compared > 0)

@@ -163,7 +163,7 @@ describe("a neighbourhood of all points", function()
       result.stderr)
     -- The check counts pairs within the radius, not all pairs, so the same scene with few neighbours passes.
     local near = text:format(1.1):gsub(":contact { radius = 0.1 }", ""):gsub("1000 }", "%%d }")
-    assert.match("looks in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
+    assert.match("pairs in a frame of 62 steps", scene.command("run", text:format(1e9):gsub("1000 }", "62 }"),
       "-f 1-2 --quiet").stderr)
     assert.equal("", scene.command("run", near:format(62), "-f 1-2 --quiet").stderr)
   end)

@@ -180,7 +180,7 @@ end) :solve {}]], { frames = {1, 2} })
 
   it("names the node, the line, the point and the frame", function()
     for body, expected in pairs {
-      ["p.v = 1"] = 'attribute "v" needs a vec3, not 1',
+      ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
       ["p.v = p.v / 0"] = "v became vec3(nan, nan, nan); a float is finite, within 3.4e38 either way",
       ["error 'no'"] = "no",
       ["local x = step.number"] = 'the step has no "number"; it has time, dt, index and detail',
@@ -193,7 +193,7 @@ end) :solve {}]], { frames = {1, 2} })
 
   it("that can be known before is told before the first frame", function()
     assert.match('scene.lua:%d: node "push": .*no attribute "heat"', message "p.heat = 1")
-    assert.match('scene.lua:2: node "push": the kernel assigns p.id, which is read-only', message "p.id = 3")
+    assert.match('scene.lua:2: node "push": the kernel assigns p.id, which is read%-only', message "p.id = 3")
     assert.match('scene.lua:2: node "push": the kernel assigns the global "n"; kernels run in parallel',
       message "n = 1")
   end)

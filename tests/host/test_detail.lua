@@ -228,7 +228,7 @@ describe("an error in a detail function", function()
       ["points[1].id = 3"] = "id is read-only",
       ["points:add { id = 3 }"] = "id is read-only",
       ["points:add { dt = 0.1 }"] =
-        "points:add: dt = 0.1; it must be from 0 to 0.0416666667 s",
+        "points:add: dt = 0.1; it must be from 0 to 0.0416666667 s, the time that the point moves in this frame",
       ["points:add { group = 'cold' }"] = "points:add: no node makes a group \"cold\"",
       ["points:add { heta = 3 }"] =
         'no attribute "heta"; did you mean "heat"? (or add :attribute{ heta = 0 } before it)',

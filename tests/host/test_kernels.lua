@@ -270,7 +270,7 @@ describe("a kernel that writes what can't be kept", function()
       ["p.heat = p.v"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
       ["p.v = 1"] = 'attribute "v" needs a vec3, not 1',
       ["p.v = {1, 2, 3}"] = 'attribute "v" needs a vec3, not a table; vec3(x, y, z) makes one',
-      ["p.v = nil"] = 'attribute "v" needs a vec3, not nil',
+      ["p.v = nil"] = 'attribute "v" takes a vec3, not nil',
       ["p.hitnum = 1.5"] = 'attribute "hitnum" takes a whole number, not 1.5',
       ["p.hitnum = 3e9"] = 'attribute "hitnum" takes a whole number, not 3000000000',
     } do

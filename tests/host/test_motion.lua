@@ -90,7 +90,7 @@ return rapid.create {}
       'motion[9] = "up" can\'t be a key; keys must be constant motions', 1, true))
     local moving_key = "{ [1] = rapid.scale(1) * function() end, [2] = rapid.scale(2) }"
     assert.truthy(error_of("rapid.mesh.box {}:transform " .. moving_key)
-      :find("motion[1] = a motion that varies is no place to be at a frame", 1, true))
+      :find("motion[1] = a motion that varies can't be a key", 1, true))
     assert.truthy(error_of("rapid.mesh.box {}:transform {}"):find("a motion by keys has no keys", 1, true))
   end)
 

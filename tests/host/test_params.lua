@@ -39,13 +39,13 @@ describe("rapid.param", function()
 
   it("refuses a setting of another type, with its default", function()
     for _, case in ipairs {
-      { "5", "fast", "a number, like the default 5 is" }, { "5", "", "a number, like the default 5 is" },
-      { "5", "1,2", "a number, like the default 5 is" }, { "5", "nan", "a number, like the default 5 is" },
-      { "5", "true", "a number, like the default 5 is" }, { "5", "7m", "a number, like the default 5 is" },
-      { "true", "yes", "true or false, like the default true is" },
-      { "{0, 0, 0}", "1,2", "a vec3 x,y,z, like the default {0, 0, 0} is" },
-      { "{0, 0, 0}", "1,2,3,4", "a vec3 x,y,z, like the default {0, 0, 0} is" },
-      { "{0, 0, 0}", "up", "a vec3 x,y,z, like the default {0, 0, 0} is" },
+      { "5", "fast", "a number, like the default 5" }, { "5", "", "a number, like the default 5" },
+      { "5", "1,2", "a number, like the default 5" }, { "5", "nan", "a number, like the default 5" },
+      { "5", "true", "a number, like the default 5" }, { "5", "7m", "a number, like the default 5" },
+      { "true", "yes", "true or false, like the default true" },
+      { "{0, 0, 0}", "1,2", "a vec3 x,y,z, like the default {0, 0, 0}" },
+      { "{0, 0, 0}", "1,2,3,4", "a vec3 x,y,z, like the default {0, 0, 0}" },
+      { "{0, 0, 0}", "up", "a vec3 x,y,z, like the default {0, 0, 0}" },
     } do
       assert.equal(("--set x=%s: the value must be %s"):format(case[2], case[3]), value(case[1], case[2]))
     end
@@ -54,7 +54,7 @@ describe("rapid.param", function()
   it("is refused by the command before the first frame, with file and line", function()
     local text = "\nlocal rate = rapid.param('rate', 5, 'born per second')\nreturn rapid.create {}"
     local result = scene.command("check", text, "--set rate=fast")
-    assert.equal("scene.lua:2: --set rate=fast: the value must be a number, like the default 5 is\n", result.stderr)
+    assert.equal("scene.lua:2: --set rate=fast: the value must be a number, like the default 5\n", result.stderr)
     assert.equal(2, result.status)
     result = scene.command("run", text, "--set raet=5")
     assert.equal('scene.lua: --set raet=5: the graph has no parameter "raet"; did you mean "rate"?\n', result.stderr)

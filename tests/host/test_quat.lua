@@ -71,8 +71,8 @@ return rapid.create { fps = 10, points = two } :attribute { orient = {0, 0, 0, 1
         "can't compute quat(0, 0, 0, 1) * vec3(0, 1, 0); both must be a quat; to turn a vec3, use q:rotate(v)",
       ["p.P = quat(0, 0, 1)"] =
         "quat needs four numbers, quat(0, 0, 0, 1); rapid.math.rotation(axis, degrees) makes one from an axis",
-      ["p.q = {0, 0, 0, 1}"] = 'attribute "q" needs a quat, not a table; quat(x, y, z, w) makes one',
-      ["p.q = p.P"] = 'attribute "q" needs a quat, not vec3(0, 1, 0)',
+      ["p.q = {0, 0, 0, 1}"] = 'attribute "q" takes a quat, not a table; quat(x, y, z, w) makes one',
+      ["p.q = p.P"] = 'attribute "q" takes a quat, not vec3(0, 1, 0)',
       ["p.P = p.q:rotate(1)"] = "q:rotate(v) needs a vec3, not 1",
       ["p.P = p.q.axis"] = 'a quat has no "axis"; it has x, y, z, w, rotate, inverse, length, normalized and slerp',
       ["p.q = rapid.math.rotation(vec3(0, 0, 0), 3)"] =

@@ -47,7 +47,7 @@ describe("a parameter of a node in Lua", function()
     local remedy = "; it must be a list of keys with increasing positions and values of one type, such as { {0, " ..
       "1}, {0.5, 4} } or { {0, {1, 0, 0}} }"
     for given, expected in pairs {
-      ["3"] = "r = 3", ["{}"] = "r = {}", ["{{1, 2}, {1, 3}}"] = "r has the position 1 behind 1",
+      ["3"] = "r = 3", ["{}"] = "r = {}", ["{{1, 2}, {1, 3}}"] = "r has the position 1 after 1",
       ["{{0, 1}, {1, {1, 1, 1}}}"] = "r has both numbers and vec3s as values", ["{{0}}"] = "r has the key {0}",
     } do
       assert.equal('scene.lua:1: node "mine1": ' .. expected .. remedy, fault("r = " .. given))

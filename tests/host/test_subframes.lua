@@ -165,8 +165,8 @@ return rapid.create { fps = 24, subframes = %d, points = rapid.points.from { P =
     local plan = json.decode(scene.command("explain", text, "--json").stdout)
     local evaluated = {}
     for _, node in ipairs(plan.nodes) do evaluated[node.name] = node.evaluated end
-    assert.same({ create1 = "4 times a frame", a = "4 times a frame", gravity1 = "4 times a frame",
-      solve1 = "4 times a frame", after = "every frame" }, evaluated)
+    assert.same({ create1 = "4 times per frame", a = "4 times per frame", gravity1 = "4 times per frame",
+      solve1 = "4 times per frame", after = "every frame" }, evaluated)
     local files = {}
     for _, option in ipairs { "", "--keep-all" } do
       assert.equal(0, scene.command("run", text, "-f 1-4 -o a.####.csv " .. option).status)

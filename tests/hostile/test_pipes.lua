@@ -51,8 +51,8 @@ describe("a pipe or a device", function()
       ['"$RAPID" nodes --plugin pipe.so'] = "pipe.so: the plugin can't be read: it is not a regular file",
       ['"$RAPID" nodes --plugin zero.so'] = "zero.so: the plugin can't be read: it is not a regular file",
       ['RAPID_PLUGIN_PATH=plugins "$RAPID" nodes'] = "plugins/pipe.so: the plugin can't be read: it is not a regular",
-      ['"$RAPID" test test_pipe.lua'] = "test_pipe.lua: it is not a regular file",
-      ['"$RAPID" test test_zero.lua'] = "test_zero.lua: it is not a regular file",
+      ['"$RAPID" test test_pipe.lua'] = "test_pipe.lua: is not a regular file",
+      ['"$RAPID" test test_zero.lua'] = "test_zero.lua: is not a regular file",
       ['"$RAPID" test tests'] = "tests: no tests in this folder",
     } do
       local result = command.shell("timeout -k 1 60 env " .. words, { cwd = folder.path })

@@ -183,7 +183,7 @@ TEST_CASE("an unknown extension is refused with the known ones, before anything 
           }) == "a.####.abc: unknown extension \".abc\"; it must be one of " + known);
     CHECK(error_of([] { format_of("a"); }) == "a: the name has no extension; it must be one of " + known);
     CHECK(format_of("A.VDB").extension == ".vdb");
-    CHECK(error_of([] { read_points("a.png"); }) == "a.png: a .png file");
+    CHECK(error_of([] { read_points("a.png"); }) == "a.png: points can't be read from a .png file");
     CHECK(error_of([] { read_points("/nowhere/a.vdb"); }) ==
           "/nowhere/a.vdb: can't be read: No such file or directory");
 }

@@ -119,7 +119,7 @@ TEST_CASE("parts that do not belong together are refused, with their names", "[m
     {
         parts[2].remove("age");
         parts[2].add({"age", Vec3f(0, 0, 0)});
-        refused_with("age is vec3, and float in part1");
+        refused_with("age is vec3, but float in part1");
     }
     SECTION("points in another order")
     {

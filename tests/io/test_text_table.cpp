@@ -40,8 +40,8 @@ TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error
         return strings_at(strings, Column<std::int32_t>(std::span<const std::int32_t>(indices)));
     };
     CHECK(same_bits(column({0, -1}), column_of({"leaf", ""})));
-    CHECK(error_of([&] { column({0, 1}); }) == "a point has string number 1; there are 1");
-    CHECK(error_of([&] { column({-2, 0}); }) == "a point has string number -2; there are 1");
+    CHECK(error_of([&] { column({0, 1}); }) == "a point has string number 1, but there are only 1");
+    CHECK(error_of([&] { column({-2, 0}); }) == "a point has string number -2, but there are only 1");
 }
 
 TEST_CASE("texts of a file have the tokens of the process, also when more are met than are remembered", "[io][texts]")

@@ -159,7 +159,8 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
     const std::string three = "type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">";
     CHECK_THAT(error("hello"), Catch::EndsWith("a.vtp: not a VTK file: it has no element VTKFile"));
     CHECK_THAT(error("<VTKFile type=\"PolyData\"><PolyData>"), Catch::Contains("its XML is damaged: "));
-    CHECK_THAT(error("<VTKFile type=\"ImageData\"/>"), Catch::EndsWith("it holds ImageData; it must contain PolyData"));
+    CHECK_THAT(error("<VTKFile type=\"ImageData\"/>"),
+               Catch::EndsWith("it contains ImageData; it must contain PolyData"));
     CHECK_THAT(error("<VTKFile type=\"PolyData\"/>"), Catch::EndsWith("the file has no piece"));
     CHECK_THAT(
         error(file_of("compressor=\"vtkLZ4DataCompressor\"", ascii_points)),
@@ -168,7 +169,7 @@ TEST_CASE("a damaged .vtp is an error that says how", "[io][vtp]")
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4")),
                Catch::EndsWith("the array \"\" of 2 rows: the array ends early"));
     CHECK_THAT(error(file_of("", "type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 1 2 3 4 five")),
-               Catch::EndsWith("the array lacks the number of its 5"));
+               Catch::EndsWith("its number 5 is not a number of its type"));
     CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({20}) + std::string(20, '\0')))),
                Catch::EndsWith("the array ends early"));
     CHECK_THAT(error(file_of("", three + base64(raw_bytes<std::uint32_t>({24}) + std::string(20, '\0')))),

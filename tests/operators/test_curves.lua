@@ -174,7 +174,7 @@ return rapid.create {} :curve_force { closed = true,
     of_source("a curve emits evenly by length", "rapid.curve.from { points = {{0, 0, 0}, {1, 0, 0}} }", "density = 'u'")
     of_source("give the function to rapid.curve.from",
       "function(frame) return rapid.curve.from { points = {{0, frame.time, 0}, {1, 0, 0}} } end")
-    of_source("returned 3 points in frame 2, and 2 in the first", [[rapid.curve.from { points = function(frame)
+    of_source("returned 3 points in frame 2 and 2 in the first", [[rapid.curve.from { points = function(frame)
       return frame.number == 2 and {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}} or {{0, 0, 0}, {1, 0, 0}} end }]])
     scene.folder:write("few.0001.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n")
     scene.folder:write("few.0002.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nl 1 2 3\n")

@@ -569,13 +569,13 @@ TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
     };
     const Value nan = std::numeric_limits<double>::quiet_NaN();
     CHECK(refusal({}, mesh) == "the number of points is missing; give rate, count or impulse");
-    CHECK(refusal({{"rate", 1.0}, {"count", 1.0}}, mesh) == "rate and count are given together; remove one of them");
+    CHECK(refusal({{"rate", 1.0}, {"count", 1.0}}, mesh) == "rate and count are given together; give only one of them");
     CHECK(refusal({{"rate", 1.0}, {"count", 1.0}, {"impulse", list({1.0})}}, mesh) ==
           "rate, count and impulse are given together; give only one of them");
     CHECK(refusal({{"rate", nan}}, mesh) == "rate = nan is out of range; it must be at least 0");
     CHECK(refusal({{"rate", -1.0}}, mesh) == "rate = -1 is out of range; it must be at least 0");
     CHECK(refusal({{"rate", 1e30}}, mesh) ==
-          "rate = 1e+30 would emit 4.17e+28 points in a frame; at most 2147483647 fit");
+          "rate = 1e+30 would emit 4.17e+28 points in a frame; at most 2147483647 are possible");
     CHECK(refusal({{"count", 1.5}}, mesh) == "count = 1.5 is not whole; it must be an integer");
     CHECK(refusal({{"impulse", list({0.5})}}, mesh) == "impulse[1] = 0.5 is not whole; it must be a number of points");
     CHECK(refusal({{"rate", 1.0}, {"birth", "evne"}}, mesh) == "birth = \"evne\" is unknown; did you mean \"even\"?");
@@ -595,7 +595,7 @@ TEST_CASE("emit refuses illegal arguments, and names legal ones", "[emit]")
           "source = 5 has the wrong type; it must be a mesh, level set, shape, fog, curve, points or vec3");
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"id", 1.0}})}}, mesh).find("\"id\"") != std::string::npos);
     CHECK(refusal({{"rate", 1.0}, {"attributes", named({{"life", 1.0}})}}, mesh) ==
-          "attributes: \"life\" can't be given; use life");
+          "attributes: \"life\" can't be given; use the parameter life");
 }
 
 TEST_CASE("an impulse before the first frame is refused by name", "[emit]")

@@ -363,7 +363,7 @@ describe("a node that can't bear", function()
     fails("local slow = rapid.create { fps = 12 } :solve {}\n"
       .. "return rapid.create {} :spawn { from = slow, count = 1 } :solve {}", "give both the same fps")
     fails(with(":solve {}", "from = parents"), "the number of points is missing")
-    fails(with(":solve {}", 'from = parents, on = "hits"'), 'on = "hits" is no event')
+    fails(with(":solve {}", 'from = parents, on = "hits"'), 'on = "hits" is not an event')
     fails(with(":solve {}", 'from = parents, on = "hit", rate = 3'), "rate and on are given together")
     fails(with(":solve {}", 'from = parents, count = 1, kill_parent = true'),
       "kill_parent needs an event in a parent's life")

@@ -221,7 +221,8 @@ TEST_CASE("a card covers a disc times the cosine between its normal and the view
     }
     // A card that faces the light is brighter than one that is turned away from it by 60°.
     const auto shaded = [&](const Vec3f& normal) {
-        points.column<Quatf>("orient").write()[0] = Quatf::FromTwoVectors(Vec3f::UnitY(), normal);
+        const Vec3f n = normal.normalized(), axis = Vec3f::UnitY().cross(n);  // of the shortest turn from y to n
+        points.column<Quatf>("orient").write()[0] = Quatf(1 + n.y(), axis.x(), axis.y(), axis.z()).normalized();
         return render(points, small, styled({.cards = true}), front_view()).pixel(160, 100)[1];
     };
     CHECK(shaded(Vec3f(-0.3f, 0.4f, 1)) > shaded(Vec3f(0.6f, -0.8f, 1)) + 20);

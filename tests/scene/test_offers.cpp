@@ -346,7 +346,8 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     };
     HostShape shape = ball({0, 0, 0}, 1);
     shape.distance = nullptr;
-    CHECK_THAT(refused("ball", shape), Contains("the program offers \"ball\": it has no function"));
+    CHECK_THAT(refused("ball", shape),
+               Contains("the program offers \"ball\": the function of the distance is missing"));
     shape = ball({0, 0, 0}, 1);
     std::swap(shape.lower, shape.upper);
     CHECK_THAT(refused("ball", shape), Contains("bounds"));
@@ -369,7 +370,7 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     points.columns = {{"P", ColumnType::Vec3, values}};
     CHECK_THAT(refused("cloud", points), Contains("P is nan at place 0"));
     points.columns = {{"P", ColumnType::Float, values}};
-    CHECK_THAT(refused("cloud", points), Contains("it must be of vec3"));
+    CHECK_THAT(refused("cloud", points), Contains("P has the type float; it must be vec3"));
     const std::uint32_t unknown[] = {4'000'000'000};
     points.columns = {{"P", ColumnType::Vec3, values}, {"name", ColumnType::String, unknown}};
     CHECK_THAT(refused("cloud", points), Contains("P is nan") || Contains("no string has the number 4000000000"));

@@ -512,7 +512,7 @@ TEST_CASE("a scene is checked without a frame, and for kernels that remember", "
     good(scene.advance());
     CHECK_THAT(
         good(SceneInside::check_outputs(scene, {})),
-        StartsWith("param rate = 2000  particles born per second\ncloud.lua: OK, ") && Contains("from output main"));
+        StartsWith("param rate = 2000  particles born per second\ncloud.lua: OK, ") && Contains("to output main"));
     CHECK(good(SceneInside::advice_on(scene, {})).empty());
     const SceneRaces none = good(SceneInside::find_races(scene, {}, {2, 4}));
     CHECK_FALSE(none.found);

@@ -197,7 +197,7 @@ TEST_CASE("a point of a merge that is not known by its place is an error that sa
     CHECK_THAT(SceneInside::origin(moved, good(moved.advance_to(2)), 0).error().message, Contains("have moved it"));
     Scene other = opened("return { sparks = rapid.create { points = rapid.points.grid {} } :solve {} }");
     CHECK_THAT(SceneInside::origin(moved, good(other.advance_to(2)), 0).error().message,
-               Contains("no output \"sparks\""));
+               Contains("an output \"sparks\" that the scene does not have"));
 }
 
 TEST_CASE("a graph without places has the nodes of the one that is laid out", "[inspection]")

@@ -61,7 +61,7 @@ describe("emit by a density", function()
     local read = 'rapid.mesh.read "square.ply"'
     assert.truthy(error_of(read, 'density = "haet"')
       :find('the source has no float with this name; did you mean "heat"?', 1, true))
-    assert.truthy(error_of("rapid.shape.sphere {}", 'density = "heat"'):find("is an attribute of points", 1, true))
+    assert.truthy(error_of("rapid.shape.sphere {}", 'density = "heat"'):find("must be an attribute of points", 1, true))
     assert.truthy(error_of(read, 'density = "heat", from = "volume"'):find("which a volume does not have", 1, true))
     assert.truthy(error_of("rapid.points.from { P = {{0, 0, 0}}, w = {-1} }", 'density = "w"')
       :find("w is -1 at point 0 of the source; a density must be at least 0", 1, true))

@@ -108,7 +108,8 @@ TEST_CASE("what is no fog is an error that says what is, and what is in the file
     empty->tree().setValue({1, 2, 3}, 0.0f);
     const auto surface = fog("surface");
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
-    CHECK_THAT(folder.error({one, other}), Catch::Contains("there are 2 fogs") && Catch::Contains("name one by grid"));
+    CHECK_THAT(folder.error({one, other}),
+               Catch::Contains("there are 2 fogs") && Catch::Contains("choose one with grid"));
     CHECK(births_in(*folder.read({one, other}, "heat"), 1).size() == 1);
     CHECK_THAT(folder.error({one}, "smok"), Catch::Contains("did you mean \"smoke\"?"));
     CHECK_THAT(folder.error({surface}), Catch::Contains("there is no fog of floats"));

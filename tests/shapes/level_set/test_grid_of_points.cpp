@@ -174,7 +174,7 @@ TEST_CASE("points that make no grid are refused", "[grid_of_points]")
     const std::vector<Vec3f> P = {Vec3f(0, 0, 0), Vec3f(1, 0, 0)}, none;
     const std::vector<float> all = {0.1f}, weight = {1}, negative = {1, -1}, zero = {0};
     const auto refused = [](const SpreadPoints& points) { return test::error_of([&] { density_of_points(points); }); };
-    CHECK_THAT(refused({none, all, weight, {}, 0.1}), Contains("there are no points"));
+    CHECK_THAT(refused({none, all, weight, {}, 0.1}), Contains("needs points, and there are none"));
     CHECK_THAT(refused({P, all, negative, {}, 0.1}), Contains("point 1 has the weight -1"));
     CHECK_THAT(refused({P, all, zero, {}, 0.1}), Contains("no density above 0"));
     const std::vector<Vec3f> far = {Vec3f(1e30f, 0, 0)};

@@ -313,11 +313,12 @@ TEST_CASE("meshes that can't become a level set are refused with the numbers, be
         }),
         Equals("mesh \"box\" vanishes with voxel = 0.3 m: its size is 0.1 x 0.1 x 0.02 m; use a voxel of at most "
                "0.00667 m"));
-    CHECK_THAT(test::error_of([&] {
-                   level_set_from_mesh(make_grid(2, 2, 4, {0, 0.02, 0}), {0.1, 3}, w);
-               }),
-               Equals("mesh \"grid\" has no inside with voxel = 0.1 m: 16 of its edges have one face; close it: for a "
-                      "ground, add a copy of its outer edge lower down, faces between the two, and a bottom"));
+    CHECK_THAT(
+        test::error_of([&] {
+            level_set_from_mesh(make_grid(2, 2, 4, {0, 0.02, 0}), {0.1, 3}, w);
+        }),
+        Equals("mesh \"grid\" has no inside with voxel = 0.1 m, because 16 of its edges have one face; close it: for a "
+               "ground, add a copy of its outer edge lower down, faces between the two, and a bottom"));
 }
 
 TEST_CASE("a wider band is the same surface with exact distances farther out", "[level set]")

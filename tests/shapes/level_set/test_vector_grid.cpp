@@ -105,9 +105,9 @@ TEST_CASE("a file without the requested grid is refused with the grids that it h
     rest->setName("rest");
     const auto path = folder.write_grids({density, vel, rest});
     const auto refused = [&](const char* name) { return test::error_of([&] { read_vector_grid(path, name); }); };
-    CHECK_THAT(refused(""), Contains("there are 2 grids of vectors") && Contains("name one by grid"));
+    CHECK_THAT(refused(""), Contains("there are 2 grids of vectors") && Contains("choose one with grid"));
     CHECK_THAT(refused("vle"), Contains("there is no grid \"vle\"") && Contains("did you mean \"vel\"?"));
-    CHECK_THAT(refused("density"), Contains("is float; it must be vectors (vec3s)"));
+    CHECK_THAT(refused("density"), Contains("is float; it must have vectors (vec3s)"));
     const auto only = folder.write_grids({density});
     CHECK_THAT(test::error_of([&] { read_vector_grid(only, ""); }),
                Contains("there is no grid of vectors (vec3s) in") && Contains("\"density\" (float)"));

@@ -123,9 +123,9 @@ return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
     for line in result.stderr:gmatch "[^\n]+" do lines[#lines + 1] = line end
     assert.equal(11, #lines, result.stderr)
     for place = 1, 10 do
-      assert.match("^warning: frame %d+: .*a voxel of 0.5 m is half as large as mesh", lines[place])
+      assert.match("^warning: frame %d+: .*a voxel of 0.5 m is at least half as large as mesh", lines[place])
     end
-    assert.match("^warning: %d%d more warnings of this kind, the last in frame 40: .* it is 0.539062 m long", lines[11])
+    assert.match("^warning: %d%d more warnings of this kind, the last in frame 40: .* is 0.539062 m long", lines[11])
   end)
 
   it("is silent with --quiet", function()
@@ -519,7 +519,7 @@ return rapid.create {} :emit { source = %s, rate = 0 } :solve {}
       assert.truthy(result.stderr:find(message, 1, true), result.stderr)
     end
     refused("-f 1-2 -o a.####.mp4", "a film is one file for all frames; remove the frame number from its name")
-    refused("-f 1-2 -o a.mp4 --size 63x48", "a .mp4 film needs even edges; give another --size other than 63x48")
+    refused("-f 1-2 -o a.mp4 --size 63x48", "a .mp4 film needs even edges; give another --size than 63x48")
     refused("-f 1-2 -o a.mp4 --untrusted", "films need the program ffmpeg, which --untrusted does not allow")
   end)
 

@@ -317,7 +317,7 @@ return rapid.study { %s }]]):format(fields))
       [rest .. 'name = "x", error = "residual"'] =
         "reference = a function; it must be removed: a residual needs no reference",
       [rest .. 'name = "x", frames = {2, 1}'] = "frames = {2, 1}; the last must come after the first",
-      [rest .. 'name = "x", sweep = { n = {{}} }'] = "sweep: n holds a table; it must be finite numbers,",
+      [rest .. 'name = "x", sweep = { n = {{}} }'] = "sweep: n contains a table; values must be finite numbers,",
       [rest .. 'name = "x", repeat_runs = 0'] = "repeat_runs = 0; it must be a whole number, at least 1",
       [rest .. 'name = "x", error_frames = "first"'] = 'error_frames = "first"; it must be "all" or "last"',
       [rest .. 'name = "x", repeat_runs = 1e18'] = "it must be a whole number, at least 1 and at most 100000",

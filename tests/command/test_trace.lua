@@ -86,7 +86,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}} } }
 
   it("says where no point has the id, and refuses a create that there is not", function()
     local _, errors = reported(ball, "--id 77", 1)
-    assert.truthy(errors:find("no point up to frame 1 has the id 77", 1, true))
+    assert.truthy(errors:find("no point up to frame 48 has the id 77", 1, true))
     local result = scene.command("trace", ball, "--id 0 --of creat1")
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find("did you mean", 1, true), result.stderr)

@@ -121,7 +121,7 @@ describe("rapid wedge", function()
       ["--vary rate=1,2 -o 'x.####.csv'"] = "rate=1 and rate=2 write the same files; put {rate} into",
       ["--vary rate=1,1 -o '{rate}.####.csv'"] = "--vary: rate=1 appears twice; remove one",
       ["--vary 'rate=1,{1}' -o '{rate}.####.csv'"] = "rate=1 and rate={1} write the same files; remove one",
-      ["--vary rate=1,2 -o '{rat}.####.csv'"] = '{rat} is not varied; did you mean "rate"?',
+      ["--vary rate=1,2 -o '{rat}.####.csv'"] = '{rat} is not the name of a varied parameter; did you mean "rate"?',
       ["--vary rate=1,2 -o '{rate}.####.cvs'"] = ".cvs",
       ["--vary rate=1,2 --jobs 0"] = "--jobs",
       [""] = "--vary is required",

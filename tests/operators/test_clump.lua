@@ -37,7 +37,8 @@ return rapid.create { fps = 24, points = rapid.points.from {
 
   it("takes no more than its strength from points that tear apart", function()
     for _, substeps in ipairs({1, 4, 16}) do
-      for _, other in ipairs({"", ":collide { shape = rapid.shape.plane { offset = -100 } }", ":drag { linear = 0 }"}) do
+      local plane = ":collide { shape = rapid.shape.plane { offset = -100 } }"
+      for _, other in ipairs { "", plane, ":drag { linear = 0 }" } do
         local p = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from {
     P = {{0, 1, 0}, {0.2, 1, 0}}, v = {{0, 0, 0}, {1, 0, 0}}, pscale = {0.1, 0.1} } }

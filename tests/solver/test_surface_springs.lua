@@ -275,7 +275,8 @@ describe("a stiff spring to a moving sphere, beside a plane that bounces with fr
         local result = run(([[
 return rapid.create { points = rapid.points.from { P = {{1.733, 2.805, -0.401}}, mass = {2.9e-4}, pscale = {0.27} } }
   :spring { target = rapid.shape.sphere { radius = 0.87, center = {0, 1.74, 0} }
-              :transform(function(f) return rapid.translate(0, 0.52 * math.sin(2.56 * f.time), 0) end), stiffness = 7e4 }
+              :transform(function(f) return rapid.translate(0, 0.52 * math.sin(2.56 * f.time), 0) end),
+            stiffness = 7e4 }
   :contact { spin = true } :collide { shape = rapid.shape.plane {}, bounce = %d, friction = 0.5 }
   :solve { substeps = %d }]]):format(bounce, substeps), 30, true)
         for frame = 1, 30 do assert.truthy(result[frame][1].v:length() < 3e4) end

@@ -175,7 +175,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
       done(("run drops.lua -f 1-4 --set rate=50000000 -o '%sa.####.csv' --farm slurm --farm-options '%s'")
         :format(name, options))
       assert.equal("failed", states(settled(name .. "FARM.json")))
-      assert.matches("free of 60 MiB", folder:read(name .. "FARM/1.log"), 1, true)
+      assert.matches("of 60 MiB are free", folder:read(name .. "FARM/1.log"), 1, true)
     end
   end)
 
@@ -194,7 +194,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
   it("finds what is wrong before it submits", function()
     for arguments, text in pairs {
       ["coupled.lua -o 'c/a.####.csv' --farm slurm --parts 2"] = 'node "contact1"',
-      ["drops.lua -o 'c/a.####.png' --farm slurm --parts 2"] = "no output files to merge",
+      ["drops.lua -o 'c/a.####.png' --farm slurm --parts 2"] = "files of parts can't be merged",
       ["drops.lua -o 'c/{part}.####.csv' --farm slurm --parts 2"] = "{part}",
       ["drops.lua --farm slurm --parts 2"] = "give -o",
       ["drops.lua --parts 2"] = "--parts needs --farm slurm",

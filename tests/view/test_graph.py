@@ -32,7 +32,7 @@ def the_graph_tells_points_and_what_is_left_out(bench):
     browser.wait("/^40 · /.test(document.querySelector('#graph [data-node=solve1] .fact').textContent)")
     assert browser.run("return document.querySelectorAll('#graph .left-out').length") == 2
     tip = browser.run("return document.querySelector('#graph .left-out title').textContent")
-    assert "left out: leads to no output" in tip, tip
+    assert "pruned: leads to no output" in tip, tip
     assert browser.run("return document.querySelectorAll('#graph path.feedback').length") == 1
 
 

@@ -444,10 +444,16 @@ void Emit::fill(const NewbornColumns& newborn, const Chosen& chosen, std::size_t
     if (own_age || velocities.is_random() || !newborn.life.empty()) uniform4(now.random, numbers, draw_use, draws);
     source_.place(now.random, numbers, /*in_order=*/!rate, birthplaces);
     if (own_age || source_.moves()) ages.find(chosen.births, chosen.in_frame(first), birthplaces, draws, L);
-    std::array<double, batch_size> times;  // in the interval, from 0 to 1
+    const auto time_of = [&](std::size_t i) { return at_beginning_ ? 0 : std::max(0.0, 1 - L[i] / now.frame.dt); };
+    if (source_.redraws())
+        source_.redraw(now.random, numbers, birthplaces, [&](std::size_t i) {
+            ages.find(chosen.births, chosen.in_frame(first + i), birthplaces.subspan(i, 1), draws.subspan(i, 1),
+                      L.subspan(i, 1));
+            return time_of(i);
+        });
+    std::array<double, batch_size> times;
     const std::span<double> t = std::span(times).first(source_.moves() ? size : 0);
-    for (std::size_t i = 0; i < t.size(); ++i) t[i] = at_beginning_ ? 0 : std::max(0.0, 1 - L[i] / now.frame.dt);
-    if (source_.redraws() && !ages.are_of_places()) source_.redraw(now.random, numbers, t, birthplaces);
+    for (std::size_t i = 0; i < t.size(); ++i) t[i] = time_of(i);
     for (const auto& inherit_attribute : newborn.inherit) inherit_attribute(first, birthplaces);
     for (const auto& draw_attribute : newborn.draw) draw_attribute(first, size, numbers);
 

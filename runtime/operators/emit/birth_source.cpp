@@ -491,15 +491,17 @@ void BirthSource::place(RandomKey key, const Items& births, bool in_order, std::
     }
 }
 
-// Rejection sampling: a place drawn by the bound on its face's area stays with the probability that its area is of it.
-void BirthSource::redraw(RandomKey key, const Items& births, std::span<const double> t, std::span<Birthplace> out) const
+// Rejection sampling: birthplaces are drawn in proportion to each face's largest area, and accepted with the
+// probability area(t) / largest area.
+void BirthSource::redraw(RandomKey key, const Items& births, std::span<Birthplace> out,
+                         const std::function<double(std::size_t)>& time) const
 {
     constexpr std::uint64_t max_trials = 256;  // the last one stays: at this time the mesh has next to no area
     for (std::size_t i = 0; i < out.size(); ++i)
         for (std::uint64_t trial = 0; trial < max_trials; ++trial) {
             const double largest = largest_areas_[static_cast<std::size_t>(out[i].element)];
             const double u = uniform4(key, births[i], accept_use | trial << 32)[0];
-            if (u * largest < path_->area(out[i].element, t[i])) break;
+            if (u * largest < path_->area(out[i].element, time(i))) break;
             RandomKey next = key;
             next.value += trial + 1;
             scatter_->place(next, births[i], out.subspan(i, 1));

@@ -5,6 +5,7 @@
 // these depend only on the random key and the birth's number.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,11 +71,13 @@ public:
     // order, cyclically, or at random; with a density always at random. Draws from the uses 0 to 15 and 17 of the key.
     void place(RandomKey key, const Items& births, bool in_order, std::span<Birthplace> out) const;
 
-    // Returns true if births are on faces that deform. redraw() then replaces places that are less likely at the time t
-    // of their birth, from 0 to 1 in the interval, than at others, so that births are uniform by the area at their own
-    // times. Draws from the use 18 of the key and, under other keys, from those of place().
+    // Returns true if births are on faces that deform. redraw() then rejects and redraws birthplaces, so that births
+    // are uniform by the area at their own times. time(i): of birth i at out[i], from 0 to 1 in the interval; an age
+    // that is an attribute of the source changes with the birthplace. Draws from the use 18 of the key and, under other
+    // keys, from those of place().
     bool redraws() const { return !largest_areas_.empty(); }
-    void redraw(RandomKey key, const Items& births, std::span<const double> t, std::span<Birthplace> out) const;
+    void redraw(RandomKey key, const Items& births, std::span<Birthplace> out,
+                const std::function<double(std::size_t)>& time) const;
 
     // Returns a column of values() at a birthplace: the point's own value, or the barycentric interpolation on a mesh.
     template <class T>

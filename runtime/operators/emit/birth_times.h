@@ -138,8 +138,6 @@ public:
     double frame_length() const { return h_; }
     // The age of all newborn points, s; empty if they differ.
     const std::optional<double>& common() const { return common_; }
-    // Returns true if they are an attribute of the source, so that a place decides them.
-    bool are_of_places() const { return age_ && !age_->attribute.empty(); }
 
     // Finds the ages L of some births, s. indices_in_frame: their numbers among the births of this frame; spans have
     // shape [n]. The draws are read only if ages are random.

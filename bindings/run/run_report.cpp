@@ -207,6 +207,7 @@ void RunReport::known_frame(const FrameRecord& record, bool is_before)
 {
     const auto lock = locked();
     totals_.add(record.statistics);
+    for (const WrittenFile& file : record.files) totals_.add_file(file.path, false, record.statistics.points, 0);
     if (statistics_) statistics_->add(record.statistics);
     keep_worst(run_.stiff, record.statistics.stiff);
     for (const std::string& text : record.warnings) report_warning(text, record.statistics.frame);

@@ -83,7 +83,7 @@ Location location_of(const Node& node, const std::string& attribute)
 }
 
 // Returns the number of components of the attribute that the node reads or assigns; 1 if unknown.
-int numbers_in(const Node& node, const std::string& attribute)
+int component_count(const Node& node, const std::string& attribute)
 {
     for (const auto& [name, value] : node.arguments) {
         const auto* reference = value.get<AttributeRef>();
@@ -300,7 +300,7 @@ void check_names_of_sources(const std::vector<PlannedNode>& nodes, std::size_t s
                 const Uses uses = uses_of(planned);
                 for (const std::string& name : uses.reads_of_source)
                     at_mention(*planned.node, name,
-                               [&] { made.check_attribute(name, numbers_in(*planned.node, name)); });
+                               [&] { made.check_attribute(name, component_count(*planned.node, name)); });
                 for (const std::string& name : uses.reads_groups_of_source) made.check_group(name);
             });
         }
@@ -311,7 +311,7 @@ void check_attribute(const MadeNames& made, const AttributeFlow& flow, const std
                      std::size_t node, const std::string& name)
 {
     // Points of other simulations, which come through a merge, may have other names.
-    const int numbers = numbers_in(*nodes[node].node, name);
+    const int numbers = component_count(*nodes[node].node, name);
     if (nodes[node].carries.size() == 1) made.check_attribute(name, numbers);
     if (flow.has(node, name) || is_own_column(name) || known_attribute(name)) return;
     if (const auto later = made.attributes.find(name); later != made.attributes.end())

@@ -98,7 +98,7 @@ void add_life(JsonText& json, const Biography& life)
     json.end();
 }
 
-std::string line(std::int64_t frame, double time, const std::string& what)
+std::string line_of(std::int64_t frame, double time, const std::string& what)
 {
     return fmt::format("  {:>5}  {:>9.5f} s  {}\n", frame, time, what);
 }
@@ -117,26 +117,26 @@ std::string text_of(const Biography::Edit& edit)
 std::string text_of(const Biography::Step& step, bool was_asleep)
 {
     std::string text;
-    for (const Biography::Edit& edit : step.edits) text += line(step.frame, step.time, text_of(edit));
-    if (step.asleep != was_asleep) text += line(step.frame, step.time, step.asleep ? "sleeps" : "wakes up");
+    for (const Biography::Edit& edit : step.edits) text += line_of(step.frame, step.time, text_of(edit));
+    if (step.asleep != was_asleep) text += line_of(step.frame, step.time, step.asleep ? "sleeps" : "wakes up");
     for (const Biography::Force& force : step.forces)
-        text += line(step.frame, step.time,
-                     fmt::format("{} accelerates it by {} m/s²", force.node, text_of_vector(force.a)));
+        text += line_of(step.frame, step.time,
+                        fmt::format("{} accelerates it by {} m/s²", force.node, text_of_vector(force.a)));
     for (const Biography::Contact& contact : step.contacts)
-        text += line(
+        text += line_of(
             step.frame, contact.time,
             fmt::format("meets {} at {}, normal {}, at {:.6g} m/s, impulse {:.6g} kg m/s", contact.node,
                         text_of_vector(contact.P), text_of_vector(contact.normal), contact.speed, contact.impulse));
     if (step.values)
-        text += line(step.frame, step.time,
-                     fmt::format("P = {}, v = {}", text_of(step.values->at("P")), text_of(step.values->at("v"))));
+        text += line_of(step.frame, step.time,
+                        fmt::format("P = {}, v = {}", text_of(step.values->at("P")), text_of(step.values->at("v"))));
     return text;
 }
 
 std::string text_of(const Biography& life)
 {
     std::string text = fmt::format("point {} of {}\n", life.id, life.simulation);
-    text += line(
+    text += line_of(
         life.birth->frame, life.birth->time,
         fmt::format("{} at {}, v = {}", life.birth->why, text_of_vector(life.birth->P), text_of_vector(life.birth->v)));
     bool asleep = false, unknown = false;
@@ -146,8 +146,8 @@ std::string text_of(const Biography& life)
         unknown |= !step.has_contacts;
     }
     if (life.death)
-        text += line(life.death->frame, life.death->time,
-                     fmt::format("dies at {}: {}", text_of_vector(life.death->P), life.death->why));
+        text += line_of(life.death->frame, life.death->time,
+                        fmt::format("dies at {}: {}", text_of_vector(life.death->P), life.death->why));
     if (unknown) text += "  Contacts are unknown: with a tolerance, Solve repeats the step of a point.\n";
     return text;
 }

@@ -37,7 +37,7 @@ void RunTotals::add(const FrameFigures& figures)
 #undef RAPID_FIGURE
     ++frames;
     if (!first_solved && figures.points > 0 && figures.substeps > 0) first_solved = figures.frame;
-    last = figures;
+    last_points = figures.points;
 }
 
 void RunTotals::add_file(const std::string& path, bool is_film, std::uint64_t points_of_file, double seconds_of_file)
@@ -60,13 +60,13 @@ std::string line(const char* label, const std::string& text) { return fmt::forma
 std::string points_text(const RunTotals& totals)
 {
     if (totals.frames == 0) return line("points", "none: no frame was run");
-    std::string text = with_separators(totals.last.points);
-    if (*totals.points.most > totals.last.points)
+    std::string text = with_separators(totals.last_points);
+    if (*totals.points.most > totals.last_points)
         text += fmt::format(" (most: {} in frame {})", with_separators(*totals.points.most), totals.points.max_frame);
     return line("points", text);
 }
 
-std::string frames_text(const RunStatistics& run, const RunTotals& totals)
+std::string frame_count_text(const RunStatistics& run, const RunTotals& totals)
 {
     std::string text = fmt::format("{} in {}", totals.frames, duration_text(run.seconds));
     if (totals.points.sum > 0 && run.seconds > 0)
@@ -165,7 +165,7 @@ std::string result_text(const RunStatistics& run, const RunTotals& totals)
 
 std::string summary(const RunStatistics& run, const RunTotals& totals)
 {
-    return points_text(totals) + frames_text(run, totals) + slowest_text(totals) + error_text(totals) +
+    return points_text(totals) + frame_count_text(run, totals) + slowest_text(totals) + error_text(totals) +
            files_text(totals) + result_text(run, totals);
 }
 

@@ -96,9 +96,10 @@ function(rapid_sanitized_program target)
   endif()
 endfunction()
 
-# Uses ccache if it is installed. By default it ignores the macros of a precompiled header, and __TIME__. Two checkouts
-# share nothing (no CCACHE_BASEDIR): a precompiled header contains the absolute paths of its checkout, and g++ would
-# take the other's headers for different ones and read them again.
+# Uses ccache if it is installed. It does not see the macros of a precompiled header, or __TIME__, and caches sources
+# with such a header only if CCACHE_SLOPPINESS allows it. Two checkouts share nothing (no CCACHE_BASEDIR): a precompiled
+# header contains the absolute paths of its checkout, and g++ would take the other's headers for different ones and read
+# them again.
 find_program(CCACHE ccache)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER

@@ -85,14 +85,14 @@ local types = {
   },
 }
 
--- texts: the strings of attributes (lua/text.lua).
+-- strings: the strings of attributes (lua/text.lua).
 local function string_type(strings)
   return {
     pointer = "uint32_t*", scalars = 1,
     load = function(data, k) return strings.text(data[k]) end,
     store = function(data, k, x) data[k] = strings.number(x) end,
     check = function(name, x)
-      if type(x) ~= "string" then wrong_type(name, "a text", x) end
+      if type(x) ~= "string" then wrong_type(name, "a string", x) end
     end,
   }
 end
@@ -103,7 +103,7 @@ local over = "points can't be used outside the :detail function that received th
 -- point_names: the host's table of a point's names; strings: the strings of attributes (lua/text.lua). Returns run(f,
 -- frame, params, size, random, details), which returns the indices (from 0) of the killed points, and the details.
 local function make(native, rand, point_names, strings)
-  local of_string_type = string_type(strings)
+  local string_attribute = string_type(strings)
   local read_only = point_names.read_only
   -- State of the current run. Only one runs at a time.
   local columns, groups, killed, added, size, frame, random, details
@@ -121,7 +121,7 @@ local function make(native, rand, point_names, strings)
       error(("the name of an attribute must be a string, not %s"):format(describe.value(name)), 0)
     end
     local data, stride, kind = native.column(name, writable) -- raises an error that lists the attributes
-    local about = kind == "string" and of_string_type or types[kind]
+    local about = kind == "string" and string_attribute or types[kind]
     column = {
       data = ffi.cast(about.pointer, data), stride = stride, writable = writable,
       load = about.load, store = about.store, check = about.check, kind = kind,
@@ -317,7 +317,8 @@ local function make(native, rand, point_names, strings)
   function set.neighbours(points, i, radius)
     check_set(points, "neighbours")
     if type(radius) ~= "number" then
-      error(("points:neighbours needs a position and a radius, not %s"):format(describe.value(radius)), 0)
+      error(("points:neighbours: the radius is %s; give an index and a number: points:neighbours(i, radius)")
+        :format(describe.value(radius)), 0)
     end
     return native.neighbours(place_of("points:neighbours", i), radius)
   end

@@ -56,7 +56,7 @@ local setter_text = {
     local a = $C[i]
     a.x, a.y, a.z, a.w = x1, x2, x3, x4]],
   string = [[
-    if type(x) ~= "string" then wrong_type($S, "a text", x) end
+    if type(x) ~= "string" then wrong_type($S, "a string", x) end
     $C[i] = strings.number(x)]],
 }
 

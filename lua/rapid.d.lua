@@ -712,7 +712,7 @@ function Node:arrive(params) end
 ---@field shape? rapid.Shape|fun(frame: rapid.Frame): rapid.Shape  shape or mesh whose surface attracts the points, instead of center [shape at rest or moving]
 ---@field strength? number|rapid.Attribute|fun(frame: rapid.Frame): number  acceleration at a distance of 1 m; a negative value repels [number, m/s², default 1, takes rapid.attr]
 ---@field falloff? number|fun(frame: rapid.Frame): number  power of the distance with which the acceleration decreases [number, default 2]
----@field core? number|fun(frame: rapid.Frame): number  distance below which the acceleration stops growing; with a shape, 0 lets the node choose it [number, m, at least 0, default 0]
+---@field core? number|fun(frame: rapid.Frame): number  distance below which the acceleration stops growing; give one with a shape, whose pull is unbounded at 0 [number, m, at least 0, default 0]
 ---@field name? string  name of the node in messages [string]
 
 ---Attracts points to a position or to the surface of a shape.
@@ -898,7 +898,7 @@ function Node:drag(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values; between two vectors on a line [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: on the line between them), or a ramp of keys [attributes]
 ---@field name? string  name of the node in messages [string]
 
 ---Emits points from a surface, a volume, a curve or points.
@@ -1114,9 +1114,9 @@ function Node:merge(...) end
 ---@class rapid.params.picture
 ---@field group? string|fun(frame: rapid.Frame): string  limits the node to the points of this group [string]
 ---@field blend? "over"|"add"|fun(frame: rapid.Frame): "over"|"add"  over: nearer points hide others; add: points add their light and cast no shadow [string, one of over, add, default "over"]
----@field draw? "balls"|"cards"|fun(frame: rapid.Frame): "balls"|"cards"  cards: flat discs across the y axis of orient, which show how points turn [string, one of balls, cards, default "balls"]
+---@field draw? "balls"|"cards"|fun(frame: rapid.Frame): "balls"|"cards"  cards: flat discs perpendicular to the y axis of orient, which show how points turn [string, one of balls, cards, default "balls"]
 ---@field shutter? number|fun(frame: rapid.Frame): number  fraction of the frame for which the picture is exposed, so that moving points leave streaks [number, from 0 to 1, default 0]
----@field camera? rapid.Camera|table<integer, rapid.Camera>|fun(frame: rapid.Frame): rapid.Camera|table<integer, rapid.Camera>  rapid.camera, a function of the frame that returns one, or keys; by default fitted to the scene [camera]
+---@field camera? rapid.Camera|table<integer, rapid.Camera>|fun(frame: rapid.Frame): rapid.Camera|table<integer, rapid.Camera>  camera made by rapid.camera, a function of the frame that returns one, or keys; by default fitted to the scene [camera]
 ---@field emitters? boolean|fun(frame: rapid.Frame): boolean  shows the shapes that emit points [boolean, default true]
 ---@field colliders? boolean|fun(frame: rapid.Frame): boolean  shows the shapes that points collide with [boolean, default true]
 ---@field grid? boolean|fun(frame: rapid.Frame): boolean  draws lines on the ground, unless a plane of the scene is the ground [boolean, default true]
@@ -1219,7 +1219,7 @@ function Node:solve(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace inherited values; between two vectors on a line [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: on the line between them), or a ramp of keys [attributes]
 ---@field inherit? string|string[]|fun(frame: rapid.Frame): string|string[]  names of attributes that newborn points copy from their parent [names]
 ---@field inherit_velocity? number|fun(frame: rapid.Frame): number  fraction of the parent's velocity that is added [number, default 1]
 ---@field split? boolean|fun(frame: rapid.Frame): boolean  divides the parent's mass and volume among points that are born together [boolean, default false]
@@ -1301,8 +1301,8 @@ function Node:transfer(params) end
 
 ---@class rapid.params.tumble
 ---@field drag? number|fun(frame: rapid.Frame): number  rate at which w decreases [number, 1/s, at least 0, default 0]
----@field speed? number|fun(frame: rapid.Frame): number  given to points whose w is 0, about a random axis [number, deg/s, at least 0, default 0]
----@field stop_at_rest? boolean|fun(frame: rapid.Frame): boolean  points slower than 1 cm/s do not turn [boolean, default false]
+---@field speed? number|fun(frame: rapid.Frame): number  angular speed of points whose w is 0, about a random axis [number, deg/s, at least 0, default 0]
+---@field stop_at_rest? boolean|fun(frame: rapid.Frame): boolean  stops turning points slower than 1 cm/s [boolean, default false]
 ---@field variation? number|fun(frame: rapid.Frame): number  fraction of the speed by which points differ [number, from 0 to 1, default 0]
 ---@field group? string  limits the node to the points of this group [string, constant]
 ---@field name? string  name of the node in messages [string]

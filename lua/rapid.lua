@@ -271,7 +271,7 @@ local function make(native, load_node, numeric, shapes, studies)
       else
         method = function(input, options, ...)
           if select("#", ...) > 0 then
-            error((":%s needs one table of parameters"):format(type_name), 2)
+            error((":%s takes only one table of parameters"):format(type_name), 2)
           end
           return call(type_name, options, input)
         end

@@ -67,7 +67,7 @@ local function make(native)
     if type(shape) ~= "userdata" or not pointer_of(shape) then
       local _, moves = native.shape(shape)
       if moves then
-        error(("%s of moving shapes and of meshes can only be called in kernels"):format(what), 0)
+        error(("shape:%s(P) of a moving shape or a mesh can only be called in a kernel"):format(what), 0)
       end
       error(("shape:%s(P) must be called with a colon, not a dot"):format(what), 0)
     end

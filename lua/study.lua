@@ -41,7 +41,7 @@ local function make(native, vector)
     local function expect(ok, name, what)
       if not ok then wrong("%s = %s; it must be %s", name, shown(definition[name]), what) end
     end
-    expect(type(definition.name) == "string" and definition.name ~= "", "name", "a text")
+    expect(type(definition.name) == "string" and definition.name ~= "", "name", "a string that is not empty")
     expect(type(definition.scene) == "function", "scene", "a function of the knobs that returns a node")
     local frames = definition.frames
     expect(type(frames) == "table" and #frames == 2, "frames", "the first and the last: {1, 48}")

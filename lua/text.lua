@@ -18,7 +18,6 @@ local function make(native)
     strings[number], numbers[text] = text, number
   end
   return {
-    strings = strings, numbers = numbers,
     text = function(...)
       local number = ...
       local text = strings[number]

@@ -258,7 +258,7 @@ int rapid_frame_indices(rapid_frame* frame, const int64_t* ids, size_t count, ui
         const auto open = open_frame(frame);
         if (count == 0) return;
         not_null(ids, "ids");
-        not_null(indices, "places");
+        not_null(indices, "indices");
         const std::vector<std::uint32_t> found = open->frame.indices({ids, ids + count}).value();
         std::copy(found.begin(), found.end(), indices);
     });

@@ -12,8 +12,8 @@ namespace rapid {
 
 // The open objects of one type. Callable from any thread.
 //
-// A handle is, from its lowest bit: 1 (no pointer is odd), the type (3 bits), the place in the table (28), the number
-// of objects that have had the place (32), so that a place which is taken again has another handle.
+// A handle is, from its lowest bit: 1 (no pointer is odd), the type (3 bits), the slot in the table (28), the number
+// of objects that have used the slot (32), so that a reused slot has another handle.
 template <class T, unsigned type>
 class Handles {
 public:

@@ -108,10 +108,9 @@ auto open(const void* handle, const char* what)
 {
     auto object = Table::get(handle);
     if (!object)
-        refuse(handle ? fmt::format(
-                            "the handle does not belong to an open {}: it was closed, or it belongs to something else",
-                            what)
-                      : fmt::format("the {} is NULL", what));
+        refuse(handle ? fmt::format("the {} handle is not open: it was closed, or it is the handle of something else",
+                                    what)
+                      : fmt::format("the {} handle is NULL", what));
     return object;
 }
 inline auto open_scene(rapid_scene* handle) { return open<Scenes>(handle, "scene"); }
@@ -176,7 +175,7 @@ void store(T* to, T from, const char* name)
 template <class T>
 const T& at_index(const std::vector<T>& all, std::size_t index, const char* whose, const char* what)
 {
-    if (index >= all.size()) refuse(fmt::format("place = {}; {} {} {}", index, whose, all.size(), what));
+    if (index >= all.size()) refuse(fmt::format("index = {}; {} {} {}", index, whose, all.size(), what));
     return all[index];
 }
 

@@ -195,7 +195,10 @@ TaskState state_of(const Queue& queue, std::int64_t job, std::size_t number, con
 class Farm : public Command {
 public:
     std::string name() const override { return "farm"; }
-    std::string doc() const override { return "reports on jobs on a farm, cancels them, and repeats failed tasks"; }
+    std::string doc() const override
+    {
+        return "reports on jobs on a farm, cancels them, and repeats failed and lost tasks";
+    }
 
     void declare(Options& options) override
     {

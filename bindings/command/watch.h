@@ -14,8 +14,8 @@ namespace rapid {
 
 class Watch {
 public:
-    // The hidden option of a run that is watched; it calls tell() with each file.
-    static constexpr const char* report_option = "--tell-files";
+    // The hidden option of a run that is watched; such a run calls report() with each file.
+    static constexpr const char* report_option = "--report-files";
     static void report(const std::filesystem::path& file);
 
     Watch(std::filesystem::path graph, bool quiet);

@@ -79,8 +79,7 @@ Error unexpected(const CLI::App& command, const std::string& argument)
     const std::string name = argument.substr(0, equals + 1);
     const std::vector<std::string> given = set->results();
     if (std::any_of(given.begin(), given.end(), [&](const std::string& other) { return other.starts_with(name); }))
-        return Error(
-            fmt::format("{}; the shell has split a list, so put it in quotes: --set '{}{{1, 2, 3}}'", text, name));
+        return Error(fmt::format("{}; the shell has split a list, so put it in quotes: --set '{}{{...}}'", text, name));
     return Error(fmt::format("{}; to set a value, type: --set {}", text, argument));
 }
 

@@ -46,7 +46,7 @@ void SceneArguments::declare(Options& options)
         .add_option(
             "--script-timeout",
             [this](const std::string& text) { options_.script_seconds = read_positive("--script-timeout", text); },
-            fmt::format("limit of each stretch of script [default {:g}]", options_.script_seconds))
+            fmt::format("time limit of each stretch of script [default {:g}]", options_.script_seconds))
         .type_name("SECONDS");
     options
         .add_option(

@@ -79,7 +79,7 @@ int append(State& state)
     return 0;
 }
 
-// native.neighbours(place, radius): returns the indices, from 1, of the others.
+// native.neighbours(index, radius): returns the indices, from 1, of the others.
 int neighbours(State& state)
 {
     lua_State* L = state.lua();

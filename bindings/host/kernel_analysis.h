@@ -37,7 +37,8 @@ struct KernelAnalysis {
     std::map<std::string, int> vectors;         // components assigned to an attribute: 3 or 4
     std::set<std::string> joins, queries;       // groups that it joins or leaves, and groups that it queries
     bool queries_any_group = false;             // queries groups by computed names
-    bool kills = false, reads_indices = false;  // it may; of a whole set: it reads points
+    bool kills = false;                         // may remove points
+    bool reads_indices = false;                 // may read a point's index; a function of the whole set: reads points
 };
 
 struct KernelSource {

@@ -65,7 +65,7 @@ std::vector<LaneInstruction> instructions_of(lua_State* L, const char* field)
         const LaneOperation operation = lane_operation(text_at(L, -1));
         lua_pop(L, 1);
         const auto operand = [&](int index) { return static_cast<std::uint16_t>(number_at(L, index)); };
-        if (!operation) throw Error("lua/lanes.lua has an operation that is none");
+        if (!operation) throw Error("lua/lanes.lua returned an unknown operation");
         code.push_back({operation, operand(1), operand(2), operand(3), operand(4), operand(5)});
     });
     return code;

@@ -114,7 +114,7 @@ std::string get_field(lua_State* L, int table, Description field)
 }
 
 // Parses "file:12" into a Location.
-Location parse_place(const std::string& location)
+Location parse_location(const std::string& location)
 {
     const std::size_t colon = location.rfind(':');
     if (colon == std::string::npos) return {};
@@ -128,8 +128,8 @@ Error with_location(const std::string& message, const std::string& location, Err
     const std::size_t end = message.find(": ");
     const std::size_t colon = end == std::string::npos ? end : message.rfind(':', end - 1);
     if (colon != std::string::npos && colon + 1 < end && message.find_first_not_of("0123456789", colon + 1) == end)
-        return Error(message.substr(end + 2), kind).at(parse_place(message.substr(0, end)));
-    if (!location.empty()) return Error(message, kind).at(parse_place(location));
+        return Error(message.substr(end + 2), kind).at(parse_location(message.substr(0, end)));
+    if (!location.empty()) return Error(message, kind).at(parse_location(location));
     return Error(message, kind);
 }
 

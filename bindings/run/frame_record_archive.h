@@ -1,5 +1,5 @@
-// Serializes statistics of frames (frame_record.h) by all their members, so that a new member does not compile until it
-// is added here.
+// Serializes the figures of a frame: those of the table, and the types that they consist of. A new member of such a
+// type does not compile until it is named here.
 #pragma once
 
 #include "bindings/run/frame_record.h"
@@ -117,7 +117,7 @@ template <StateArchive Archive>
 void serialize(Archive& keep, NodeWork& work)
 {
     auto& [nodes, stage, begin, seconds, points, bytes] = work;
-    keep(nodes, seconds, points, bytes);  // what statistics have of it
+    keep(nodes, seconds, points, bytes);  // stage and begin are only for the profile
 }
 
 template <StateArchive Archive>

@@ -101,7 +101,7 @@ std::optional<Difference> compare(const PointSet& a, const PointSet& b)
     // If ids differ, because points were killed or sorted, their values are irrelevant.
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         if (a.id()[i] != b.id()[i])
-            return Difference{nullptr, fmt::format("the id at place {}", i + 1), shown(a.id()[i]), shown(b.id()[i])};
+            return Difference{nullptr, fmt::format("the id at index {}", i + 1), shown(a.id()[i]), shown(b.id()[i])};
     if (a.size() != b.size())
         return Difference{nullptr, "the number of points", fmt::format("{}", a.size()), fmt::format("{}", b.size())};
     if (auto found = compare_columns(a, b)) return found;

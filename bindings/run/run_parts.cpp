@@ -140,7 +140,7 @@ RunParts::RunParts(const std::vector<std::string>& given)
     }
     if (with) find_missing(parts, with->part.count, problems);
     for (auto& [number, part] : parts) find_frames(part, problems);
-    if (!problems.empty()) throw Error(fmt::format("the parts are incomplete: {}", fmt::join(problems, "; ")));
+    if (!problems.empty()) throw Error(fmt::format("the parts can't be merged: {}", fmt::join(problems, "; ")));
     for (auto& [number, part] : parts) parts_.push_back(std::move(part));
 }
 

@@ -36,7 +36,7 @@ public:
                                         i / components, size_ / components));
         for (std::size_t i = 0; i < size_; ++i)
             if (!std::isfinite(static_cast<double>(values_[i])))
-                throw Error(fmt::format("{} is {} at place {}; it must be finite", who, static_cast<double>(values_[i]),
+                throw Error(fmt::format("{} is {} at index {}; it must be finite", who, static_cast<double>(values_[i]),
                                         i / components));
     }
 

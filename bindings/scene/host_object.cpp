@@ -29,7 +29,7 @@ Column<T> copied(const HostPoints::Column& from, std::size_t count)
         constexpr std::size_t each = sizeof(T) / sizeof(float);
         for (std::size_t k = 0; k < each * count; ++k)
             if (!std::isfinite(numbers[k]))
-                throw Error(fmt::format("{} is {} at place {}; it must be finite", from.name, numbers[k], k / each));
+                throw Error(fmt::format("{} is {} at index {}; it must be finite", from.name, numbers[k], k / each));
     }
     return column;
 }

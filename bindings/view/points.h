@@ -19,7 +19,7 @@ inline const std::string group_mark = "group:";
 // Indices of some points in the columns.
 using Indices = std::vector<std::uint32_t>;
 
-// The values of a column, packed: a view into the frame if it has them in this form. T: type of a component. places:
+// The values of a column, packed: a view into the frame if it has them in this form. T: type of a component. indices:
 // null for all points.
 template <class T>
 class PointValues {

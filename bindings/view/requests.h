@@ -64,7 +64,7 @@ private:
     void send_arguments(const Json& json, const PendingRequest& request);
     void send_picture(const Json& json, const PendingRequest& request);
     void begin_film(const Json& json, const PendingRequest& request);
-    void send_film_progress(const PendingRequest& request) const;  // its progress
+    void send_film_progress(const PendingRequest& request) const;
     void send_film(const PendingRequest& request);
     void set_parameters(const Json& json, const PendingRequest& request);
 

@@ -25,7 +25,7 @@ namespace rapid {
 // Returns the exception as an error of the scene.
 Error error_of(const std::exception& error);
 
-// All functions except abandon(), ended() and ask() belong to its own thread.
+// All functions except abandon(), ended() and enqueue() belong to its own thread.
 class ViewSimulation::Run {
 public:
     Run(ViewSimulation& view, std::uint64_t number);

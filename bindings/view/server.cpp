@@ -361,9 +361,9 @@ private:
     // Runs on the handler's thread. An answer may take long, and its page may have closed.
     void handle(const std::string& text)
     {
-        const auto pending_answers = std::make_shared<const PendingAnswer>(weak_from_this());
+        const auto pending_answer = std::make_shared<const PendingAnswer>(weak_from_this());
         if (is_closed_) return;
-        server_.handler_(text, [page = weak_from_this(), pending_answers](std::string message, bool binary) {
+        server_.handler_(text, [page = weak_from_this(), pending_answer](std::string message, bool binary) {
             auto open = page.lock();
             if (!open) return;
             asio::io_context& net = open->server_.net_;
@@ -408,7 +408,7 @@ private:
     beast::flat_buffer buffer_;
     std::deque<std::pair<std::string, bool>> waiting_;
     std::size_t bytes_ = 0;                // of waiting answers
-    int pending_answers_ = 0;              // requests
+    int pending_answers_ = 0;              // requests that are not answered yet
     bool is_handling_ = false;             // one of its requests is being handled
     std::atomic<bool> is_closed_ = false;  // its requests are no longer answered
 };

@@ -15,6 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char not_traced[] = "points of a sequence of files can't be traced; open the scene instead";
+
 constexpr std::size_t max_ending = 2;
 constexpr std::size_t max_spare = 32;  // columns of replaced frames, whose pages the next ones reuse
 
@@ -224,14 +226,14 @@ void ViewSimulation::arguments(std::int64_t frame, std::function<void(Arguments,
 void ViewSimulation::origin(std::int64_t frame, std::string output, std::int64_t id,
                             std::function<void(PointOrigin, std::string error)> callback)
 {
-    if (!run_) return callback({}, "a sequence of files has no lives of points");
+    if (!run_) return callback({}, not_traced);
     query_run<PointOrigin>([=](Run& run) { return run.origin(frame, output, id); }, std::move(callback));
 }
 
 void ViewSimulation::trace(const PointOrigin& point, std::int64_t last,
                            std::function<void(std::string json, std::string error)> callback)
 {
-    if (is_sequence()) return callback("", "a sequence of files has no lives of points");
+    if (is_sequence()) return callback("", not_traced);
     tracer_stop_.request_stop();
     if (tracer_.joinable()) tracer_.join();
     tracer_stop_ = std::stop_source();

@@ -83,14 +83,14 @@ public:
     // run then continues.
     using Results = std::map<std::string, SceneFrame>;
     void inspect(std::int64_t frame, std::function<void(Results, std::string error)> callback);
-    // Returns likewise the arguments of the nodes in a frame, as strings by node and name.
+    // Calls back likewise with the arguments of the nodes in a frame, as strings by node and name.
     using Arguments = std::map<std::string, std::map<std::string, std::string>>;
     void arguments(std::int64_t frame, std::function<void(Arguments, std::string error)> callback);
-    // Returns likewise the create node that made a point of an output in a frame, and its id there: merged chains get
-    // other ids.
+    // Calls back likewise with the create node that made a point of an output in a frame, and its id there: merged
+    // chains get other ids.
     void origin(std::int64_t frame, std::string output, std::int64_t id,
                 std::function<void(PointOrigin, std::string error)> callback);
-    // Returns likewise the life of a point up to a frame, as JSON, from its own thread and scene.
+    // Calls back with the life of a point up to a frame, as JSON, from its own thread and scene.
     void trace(const PointOrigin& point, std::int64_t last,
                std::function<void(std::string json, std::string error)> callback);
 

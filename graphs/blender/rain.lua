@@ -5,8 +5,8 @@
 local rapid = require "rapid"
 
 local rate = rapid.param("rate", 12000, "drops per second [0, 200000]")
-local wind = rapid.param("wind", -1.5, "of the air along the road, m/s [-20, 20]")
-local count = rapid.param("droplets", 5, "born where a drop hits [0, 50]")
+local wind = rapid.param("wind", -1.5, "wind along the road, m/s [-20, 20]")
+local count = rapid.param("droplets", 5, "droplets per hit [0, 50]")
 
 local clouds = rapid.host "clouds"
 local car = rapid.levelset.from_mesh(rapid.host "car", { voxel = 0.05 })

@@ -88,7 +88,7 @@ def light(location, energy, size):
 
 
 def bake(thing, path):
-    """Saves the shot, and bakes its simulation beside it."""
+    """Saves the shot, and bakes its simulation next to it."""
     bpy.ops.wm.save_as_mainfile(filepath=str(pathlib.Path(path).resolve()))
     bpy.context.view_layer.objects.active = thing
     bpy.ops.rapid.bake()

@@ -236,8 +236,9 @@ int rapid_snapshot_release(rapid_snapshot* snapshot, rapid_error** error);
 /* Returns what the scene's plan keeps and prunes, and why: an object, as printed by `rapid explain --json`. It
  * belongs to the scene, until the next call of this function. */
 int rapid_scene_explain(rapid_scene* scene, const char** json, rapid_error** error);
-/* The points as they leave a node in a frame, as a frame with the only output of the node's name: goes to the start,
- * and computes the frames up to this one beside the scene, which then is at its start. *frame is to be released. */
+/* Returns the points as they leave a node in a frame, as a frame whose only output has the node's name. Goes to the
+ * start, and computes the frames up to this one separately; afterwards the scene is at its start. *frame must be
+ * released. */
 int rapid_scene_points_after(rapid_scene* scene, const char* node, int64_t number, rapid_frame** frame,
                              rapid_error** error);
 /* Forms of a graph: in Graphviz's language; as a picture; as nodes and edges with their positions, an object, as
@@ -533,7 +534,7 @@ typedef struct rapid_outcome {
     int ending;            /* RAPID_COMPLETE; RAPID_ENDED by rapid_run_end_after_frame(); RAPID_FAILED in a frame */
     int64_t last_frame;    /* the last one computed or known */
     const char* unwritten; /* statistics or a profile that could not be written, and why, one per line */
-    const char* summary;   /* for RAPID_COMPLETE: points, seconds, errors */
+    const char* summary;   /* for RAPID_COMPLETE: the summary that `rapid run` prints, several lines */
 } rapid_outcome;
 
 /* Makes a run; nothing is opened yet. A run is used by one thread at a time, except rapid_run_end_after_frame() and

@@ -109,7 +109,7 @@ struct RunOutcome {
     std::int64_t last_frame = 0;         // the last one computed or known
     std::optional<SceneError> error;     // for Failed
     std::vector<std::string> unwritten;  // statistics or a profile that could not be written, and why
-    std::string summary;                 // for Complete: points, seconds, errors, as printed by `rapid run`
+    std::string summary;  // for Complete: the summary that `rapid run` prints, several lines, as printed by `rapid run`
 };
 
 // A run. Like a Scene it is used by one thread at a time, except cancel() and end_after_frame().

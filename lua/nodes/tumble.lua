@@ -15,9 +15,9 @@ return rapid.node {
   params = {
     drag         = { "float", default = 0, min = 0, unit = "1/s", doc = "rate at which w decreases" },
     speed        = { "float", default = 0, min = 0, unit = "deg/s",
-                     doc = "given to points whose w is 0, about a random axis" },
+                     doc = "angular speed of points whose w is 0, about a random axis" },
     variation    = { "float", default = 0, min = 0, max = 1, doc = "fraction of the speed by which points differ" },
-    stop_at_rest = { "bool", default = false, doc = "points slower than 1 cm/s do not turn" },
+    stop_at_rest = { "bool", default = false, doc = "stops turning points slower than 1 cm/s" },
   },
   makes = { orient = {0, 0, 0, 1}, w = {0, 0, 0} },
   points = function(p, _, params)

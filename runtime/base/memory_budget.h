@@ -38,7 +38,8 @@ bool fits_in_memory(double bytes);
 // Returns the additional bytes that the process may use.
 std::uint64_t free_memory();
 
-// Returns the error "WHAT would take about 119.2 GiB, and 21.3 GiB are free of 64.0 GiB; REMEDY, or set --memory".
+// Returns the error "WHAT would need about 119.2 GiB, but only 21.3 GiB of 64.0 GiB are free; REMEDY, or set
+// --memory".
 Error memory_exceeded(const std::string& what, double bytes, const std::string& remedy);
 
 // Returns a string such as "119.2 GiB" or "12 MiB".

@@ -62,8 +62,9 @@ public:
     FrameArchive(const FrameArchive&) = delete;
     FrameArchive& operator=(const FrameArchive&) = delete;
 
-    // Creates the folder and locks it for this process. asked, who: the folder and its user in error messages. Throws
-    // Error if another process keeps the lock for five seconds; a killed process holds it until its memory is freed.
+    // Creates the folder and locks it for this process. shown_as, who: the folder and its user in error messages.
+    // Throws Error if another process keeps the lock for five seconds; a killed process holds it until its memory is
+    // freed.
     static Descriptor lock(const std::filesystem::path& folder, const std::filesystem::path& shown_as, const char* who);
 
     const std::filesystem::path& folder() const { return folder_; }

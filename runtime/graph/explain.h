@@ -13,7 +13,7 @@ struct Explanation {
     struct ExplainedNode {
         std::string name, type;
         bool kept;
-        std::string evaluated;  // "once", "every frame", "4 times a frame", "never"
+        std::string evaluated;  // "once", "every frame", "4 times per frame", "never"
         std::string why;        // why it is kept or pruned
         std::string changes;    // why it is evaluated every frame; empty otherwise
     };
@@ -27,7 +27,7 @@ struct Explanation {
     };
     struct ExplainedFunction {
         std::string name;     // node and parameter: "pin1.target"
-        std::string called;   // how often: "once a frame", "4 times a frame", "as its path needs"
+        std::string called;   // how often: "once per frame", "4 times per frame", "as often as its path needs"
         std::string between;  // its value between the calls, and its part in the estimated error
     };
     struct ExplainedStage {

@@ -101,8 +101,8 @@ void warn_of_held_points(const Plan& plan, std::vector<std::string>& warnings)
         } else if (const auto goal = goals.find(planned.simulation);
                    goal != goals.end() && goal->second && node.type->has(Stage::Forces)) {
             warnings.push_back(
-                warning_of(node, fmt::format("can't move the points that have arrived, as {} holds them; to let them "
-                                             "go, give {} hold = false",
+                warning_of(node, fmt::format("can't move the points that have arrived, because {} holds them; to let "
+                                             "them go, give {} hold = false",
                                              goal->second->name, goal->second->name)));
             goal->second = nullptr;
         }
@@ -158,7 +158,8 @@ void warn_of_units(const Plan& plan, std::vector<std::string>& warnings)
             if (const auto all = numbers_in(*pscale); !all.empty()) {
                 const double least = *std::min_element(all.begin(), all.end());
                 if (least >= 1 && least > size_of_source(node))
-                    warn(fmt::format("pscale = {} is a radius in metres, larger than the source", describe(*pscale)));
+                    warn(fmt::format("pscale = {} is a radius in metres, larger than the source; give a smaller one",
+                                     describe(*pscale)));
             }
         const auto life = node.arguments.find("life");
         if (life == node.arguments.end() || !node.type->has(Stage::Emission)) continue;
@@ -203,7 +204,7 @@ void warn_of_still_tumbles(const Plan& plan, std::vector<std::string>& warnings)
             }))
             warnings.push_back(
                 warning_of(*planned.node,
-                           "turns nothing, as the angular velocity w of all points is 0; give it a speed in "
+                           "turns nothing, because the angular velocity w of all points is 0; give it a speed in "
                            "degrees per second: :tumble { speed = 360 }"));
     }
 }
@@ -346,18 +347,15 @@ std::vector<NodePtr> sources_of(const Node& node)
 std::set<std::string> reads_of_no_hits(const std::vector<PlannedNode>& nodes,
                                        const std::vector<PlannedSimulation>& simulations)
 {
-    const auto is_provided = [&](std::size_t simulation, const char* name) {
-        const PlannedAttribute& hit = *simulations[simulation].find(name);
-        return !hit.made_by.empty() || !hit.written_by.empty();
-    };
     std::set<std::string> warnings;
     for (std::size_t s = 0; s < simulations.size(); ++s)
         for (const char* name : Hits::names) {
             const PlannedAttribute& hit = *simulations[s].find(name);
-            if (hit.read_by.empty() || is_provided(s, name)) continue;
+            if (hit.read_by.empty() || is_provided(simulations[s], name)) continue;
             const PlannedNode& reader = nodes[hit.read_by.front()];
-            const bool comes_elsewhere = std::any_of(reader.carries.begin(), reader.carries.end(),
-                                                     [&](std::size_t other) { return is_provided(other, name); });
+            const bool comes_elsewhere =
+                std::any_of(reader.carries.begin(), reader.carries.end(),
+                            [&](std::size_t other) { return is_provided(simulations[other], name); });
             if (comes_elsewhere) continue;
             warnings.insert(
                 fmt::format("{}:{}: node \"{}\": reads {}, which no collider writes; give :collide record = true",

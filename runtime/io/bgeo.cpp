@@ -367,7 +367,7 @@ std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
 {
     const Dictionary dictionary = read_dictionary(reader, count, 0);
     for (const RecordAttribute& attribute : dictionary.attributes)
-        SkippedContents::add(fmt::format("the attribute \"{}\" of no point", attribute.name));
+        SkippedContents::add(fmt::format("the attribute \"{}\", which does not belong to points", attribute.name));
     return dictionary.stride;
 }
 
@@ -465,7 +465,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
     const std::size_t polygon_bytes = stride_of_unread(reader, of_primitives);
     if (!read_lines(reader, primitives, vertex_bytes, polygon_bytes, lines)) {
         SkippedContents::add(
-            fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and its groups behind them" : ""));
+            fmt::format("its {} primitives{}", primitives, groups > 0 ? ", and the groups after them" : ""));
         return lines.points;
     }
     reader.enter("attributes of the whole");

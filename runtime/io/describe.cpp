@@ -58,7 +58,7 @@ std::string text_list(const AttributeSummary& a)
     std::string list;
     for (const std::string& text : a.first_strings)
         list += fmt::format("{}\"{}\"", list.empty() ? "" : " ", printable_name(text));
-    return a.strings > a.first_strings.size() ? list + fmt::format(" ... of {} texts", a.strings) : list;
+    return a.strings > a.first_strings.size() ? list + fmt::format(" ... of {} strings", a.strings) : list;
 }
 
 std::string number_list(const std::vector<double>& values)

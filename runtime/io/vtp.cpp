@@ -296,8 +296,9 @@ std::vector<Token> VtkFile::strings(pugi::xml_node node, std::size_t rows) const
         }
         return strings;
     } catch (const Error& error) {
-        throw Error(fmt::format("the array \"{}\" of {} texts: {}", node.attribute("Name").value(), rows, error.what()),
-                    error.kind());
+        throw Error(
+            fmt::format("the array \"{}\" of {} strings: {}", node.attribute("Name").value(), rows, error.what()),
+            error.kind());
     }
 }
 

@@ -31,7 +31,8 @@ struct Attract {
             .param(&Attract::falloff, "falloff", 2.0, any_number(), "",
                    "power of the distance with which the acceleration decreases")
             .param(&Attract::core, "core", 0.0, at_least(0), "m",
-                   "distance below which the acceleration stops growing; with a shape, 0 lets the node choose it");
+                   "distance below which the acceleration stops growing; give one with a shape, whose pull is "
+                   "unbounded at 0");
     }
 
     std::shared_ptr<const Force> dynamic(const Evaluation& now) const

@@ -128,8 +128,8 @@ private:
                               const std::vector<Vec3d>& P)
     {
         const auto at = [&](std::int32_t k) -> const Vec3d& { return P[static_cast<std::size_t>(k >= 0 ? k : i)]; };
-        const auto position = static_cast<std::size_t>(i);
-        const Vec3d d = at(lines.after[position]) - at(lines.before[position]);
+        const auto index = static_cast<std::size_t>(i);
+        const Vec3d d = at(lines.after[index]) - at(lines.before[index]);
         return d.norm() > 0 ? Vec3d(d.normalized()) : on_line;  // the curve turns back there
     }
 
@@ -153,10 +153,10 @@ private:
         found.is_beyond_end = (part < 0 && lines.before[static_cast<std::size_t>(on.a)] < 0) ||
                               (part > 1 && lines.after[static_cast<std::size_t>(on.b)] < 0);
         part = std::clamp(part, 0.0, 1.0);
-        const Vec3d segment = (at(P, on.b) - at(P, on.a)).normalized();
+        const Vec3d on_line = (at(P, on.b) - at(P, on.a)).normalized();
         const Vec3d direction =
-            (1 - part) * direction_at(on.a, segment, lines, P) + part * direction_at(on.b, segment, lines, P);
-        found.direction = direction.norm() > 0 ? Vec3d(direction.normalized()) : segment;
+            (1 - part) * direction_at(on.a, on_line, lines, P) + part * direction_at(on.b, on_line, lines, P);
+        found.direction = direction.norm() > 0 ? Vec3d(direction.normalized()) : on_line;
         if (!v.empty()) found.v = at(v, on.a) + part * (at(v, on.b) - at(v, on.a));
         return found;
     }

@@ -78,12 +78,13 @@ NodeType PictureNode::declare()
                "over: nearer points hide others; add: points add their light and cast no shadow")
         .choices({"over", "add"})
         .param(&PictureNode::draw, "draw", std::string("balls"), any_number(), "",
-               "cards: flat discs across the y axis of orient, which show how points turn")
+               "cards: flat discs perpendicular to the y axis of orient, which show how points turn")
         .choices({"balls", "cards"})
         .param(&PictureNode::shutter, "shutter", 0.0, between(0, 1), "",
                "fraction of the frame for which the picture is exposed, so that moving points leave streaks")
         .param(&PictureNode::camera, "camera", Value(), any_number(), "",
-               "rapid.camera, a function of the frame that returns one, or keys; by default fitted to the scene")
+               "camera made by rapid.camera, a function of the frame that returns one, or keys; by default fitted to "
+               "the scene")
         .param(&PictureNode::emitters, "emitters", true, any_number(), "", "shows the shapes that emit points")
         .param(&PictureNode::colliders, "colliders", true, any_number(), "",
                "shows the shapes that points collide with")

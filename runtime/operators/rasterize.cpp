@@ -62,9 +62,9 @@ void Rasterize::edit(PointSet& points, const Evaluation& now) const
         if (own && !own->attribute.empty()) names.push_back(own->attribute);
     for (const std::string& name : attributes)
         if (!written.find<Vec3f>(name))
-            throw Error(
-                fmt::format("attributes: \"{}\" is {}; it must be a vec3", name,
-                            written.has(name) ? type_name(type_of(*written.find(name))) : "none of the points'"));
+            throw Error(fmt::format(
+                "attributes: \"{}\" is {}; it must be a vec3", name,
+                written.has(name) ? type_name(type_of(*written.find(name))) : "not an attribute of the points"));
     keep_columns(written, names);
     now.write(file, written);
 }

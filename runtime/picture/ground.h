@@ -37,7 +37,7 @@ struct Ground {
     // Returns true if the plane is seen from behind and stands between the eye and the scene. It is then not drawn.
     bool hides_scene(const Vec3f& eye) const { return normal.dot(eye) < offset && normal.dot(scene_center) >= offset; }
 
-    // Shades P, at depth t on the ray, over the background colour `background`.
+    // Shades P, at depth t on the ray, over the background.
     ShadedSample shade(const Vec3f& P, float t, float focal, const Vec3f& ray, const Vec3f& background,
                        const Light& light) const;
 

@@ -87,8 +87,8 @@ struct RunTotals {
     RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE
     std::uint64_t frames = 0;
-    FrameFigures last;
-    std::optional<std::int64_t> first_solved;  // frame with points
+    std::uint64_t last_points = 0;             // of the last frame
+    std::optional<std::int64_t> first_solved;  // first frame with points that were solved
 
     std::uint64_t warnings = 0;                     // printed during the run
     std::map<std::string, double> writing_seconds;  // by extension
@@ -101,8 +101,8 @@ struct RunTotals {
     void add_file(const std::string& path, bool is_film, std::uint64_t points_of_file, double seconds_of_file);
 };
 
-// Returns six lines for the user: points, frames, the slowest part, the estimated error, the files, and whether all is
-// fine; or, instead of the last, a line for each thing to look at.
+// Returns the summary for the user: points, frames, the slowest part, the estimated error, the files, and `all fine` or
+// a line for each thing to look at. The slowest part is missing if no pass was timed, the error if no point was solved.
 std::string summary(const RunStatistics& run, const RunTotals& totals);
 
 // Returns a line for each stiff node.

@@ -38,6 +38,10 @@
 
 namespace rapid {
 
+// Returns true if a point inside a level set is within a voxel's diagonal of the edge of its band. There the field
+// flattens, so that its slope says nothing about the distance, which is at least |phi|.
+inline bool is_at_band_edge(double phi, double band, double voxel) { return -phi > band - std::sqrt(3.0) * voxel; }
+
 // The root search at the end of every walk to a contact, between a time when the path is outside the shape and one when
 // it is inside.
 

@@ -155,12 +155,9 @@ private:
         const double slope = gradient.norm();
         if (slope > 0) {
             contact.n = gradient / slope;
-            // To first order; exact if the field is a distance. At the edge of a level set's band the field flattens,
-            // so that its slope says nothing about the distance, which is at least |φ|.
-            bool flattens = false;
             if constexpr (requires { sampler_.band(); })
-                flattens = -f - path.radius > sampler_.band() - std::sqrt(3.0) * sampler_.smallest_feature();
-            if (!flattens) contact.depth /= slope;
+                if (is_at_band_edge(f + path.radius, sampler_.band(), sampler_.smallest_feature())) return contact;
+            contact.depth /= slope;  // to first order; exact if the field is a distance
             return contact;
         }
         if constexpr (requires { sampler_.nearest_inside(path.P); })

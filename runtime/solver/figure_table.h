@@ -1,11 +1,11 @@
 // The table of the statistics of a frame, which declares each of them.
 //
-//   F(type, name, together, later, told, unit, meaning, chart, warning)
+//   F(type, name, together, later, reported, unit, meaning, chart, warning)
 //
 //   type, name   the member of FrameFigures (figures.h); the name is the key in the file of --stats, in this order
 //   together     merges parts of the points that are advanced side by side: chunks, constraints, simulations
 //   later        merges the next subframe into the frame so far
-//   told         the condition under which the statistics of `frame` have the key
+//   reported     the condition under which the statistics of `frame` have the key
 //   unit         of the value; empty: a count, or several values
 //   meaning      as in docs/cli.md
 //   chart        the title of the chart in the viewer; empty: no chart
@@ -25,7 +25,7 @@
     F(std::uint64_t, died, sum, sum, true, "",                                                                         \
       "points that died in the frame", "", "")                                                                         \
     F(int, substeps, most, most, true, "",                                                                             \
-      "the largest number of substeps of a point", "sub-steps", "")                                                    \
+      "the largest number of substeps of a point", "substeps", "")                                                    \
     F(StageSeconds, seconds, sum, sum, true, "s",                                                                      \
       "`total`, `graph`, `script`, `solve`, `write`", "time of a frame", "")                                           \
     F(Sampled<ErrorQuantiles>, error, sum, last, frame.error.summary.has_value(), "m",                                 \
@@ -48,7 +48,7 @@
       "active rows at the end of the frame; absent if there are none", "", "")                                         \
     F(std::uint64_t, loose_constraints, sum, last, frame.constraint_rows > 0, "",                                      \
       "rows with an error of more than a tenth of their size", "",                                                     \
-      "constraints were off by a tenth of their size {}: give :solve more substeps")                                   \
+      "constraints had an error of more than a tenth of their size {}: give :solve more substeps")                                   \
     F(std::uint64_t, broken, sum, sum, frame.broken > 0, "",                                                           \
       "pairs of `:distance` that broke in the frame; absent if none did", "", "")                                      \
     F(std::uint64_t, asleep, sum, last, true, "",                                                                      \
@@ -70,7 +70,7 @@
       "points reached the limit of contacts in a step {}: give :solve more substeps")                                  \
     F(std::uint64_t, trapped, sum, most, true, "",                                                                     \
       "points deep in a shape that could not be moved out", "",                                                        \
-      "points were deep inside a shape {}: emit them outside of it, or close the mesh")                                \
+      "points could not be moved out of a shape {}: emit them outside, or move the shapes apart")                                \
     F(std::uint64_t, beyond_tolerance, sum, most, true, "",                                                            \
       "points that would need more than `max_substeps`, or whose position a sample with other substeps does not "      \
       "confirm", "", "points were beyond the tolerance {}: raise it, or max_substeps")                                 \

@@ -43,7 +43,6 @@ struct Ledger {
     };
     std::optional<Residue> residue;
 
-    double energy() const { return kinetic + potential + elastic; }
     // Appends the next part of the frame.
     void append(const Ledger& later);
 };

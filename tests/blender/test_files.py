@@ -91,13 +91,14 @@ class Files(Case):
         numpy.testing.assert_array_equal(self.points(thing, 8)["P"], self.expected)
 
     def test_undo_shows_the_points_of_the_frame(self):
-        bpy.ops.ed.undo_push(message="baked")
         self.scene.frame_set(3)
         bpy.ops.ed.undo_push(message="frame 3")
         self.scene.frame_set(8)
+        bpy.ops.ed.undo_push(message="frame 8")
         bpy.ops.ed.undo()
         thing = bpy.data.objects["Rapid"]
         frame = bpy.context.scene.frame_current
+        self.assertEqual(frame, 3)
         with numpy.load(bake.points_files(thing, frame)["main"]) as arrays:
             self.assertEqual(len(thing.data.vertices), len(arrays["P"]))
 

@@ -94,8 +94,9 @@ class Blurred(Case):
         self.assert_streak(0, 2)
 
     def test_a_render_leaves_the_frame_of_the_viewport(self):
-        self.streak()
         self.scene.frame_set(4)
+        self.streak()
+        self.assertEqual(self.scene.frame_current, 4)
         self.assertAlmostEqual(self.thing.data.vertices[0].co.x, -4, 4)
 
 

@@ -256,7 +256,7 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     auto shape = sized<rapid_shape>();
     auto type = sized<rapid_node_type>();
     refused("offers is NULL", [&](rapid_error** e) { return rapid_offers_new(nullptr, e); });
-    refused("the offers is NULL", [&](rapid_error** e) { return rapid_offers_guard(nullptr, 1, e); });
+    refused("the offers handle is NULL", [&](rapid_error** e) { return rapid_offers_guard(nullptr, 1, e); });
     refused("release is NULL", [&](rapid_error** e) { return rapid_offers_on_release(offers, nullptr, nullptr, e); });
     refused("name is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, nullptr, &shape, e); });
     refused("shape is NULL", [&](rapid_error** e) { return rapid_offers_shape(offers, "a", nullptr, e); });
@@ -270,7 +270,8 @@ TEST_CASE("wrong offers in C are errors by name", "[c]")
     type.kind = 9;
     refused("type->kind = 9", [&](rapid_error** e) { return rapid_offers_node(offers, &type, e); });
     CHECK(rapid_offers_release(offers, nullptr) == RAPID_OK);
-    refused("does not belong to an open offers", [&](rapid_error** e) { return rapid_offers_release(offers, e); });
+    refused("the offers handle is not open: it was closed, or it is the handle of something else",
+            [&](rapid_error** e) { return rapid_offers_release(offers, e); });
 }
 
 TEST_CASE("a program learns when a scene no longer uses its callbacks", "[c]")
@@ -344,12 +345,13 @@ TEST_CASE("a handle that is NULL, closed or of something else is an error", "[c]
     {
         OwnedError error;
         CHECK(rapid_scene_advance(nullptr, nullptr, error) == RAPID_WRONG_CALL);
-        CHECK(error.message() == "the scene is NULL");
+        CHECK(error.message() == "the scene handle is NULL");
     }
     {
         OwnedError error;
         CHECK(rapid_frame_column(reinterpret_cast<rapid_frame*>(scene), "P", &column, error) == RAPID_WRONG_CALL);
-        CHECK_THAT(error.message(), Contains("does not belong to an open frame"));
+        CHECK_THAT(error.message(),
+                   Contains("the frame handle is not open: it was closed, or it is the handle of something else"));
     }
     int local = 0;
     CHECK(rapid_scene_restart(reinterpret_cast<rapid_scene*>(&local), nullptr) == RAPID_WRONG_CALL);
@@ -383,7 +385,7 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("scene", [&](rapid_error** e) { return rapid_scene_open("a.lua", nullptr, nullptr, e); });
     refused("name", [&](rapid_error** e) { return rapid_scene_open_text(nullptr, fall, nullptr, &other, e); });
     refused("text", [&](rapid_error** e) { return rapid_scene_warnings(scene, nullptr, e); });
-    refused("offers", [&](rapid_error** e) { return rapid_scene_offer(scene, nullptr, e); });
+    refused("the offers handle", [&](rapid_error** e) { return rapid_scene_offer(scene, nullptr, e); });
     refused("a setting's name", [&](rapid_error** e) {
         const rapid_setting unnamed = {nullptr, {RAPID_NUMBER, {1, 0, 0}, nullptr}};
         return rapid_scene_set(scene, &unnamed, 1, e);
@@ -397,7 +399,7 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
     refused("node", [&](rapid_error** e) { return rapid_scene_node(scene, 0, nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_scene_node_types(scene, nullptr, e); });
     refused("snapshot", [&](rapid_error** e) { return rapid_scene_save(scene, nullptr, e); });
-    refused("snapshot", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
+    refused("the snapshot handle", [&](rapid_error** e) { return rapid_scene_restore(scene, nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_scene_explain(scene, nullptr, e); });
     refused("node", [&](rapid_error** e) {
         rapid_frame* behind = nullptr;
@@ -442,14 +444,15 @@ TEST_CASE("arguments that are NULL are errors by name", "[c]")
         return rapid_snapshot_read(nullptr, &read, e);
     });
     refused("snapshot", [&](rapid_error** e) { return rapid_snapshot_read("fall.state", nullptr, e); });
-    refused("snapshot", [&](rapid_error** e) { return rapid_snapshot_write(nullptr, "fall.state", e); });
+    refused("the snapshot handle", [&](rapid_error** e) { return rapid_snapshot_write(nullptr, "fall.state", e); });
     refused("path", [&](rapid_error** e) {
         rapid_frame* read = nullptr;
         return rapid_frame_read(nullptr, &read, e);
     });
     refused("frame", [&](rapid_error** e) { return rapid_frame_read("points.csv", nullptr, e); });
     refused("json", [&](rapid_error** e) { return rapid_frame_describe(frame, nullptr, e); });
-    refused("frame", [&](rapid_error** e) { return rapid_frame_compare(frame, nullptr, 0, nullptr, nullptr, e); });
+    refused("the frame handle",
+            [&](rapid_error** e) { return rapid_frame_compare(frame, nullptr, 0, nullptr, nullptr, e); });
     CHECK(rapid_frame_compare(frame, frame, 0, nullptr, nullptr, nullptr) == RAPID_OK);
     CHECK(rapid_scene_set(scene, nullptr, 0, nullptr) == RAPID_OK);
     rapid_frame_release(frame, nullptr);

@@ -660,7 +660,7 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
     refused("height", setting("height", {RAPID_NUMBER, {NAN, 0, 0}, nullptr}));
     refused("type of its value is 9", setting("height", {9, {0, 0, 0}, nullptr}));
     refused("has 1 parameters", [&](auto e) { return rapid_scene_parameter(h.scene, 1, &parameter, e); });
-    refused("place = 99", [&](auto e) { return rapid_scene_node(h.scene, 99, &node, e); });
+    refused("index = 99", [&](auto e) { return rapid_scene_node(h.scene, 99, &node, e); });
     refused("frame 0", [&](auto e) { return rapid_scene_advance_to(h.scene, 0, &frame, e); });
     refused("frame 2", [&](auto e) { return rapid_scene_advance_to(h.scene, 2, &frame, e); });
     refused("\"other\"", [&](auto e) { return rapid_frame_output(h.frame, "other", &frame, e); });
@@ -762,8 +762,8 @@ TEST_CASE("what a callback does wrong is an error of the scene, which goes on be
              Wrong{"it returned -1", [](const rapid_call*) { return -1; }},
              Wrong{"broken", [](const rapid_call*) -> int { throw std::runtime_error("broken"); }},
              Wrong{"not a std::exception", [](const rapid_call*) -> int { throw 3; }},
-             Wrong{"nan at place 2", [](const rapid_call* now) { return now->writes[0][2] = NAN, 0; }},
-             Wrong{"inf at place 0", [](const rapid_call* now) { return now->writes[0][0] = INFINITY, 0; }},
+             Wrong{"nan at index 2", [](const rapid_call* now) { return now->writes[0][2] = NAN, 0; }},
+             Wrong{"inf at index 0", [](const rapid_call* now) { return now->writes[0][0] = INFINITY, 0; }},
              Wrong{"\"warm\" was written beyond the end",
                    [](const rapid_call* now) { return now->writes[0][now->count] = 1, 0; }},
              Wrong{"kills was written beyond the end",

@@ -194,7 +194,7 @@ describe("rapid explain", function()
           assert.equal(one.kept, at < left_out, one.name)
         end
       end
-      assert.truthy(text:find(plan.bytes_per_point .. " bytes per point", 1, true), text)
+      assert.truthy(text:find("\n attributes, at most " .. plan.bytes_per_point .. " bytes per point\n", 1, true), text)
       for _, pass in ipairs(plan.passes) do
         assert.truthy(text:find("\n  " .. table.concat(pass, ", ") .. "\n", 1, true), text)
       end

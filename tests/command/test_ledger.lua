@@ -2,19 +2,20 @@
 local command = require "testing.command"
 local json = require "dkjson"
 
--- Returns the change of energy by cause over the frames from `first` to 25.
+-- Returns the change of energy by cause over the frames from `first` to 25, and the ledger of frame 25.
 local function ledger(text, first)
   local folder = command.folder()
   folder:write("scene.lua", 'local rapid = require "rapid"\nreturn rapid.create { fps = 24, points = ' .. text)
   local result = command.rapid("run scene.lua -f 1-25 --stats stats.json", { cwd = folder.path })
   assert.equal(0, result.status, result.stderr)
-  local sums = {}
+  local sums, last = {}, nil
   for _, frame in ipairs(json.decode(folder:read "stats.json").frames) do
     for name, value in pairs(frame.frame >= (first or 1) and frame.ledger or {}) do
       if name:find "^by_" then sums[name] = (sums[name] or 0) + value end
     end
+    last = frame.ledger
   end
-  return sums
+  return sums, last
 end
 
 -- Checks the sums over one second; all that are not named are 0.
@@ -27,11 +28,12 @@ local g = 9.81
 
 describe("the ledger", function()
   it("has (1 - e²) m v²/2 of a bounce", function()
-    local sums = ledger [[rapid.points.from { P = {{0, 1, 0}}, v = {{0.5, -4, 0}} } }
+    local sums, last = ledger [[rapid.points.from { P = {{0, 1, 0}}, v = {{0.5, -4, 0}} } }
   :attribute { mass = 3 } :collide { shape = rapid.shape.plane {}, bounce = 0.6 }
   :contact { radius = 0.1 } :solve { substeps = 2 }]]
     local lost = (1 - 0.6 ^ 2) * 3 * 4 ^ 2 / 2
     check({ by_contacts = -lost }, sums, 1e-4)
+    assert.near(3 / 2 * (0.5 ^ 2 + (0.6 * 4) ^ 2), last.kinetic, 1e-4)
   end)
 
   it("has μ m g cos d of a slide, as friction where forces are recorded", function()

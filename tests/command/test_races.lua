@@ -48,7 +48,7 @@ describe("rapid check --races", function()
     for what, chain in pairs {
       ["point id 0 is out of the group late in the order of the points, and in it in reverse order"] =
         ":points('k', function(p) %s kept.n = kept.n + 1 if kept.n %% 2 == 0 then p:join 'late' end end) :solve {}",
-      ["the id at place 1 is 0 in the order of the points, and 1 in reverse order"] =
+      ["the id at index 1 is 0 in the order of the points, and 1 in reverse order"] =
         ":points('k', function(p) %s kept.n = kept.n + 1 if kept.n %% 2 == 0 then p:kill() end end) :solve {}",
       ["point id 0 is in the group odd in the order of the points, and out of it in reverse order"] =
         ":group { name = 'odd', where = function() %s kept.n = kept.n + 1 return kept.n %% 2 == 1 end } :solve {}",

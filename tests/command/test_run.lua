@@ -395,7 +395,7 @@ describe("--stats", function()
     end
   end)
 
-  it("counts the points that sleep, and so does the summary", function()
+  it("counts the points that sleep", function()
     local folder = new_folder [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 0.1, 0}, {1, 0.1, 0}, {2, 99, 0}} } }

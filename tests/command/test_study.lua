@@ -310,7 +310,7 @@ return rapid.study { %s }]]):format(fields))
   it("names the field that is wrong, its value and what would be right", function()
     local rest = 'scene = scene, frames = {1, 2}, sweep = { n = {1} }, reference = function() end, '
     for fields, expected in pairs {
-      [rest] = "name = nil; it must be a text",
+      [rest] = "name = nil; it must be a string that is not empty",
       [rest .. 'name = "x", eror = "rms"'] = 'unknown field "eror"; did you mean "error"?',
       [rest .. 'name = "x", error = "mean"'] =
         'error = "mean"; it must be "rms", "max", "p95", "residual" or a function',

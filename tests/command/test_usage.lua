@@ -42,11 +42,13 @@ describe("rapid", function()
     assert.equal(2, result.status)
     assert.equal(("rapid: no command; to run the scene, type: %s run scene.lua\n"):format(command.binary()),
       result.stderr)
+    local by_name = command.shell([[PATH="$(dirname "$RAPID"):$PATH" rapid scene.lua]])
+    assert.equal("rapid: no command; to run the scene, type: rapid run scene.lua\n", by_name.stderr)
   end)
 
   it("says how a list is given to --set, which the shell splits without quotes", function()
     assert.equal('rapid run: unexpected argument "tint=0.2"; the shell has split a list, so put it in quotes: '
-      .. "--set 'tint={1, 2, 3}'\n", rapid("run scene.lua --set tint=0.1 tint=0.2 tint=0.9").stderr)
+      .. "--set 'tint={...}'\n", rapid("run scene.lua --set tint=0.1 tint=0.2 tint=0.9").stderr)
     assert.equal('rapid run: unexpected argument "rate=5"; to set a value, type: --set rate=5\n',
       rapid("run scene.lua rate=5").stderr)
   end)

@@ -29,6 +29,25 @@ describe("docs/lua-api.md", function()
       "docs/lua-api.md is out of date; rapid nodes --json | python3 docs/reference/nodes.py writes it")
   end)
 
+  it("has one row for each parameter of a node, and no others", function()
+    local checked = 0
+    for _, node in ipairs(nodes) do
+      local expected, found = {}, {}
+      for _, param in ipairs(node.params) do
+        -- The reference states this parameter once for all nodes.
+        local is_common = param.name == "group" and param.doc:find "^limits the node to the points of this group"
+        if not is_common then expected[param.name] = 1 end
+      end
+      local head = "\n### " .. (node.name == "create" and "rapid.create" or ":" .. node.name) .. "\n"
+      local _, from = page:find(head, 1, true)
+      local section = page:sub(assert(from, head), (page:find("\n###? ", from) or 0) - 1)
+      for name in section:gmatch "\n| `([%w_]+)` |" do found[name] = (found[name] or 0) + 1 end
+      assert.same(expected, found, node.name)
+      checked = checked + 1
+    end
+    assert.truthy(checked > 50, checked)
+  end)
+
   it("has the fields and methods of a point, and no others", function()
     local section = document.section(page, "## Kernels")
     local fields, methods = {}, {}

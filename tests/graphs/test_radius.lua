@@ -30,12 +30,15 @@ describe("graphs/radius.lua", function()
     for _, frame in ipairs(require "dkjson".decode(folder:read "stats.json").frames) do
       for _, band in ipairs(frame.bands or {}) do
         local known = bands[band.node] or { width = 0, seconds = 0 }
-        bands[band.node] = { width = math.max(known.width, band.width), seconds = known.seconds + band.seconds }
+        bands[band.node] = { width = math.max(known.width, band.width), seconds = known.seconds + band.seconds,
+          voxels = band.voxels }
       end
     end
-    assert.near(0.06, bands.collide1.width, 1e-4)
+    assert.near(0.06, bands.collide1.width, 1e-6)
+    assert.equal(15532, bands.collide1.voxels)
     assert.equal(0, bands.collide1.seconds) -- built with the level set
-    assert.near(0.16, bands.collide2.width, 1e-4)
+    assert.near(0.16, bands.collide2.width, 1e-6)
+    assert.equal(41213, bands.collide2.voxels)
     assert.truthy(bands.collide2.seconds > 0)
   end)
 end)

@@ -217,8 +217,8 @@ describe("a warning", function()
 
   it("names a force after a goal that holds its points", function()
     local chain = "return rapid.create { points = POINTS } %s :goal { to = POINTS %s } %s :solve {}"
-    expect('node "wind1": can\'t move the points that have arrived, as goal1 holds them; to let them go, give goal1 '
-      .. "hold = false", warnings(chain:format("", "", ":wind { velocity = {2, 0, 0} }")))
+    expect('node "wind1": can\'t move the points that have arrived, because goal1 holds them; to let them go, '
+      .. "give goal1 hold = false", warnings(chain:format("", "", ":wind { velocity = {2, 0, 0} }")))
     assert.equal("", warnings(chain:format("", ", hold = false", ":wind {}")))
     assert.equal("", warnings(chain:format(":gravity {}", "", "")))
   end)
@@ -239,7 +239,7 @@ describe("a warning", function()
       ":solve {}"
     expect("Cd = {255, 80, 20}: colours go from 0 to 1; divide by 255",
       warnings(chain:format "attributes = { Cd = {255, 80, 20} }"))
-    expect("pscale = 4 is a radius in metres, larger than the source",
+    expect("pscale = 4 is a radius in metres, larger than the source; give a smaller one",
       warnings(chain:format "attributes = { pscale = 4 }"))
     expect("life = 48 is in seconds; if frames are meant, divide by 24", warnings(chain:format "life = 48"))
     assert.equal("", warnings(chain:format "life = {1, 20}, attributes = { Cd = {12, 1, 0}, pscale = 0.5 }"))

@@ -256,7 +256,7 @@ describe("a constructor with arguments that nothing can be made of", function()
       ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { h = {1} } }"] =
         "values: h has 1 values; it must be a list of 3 values, one for each of `points`",
       ["rapid.mesh.from { points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}}, faces = {{1, 2, 3}}, values = { id = {} } }"] =
-        "values: newborn points can't have an attribute id",
+        "values: id can't be given, because the birth of a point sets it; choose another name",
       ["rapid.mesh.read()"] = "rapid.mesh.read: the path is missing",
       ["rapid.mesh.read 'none.obj'"] = 'rapid.mesh.read: there is no mesh file "none.obj"',
       ["rapid.mesh.read(5)"] = "path = 5 has the wrong type; it must be a string",

@@ -133,7 +133,7 @@ return %s]]
         "{ NAME = value, ... }",
       ["rapid.create {} :gravity { { 0, 1, 0 } }"] = 'node "gravity1": {0, 1, 0} has no name; ' ..
         "write { NAME = value, ... }",
-      ["rapid.create {} :gravity({}, {})"] = ":gravity needs one table of parameters",
+      ["rapid.create {} :gravity({}, {})"] = ":gravity takes only one table of parameters",
       ["rapid.create {} :points('k')"] = ":points needs a name and a function, or a table { name = ..., kernel = ... }",
       ["rapid.create {} :points(function() end)"] = ":points needs a name and a function, or a table { name = ..., " ..
         "kernel = ... }",

@@ -225,7 +225,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
   end)
 
   it("is none that writes a text, or another type", function()
-    for body, message in pairs { ["p.name = 3"] = "takes a text, not 3", ["p.name = \"b\""] = false } do
+    for body, message in pairs { ["p.name = 3"] = "takes a string, not 3", ["p.name = \"b\""] = false } do
       local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")
         .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body)
       if message then

@@ -37,8 +37,8 @@ describe("a level set", function()
     local balls = "rapid.points.from { P = {{0, 0, 0}, {2, 0, 0}}, pscale = {0.5, 0.2} }"
     assert.near(0.05, distance(("rapid.levelset.from_points(%s, { voxel = 0.05 })"):format(balls), 2.25), 1e-3)
     assert.truthy(error_of("rapid.levelset.from_points(two, { voxel = 0.05 })"):find(
-      "rapid.levelset.from_points: the size of the balls is unknown; give radius, or give the points the attribute " ..
-        "pscale", 1, true))
+      "rapid.levelset.from_points: the radius of the spheres is unknown; give radius, or give the points the " ..
+        "attribute pscale", 1, true))
   end)
 
   it("of which nothing is left is refused, by the method's name", function()

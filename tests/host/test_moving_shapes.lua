@@ -105,7 +105,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, s
   end)
 
   it("is told where it can't be asked", function()
-    assert.matches("distance of moving shapes and of meshes can only be called in kernels", scene.error [[
+    assert.matches("shape:distance(P) of a moving shape or a mesh can only be called in a kernel", scene.error [[
 local ball = rapid.shape.sphere {}:transform { [1] = rapid.translate(0, 0, 0), [2] = rapid.translate(1, 0, 0) }
 local _ = ball:distance(vec3(0, 0, 0)) return rapid.create {} :solve {}]], 1, true)
   end)

@@ -203,7 +203,8 @@ describe("the folder of a cache", function()
   it("is an error that names what is wrong with it", function()
     assert.match("^%-%-cache cache: its .lock is a link", go_on("rm .lock; ln -s ../seen .lock").stderr)
     assert.match("^cache/journal: can't be read: it is not a regular file", go_on("rm journal; mkfifo journal").stderr)
-    assert.match("^cache/journal: the whole file", go_on("truncate -s 300G journal").stderr)
+    assert.match("^cache/journal: the whole file would need about 300%.0 GiB, but only %d+ MiB of 1%.0 GiB are free; "
+      .. "read a smaller file, or set %-%-memory\n$", go_on("truncate -s 300G journal").stderr)
   end)
 end)
 

@@ -212,7 +212,7 @@ TEST_CASE("a description shows the texts of an attribute, in order, and how many
     for (std::size_t i = 0; i < points.size(); ++i)
         points.column<Token>("name").write()[i] = token_of(fmt::format("t{:02}", i));
     CHECK_THAT(to_text(describe(points)),
-               Catch::Contains("\"t00\" \"t01\"") && Catch::Contains("\"t07\" ... of 20 texts"));
+               Catch::Contains("\"t00\" \"t01\"") && Catch::Contains("\"t07\" ... of 20 strings"));
     const auto json = json_of(describe(points))["attributes"][3];
     CHECK(json["texts"] == 20);
     CHECK(json["first_texts"][0] == "t00");

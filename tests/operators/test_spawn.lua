@@ -435,7 +435,7 @@ return rapid.create {} :emit(given) :solve {}]]
     local message = scene.error [[
 local stars = rapid.create { points = two } :solve {}
 return rapid.create {} :emit { source = function() return stars end, count = 1 } :solve {}]]
-    assert.matches("source is a node; to emit from its points, use", message, 1, true)
+    assert.matches("source is a node; to emit from its points, use :spawn { from = ... }", message, 1, true)
   end)
 end)
 

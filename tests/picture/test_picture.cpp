@@ -228,6 +228,25 @@ TEST_CASE("a card covers a disc times the cosine between its normal and the view
     CHECK(shaded(Vec3f(-0.3f, 0.4f, 1)) > shaded(Vec3f(0.6f, -0.8f, 1)) + 20);
 }
 
+TEST_CASE("a card lies across its normal, and a collider hides the half behind it", "[io][picture]")
+{
+    PointSet points = balls({{0, 0, 0}}, {green}, 2);
+    points.add({"orient", Quatf(Quatf::Identity())});
+    const auto looks_at = [&](const PictureScene& scene, const Vec3f& normal, const Vec3d& P) {
+        const Vec3f n = normal.normalized(), axis = Vec3f::UnitY().cross(n);  // of the shortest turn from y to n
+        points.column<Quatf>("orient").write()[0] = Quatf(1 + n.y(), axis.x(), axis.y(), axis.z()).normalized();
+        const Vec3d s = front_view().camera.project(P, small.width, small.height);
+        const Picture picture = render(points, small, scene, front_view());
+        return is_green(picture.pixel(static_cast<int>(s.x()), static_cast<int>(s.y())));
+    };
+    PictureScene scene = styled({.cards = true});
+    CHECK(looks_at(scene, {1, 1, 0.5f}, {1.06, -1.06, 0}));
+    CHECK_FALSE(looks_at(scene, {1, 1, 0.5f}, {1.06, 1.06, 0}));
+    scene.bodies.push_back(quad(0));
+    CHECK(looks_at(scene, {0, 1, 1}, {0, -0.7, 0.7}));
+    CHECK_FALSE(looks_at(scene, {0, 1, 1}, {0, 0.7, -0.7}));
+}
+
 TEST_CASE("a ball that hardly moves is shaded as one at rest", "[io][picture]")
 {
     PointSet points = balls({{0, 0, 0}}, {{0.4f, 0.4f, 0.4f}}, 2);

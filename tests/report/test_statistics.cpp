@@ -258,8 +258,8 @@ TEST_CASE("instead of all fine, the summary has a line for each thing to look at
     CHECK_THAT(summary(run),
                Catch::EndsWith("look at  points reached the limit of contacts in a step 1,234 times, in 2 frames from "
                                "2 to 4: give :solve more substeps\n"
-                               "look at  points were deep inside a shape once, in frame 3: emit them outside of it, or "
-                               "close the mesh\n"
+                               "look at  points could not be moved out of a shape once, in frame 3: emit them outside, "
+                               "or move the shapes apart\n"
                                "look at  the error of positions is visible: give :solve more substeps\n"));
     CHECK_THAT(summary(run), !Catch::Contains("all fine"));
 
@@ -272,8 +272,10 @@ TEST_CASE("instead of all fine, the summary has a line for each thing to look at
 
 TEST_CASE("the summary of an empty scene says that there are no points, not that no frame was run", "[report]")
 {
-    CHECK_THAT(summary(run_of({0, 0})), Catch::StartsWith("points   0\nframes   2 in 0.500 s, 3.0 MiB of memory\n") &&
-                                            Catch::Contains("look at  no frame has a point"));
+    CHECK_THAT(summary(run_of({0, 0})),
+               Catch::StartsWith("points   0\nframes   2 in 0.500 s, 3.0 MiB of memory\n") &&
+                   Catch::Contains(
+                       "look at  no frame has a point: emit more, keep points alive for longer, or run more frames\n"));
     CHECK_THAT(summary(run_of({})), Catch::StartsWith("points   none: no frame was run\n"));
 }
 

@@ -131,7 +131,8 @@ TEST_CASE("parts that are no whole are refused before anything is written", "[me
     CHECK_THAT(fault({parts.folder / "x_part1of2.####.csv"}, whole), Contains("missing is part 2of2"));
     CHECK_THAT(fault({parts.folder / "y_part{part}.####.csv"}, whole),
                Contains("there is no complete part with this name"));
-    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.####.png"), Contains("store points"));
+    CHECK_THAT(fault({parts.all()}, parts.folder / "whole.####.png"),
+               Contains("a .png file can't store points; merge into another format"));
     CHECK_THAT(fault({parts.all()}, parts.folder / "whole.csv"), Contains("several frames would go into one file"));
     CHECK_THAT(fault({parts.all()}, parts.folder / "x_part1of2.####.csv"), Contains("would replace"));
     std::filesystem::remove(parts.folder / "x_part2of2.0003.csv");

@@ -368,7 +368,7 @@ TEST_CASE("wrong offers are errors by name", "[offers]")
     points.columns = {{"P", ColumnType::Vec3, nullptr}};
     CHECK_THAT(refused("cloud", points), Contains("null"));
     points.columns = {{"P", ColumnType::Vec3, values}};
-    CHECK_THAT(refused("cloud", points), Contains("P is nan at place 0"));
+    CHECK_THAT(refused("cloud", points), Contains("P is nan at index 0"));
     points.columns = {{"P", ColumnType::Float, values}};
     CHECK_THAT(refused("cloud", points), Contains("P has the type float; it must be vec3"));
     const std::uint32_t unknown[] = {4'000'000'000};
@@ -416,7 +416,7 @@ TEST_CASE("a callback that throws, writes NaN or past its array's end is an erro
     CHECK(threw.node == "pull1");
     CHECK_THAT(threw.message, Contains("pull") && Contains("broken"));
     CHECK_THAT(error_with([](const HostCall&) { throw 3; }).message, Contains("not a std::exception"));
-    CHECK_THAT(error_with([](const HostCall& now) { now.acceleration[4] = NAN; }).message, Contains("nan at place 1"));
+    CHECK_THAT(error_with([](const HostCall& now) { now.acceleration[4] = NAN; }).message, Contains("nan at index 1"));
     CHECK_THAT(error_with([](const HostCall& now) { now.acceleration[3 * now.count] = 1; }).message,
                Contains("beyond the end"));
 

@@ -115,7 +115,7 @@ TEST_CASE("points behind no node, or before the first frame, are an error", "[re
         return points.error();
     };
     CHECK_THAT(fault("worm", 2).message, Contains("did you mean \"warm\""));
-    CHECK_THAT(fault("spare", 2).message, Contains("is pruned"));
+    CHECK_THAT(fault("spare", 2).message, Contains("node \"spare\" is pruned: it leads to no output"));
     CHECK_THAT(fault("warm", 0).message, Contains("before the scene's first"));
     CHECK(fault("worm", 2).kind == SceneError::WrongCall);
     const SceneError late = fault("solve1", 5);

@@ -361,7 +361,11 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     wrong([](RunOptions& o) { o.cache.every = -1; }, "every = -1");
     wrong([](RunOptions& o) { o.cache.again = true; }, "again replaces the contents of a cache");
     wrong([](RunOptions& o) { o.claims = "claims"; }, "claims need a statistics file");
-    wrong([](RunOptions& o) { o.files.pictures.camera.position = {1, NAN, 0}; }, "must be finite");
+    wrong(
+        [](RunOptions& o) {
+            o.files.pictures.camera.position = {1, NAN, 0};
+        },
+        "the camera's position and target must be finite");
     wrong(
         [](RunOptions& o) {
             o.files.pictures.camera.position = o.files.pictures.camera.target = {1, 2, 3};

@@ -190,7 +190,7 @@ TEST_CASE("a point of a merge that is not known by its place is an error that sa
 {
     Scene twice = opened(std::string(merged) + "return chain('a', 0):merge(chain('b', 0))");
     CHECK_THAT(SceneInside::origin(twice, good(twice.advance_to(2)), 0).error().message,
-               Contains("several points have this position"));
+               Contains("several points have this position and velocity; choose another frame"));
     Scene moved =
         opened(std::string(merged) +
                "return chain('a', 0):merge(chain('b', 7)) :points('up', function(p) p.P = p.P + vec3(0, 0.3, 0) end)");

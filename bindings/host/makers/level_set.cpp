@@ -168,7 +168,7 @@ struct FromPoints : Grid {
     {
         const PointSet& set = points->points;
         if (!radius && !set.has("pscale"))
-            throw Error("the size of the balls is unknown; give radius, or give the points the attribute pscale");
+            throw Error("the radius of the spheres is unknown; give radius, or give the points the attribute pscale");
         const PerPoint<float> given = radius ? *radius : PerPoint<float>::of("pscale");
         const Strided<Vec3f> P = set.P().read();
         const Strided<float> r = given.read(set);

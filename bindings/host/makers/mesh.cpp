@@ -138,7 +138,8 @@ std::map<std::string, Mesh::VertexValues> vertex_values(const std::map<std::stri
         const auto& name = named.first;
         const auto& list = named.second;
         if (name == "P" || name == "v" || name == "id")
-            throw Error(fmt::format("values: newborn points can't have an attribute {}; choose another name", name));
+            throw Error(fmt::format(
+                "values: {} can't be given, because the birth of a point sets it; choose another name", name));
         const Table* table = list.table();
         if (!table || table->list.size() != vertices)
             throw Error(fmt::format("values: {} has {}; it must be a list of {} values, one for each of `points`", name,

@@ -46,7 +46,7 @@ struct SequenceOptions {
     void check(const std::string& path, bool is_sequence) const
     {
         if (offset && *offset != std::floor(*offset))
-            throw Error(fmt::format("offset = {} is not whole; it must be a number of frames", *offset));
+            throw Error(fmt::format("offset = {} is not whole; it must be a whole number of frames", *offset));
         for (const auto& [given, name] : {std::pair(!before.empty(), "before"), std::pair(!after.empty(), "after"),
                                           std::pair(offset.has_value(), "offset")})
             if (given && !is_sequence)

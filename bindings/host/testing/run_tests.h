@@ -30,6 +30,6 @@ struct TestOptions {
 
 // Runs the tests of a file, and reports each event as it happens.
 void run_test_file(const std::filesystem::path& file, const TestOptions& options,
-                   const std::function<void(const TestEvent&)>& report);
+                   const std::function<void(const TestEvent&)>& on_event);
 
 }  // namespace rapid

@@ -624,9 +624,9 @@ class Run(_Program):
         if frame:
             options.frame = FrameDone(self._guard(lambda _, *values: frame(*values[:3], bool(values[3])), None))
         if line:
-            options.line = Line(self._guard(lambda _, values: line(values.decode()), None))
+            options.line = Line(self._guard(lambda _, text: line(text.decode()), None))
         if warning:
-            options.warning = Line(self._guard(lambda _, values: warning(values.decode()), None))
+            options.warning = Line(self._guard(lambda _, text: warning(text.decode()), None))
         of_scene = self._scene_options(**scene)
         self._options = options, of_scene
         handle = c_void_p()

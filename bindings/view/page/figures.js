@@ -32,10 +32,10 @@ export class Figures {
   declare(listed) {
     if (this.charts?.length) return;
     this.known = null;
-    this.charts = chartsOf(listed).map(([name, of, lines]) => {
+    this.charts = chartsOf(listed).map(([name, unitName, lines]) => {
       const canvas = element("canvas", { title: `${name || "seconds by stage"}: a click goes to the frame` }), value = element("span", { class: "number" });
       const names = lines.map(([line, tint]) => element("span", { class: line ? `line ${tint}` : "" }, line || name));
-      const chart = { name, of, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
+      const chart = { name, unitName, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
       canvas.addEventListener("click", (event) => {
         const box = canvas.getBoundingClientRect();
         this.go(Math.round(this.first + ((event.clientX - box.left) / box.width) * (this.last - this.first)));
@@ -116,8 +116,8 @@ export class Figures {
     });
     context.fillStyle = colour("quiet");
     context.fillRect(x(this.frame), 0, 1, height);
-    const now = this.of(this.frame), text = (v) => (typeof v !== "number" ? "–" : chart.of === "s" ? seconds(v) : brief(v));
-    const here = chart.lines.map(([, , read]) => text(now && read(now))), most = chart.of === "s" ? seconds(high) : `${brief(high)} ${chart.of}`;
+    const now = this.of(this.frame), text = (v) => (typeof v !== "number" ? "–" : chart.unitName === "s" ? seconds(v) : brief(v));
+    const here = chart.lines.map(([, , read]) => text(now && read(now))), most = chart.unitName === "s" ? seconds(high) : `${brief(high)} ${chart.unitName}`;
     chart.value.textContent = here.length === 1 ? `${here[0]} of ${most}` : `of ${most}`;
     // If there are several lines, each is followed by its value; one that is always 0 has neither.
     if (here.length > 1)

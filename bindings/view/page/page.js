@@ -148,11 +148,12 @@ function theme(name) {
   if (state.point !== null) showPoint(); // its curves
 }
 
-// where: tells what to do with the text.
-function copy(text, where) {
-  const told = `${text}; ${where}`;
-  navigator.clipboard?.writeText(text).then(() => flash(`copied: ${told}`), () => flash(told));
-  if (!navigator.clipboard) flash(told);
+// advice: says what to do with the text.
+function copy(text, advice) {
+  if (!text) return flash("nothing to copy: no value is changed");
+  const message = `${text}; ${advice}`;
+  navigator.clipboard?.writeText(text).then(() => flash(`copied: ${message}`), () => flash(message));
+  if (!navigator.clipboard) flash(message);
 }
 
 function flash(text) { by("dock-note").textContent = text; }

@@ -11,7 +11,8 @@ function limits(fallback) {
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class Parameters {
-  // change(values): runs the scene with these; copy(text, where): copies text to the clipboard, and says where to paste it.
+  // change(values): runs the scene with these; copy(text, advice): copies text to the
+  // clipboard, and shows the advice.
   constructor(root, { change, copy }) {
     this.root = root;
     this.change = change;
@@ -19,7 +20,7 @@ export class Parameters {
     this.reset = element("button", { title: "all parameters as the scene has them", onclick: () => this.send({}) }, "reset");
     root.append(
       element("h2", {}, "Parameters", element("span", { class: "gap" }), this.reset,
-        element("button", { title: "copies the changed values as options of rapid run", id: "copy-set", onclick: () => copy(this.options() || "no value is changed",
+        element("button", { title: "copies the changed values as options of rapid run", id: "copy-set", onclick: () => copy(this.options(),
           "paste it after rapid run SCENE in a terminal, or write the values into the scene as the defaults of rapid.param") }, "copy --set")),
       this.list);
     this.values = {};

@@ -120,9 +120,9 @@ export class Inspector {
     if (figure?.seconds) {
       add("points", `${brief(figure.points)}  (+${brief(figure.born)} −${brief(figure.died)})`, "born, died in this frame");
       for (const stage of ["solve", "script", "graph"]) if (figure.seconds[stage] > 0) add(stage, seconds(figure.seconds[stage]));
-      for (const { name, of, lines } of charts) {
+      for (const { name, unitName, lines } of charts) {
         const value = lines[0][2](figure);
-        if (name && name !== "points" && of !== "s" && value) add(name, `${brief(value)} ${of}`);
+        if (name && name !== "points" && unitName !== "s" && value) add(name, `${brief(value)} ${unitName}`);
       }
     } else if (figure) {
       add("points", brief(figure.points));

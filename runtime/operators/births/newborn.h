@@ -105,8 +105,9 @@ void Newborn::declare_newborn(Declaration<T>& type, const std::string& speed_alo
         .param(&T::joins, "group", Value(), any_number(), "", "group that newborn points join")
         .constant()
         .param(&T::attributes, "attributes", Value(), any_number(), "",
-               "values of newborn points, {heat = 1}: one value, a range {min, max}, or a ramp of keys; they replace "
-               "inherited values; between two vectors on a line");
+               "values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: "
+               "on the "
+               "line between them), or a ramp of keys");
 }
 
 }  // namespace rapid

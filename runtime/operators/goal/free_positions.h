@@ -34,9 +34,9 @@ private:
     std::vector<Vec3d> positions_;
     std::vector<std::uint32_t> occupancy_;
     std::uint32_t round_ = 0;           // the lowest number of takers
-    std::vector<std::uint32_t> order_;  // indices of places, in tree order
+    std::vector<std::uint32_t> order_;  // indices of positions, in tree order
     std::vector<std::uint8_t> axis_;    // along which a node splits its range
-    std::vector<std::uint32_t> free_;   // number of places in a node's range with the fewest takers
+    std::vector<std::uint32_t> free_;   // number of positions in a node's range with the fewest takers
 };
 
 }  // namespace rapid

@@ -53,7 +53,7 @@ public:
                       std::span<Vec3f> positions) = 0;
 
 protected:
-    // Sets places[i] to place(i) for each member.
+    // Sets positions[i] to position_of(i) for each member.
     template <class F>
     static void for_each_member(Strided<std::uint8_t> members, std::span<Vec3f> positions, const F& position_of)
     {

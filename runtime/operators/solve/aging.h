@@ -45,7 +45,7 @@ private:
 };
 
 // Advances the ages of the group's points by their `dt`, or by a frame, and removes points that have reached their
-// `life`. Calls bury(stays) before removal: their mask is 0. Returns the number that died.
+// `life`. Calls before_removal(stays) first; points to be removed have mask 0. Returns the number that died.
 std::size_t age_points(PointSet& points, const std::string& group, double frame_length,
                        const std::function<void(std::span<const std::uint8_t>)>& before_removal);
 

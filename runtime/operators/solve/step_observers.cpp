@@ -300,8 +300,8 @@ private:
                             result.substeps, *step.tolerance));
         if (step.beyond_tolerance > result.beyond_tolerance)
             step.warn(
-                fmt::format("in a sample, {} points differ by more than {:g} m with other substeps, because forces "
-                            "change within a substep; give a larger number of substeps to begin with",
+                fmt::format("a sample suggests that about {} points differ by more than {:g} m with other substeps, "
+                            "because forces change within a substep; begin with more substeps",
                             step.beyond_tolerance, *step.tolerance));
     }
 

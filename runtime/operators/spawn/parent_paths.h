@@ -23,7 +23,7 @@ public:
     // Times are in s since the beginning of the step.
     struct Parent {
         const PointSet* set;  // has the parent's values
-        std::uint32_t index;  // index in it
+        std::uint32_t index;  // in set
         std::int64_t id;
         std::uint32_t before;   // index in the record's `before`; none if it did not exist then
         double begin, end;      // of its life in this step

@@ -120,8 +120,8 @@ public:
         });
     }
 
-    // Returns the inside voxel at the surface from which, with its own distance, the surface is the shortest way from
-    // P, to within a voxel; none if no voxel is inside. Its cost grows with the number of blocks that are as near.
+    // Returns the inside voxel next to the surface that minimises its distance from P plus its own distance from the
+    // surface; nothing if no voxel is inside. The more blocks are at a similar distance, the longer it takes.
     std::optional<Vec3d> nearest_inside(const Vec3d& P) const;
 
     // Returns the largest slope of the field, measured when it was baked: about 1 for a smooth surface, up to √3 where

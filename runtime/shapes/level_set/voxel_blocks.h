@@ -50,7 +50,7 @@ struct VoxelBlocks {
     }
     std::uint64_t voxels_in_band() const;
 
-    // Makes space for that many blocks. The caller sets their values and places.
+    // Makes space for that many blocks. The caller sets their values and coords.
     void resize(std::size_t blocks);
     // Removes the blocks without voxels in the band. Calls moved(from, to) for each other block whose index changes.
     template <class Moved>

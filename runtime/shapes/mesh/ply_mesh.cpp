@@ -200,7 +200,7 @@ public:
 private:
     struct Part {
         Mesh::VertexValues* values;
-        std::vector<std::size_t> property_indices;  // property indices
+        std::vector<std::size_t> property_indices;
         double scale;
     };
     void add(const std::string& name, std::vector<std::size_t> property_indices, double scale)

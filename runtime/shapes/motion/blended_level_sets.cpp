@@ -70,13 +70,13 @@ public:
         const double h = duration_ / 32, from = std::max(0.0, time - h), to = std::min(duration_, time + h);
         return (at(P + (to - time) * v, to).vc - at(P + (from - time) * v, from).vc) / (to - from);
     }
-    // Returns the part of it due to motion `direction` along the surface at a fixed time.
-    Vec3d change_along(const Vec3d& P, const Vec3d& direction, double time) const
+    // Returns the part of it due to a motion along the surface with this velocity, at a fixed time.
+    Vec3d change_along(const Vec3d& P, const Vec3d& velocity, double time) const
     {
-        const double speed = direction.norm();
+        const double speed = velocity.norm();
         if (!(speed > 0)) return Vec3d::Zero();
         const double h = 0.5 * voxel() / speed;
-        return (at(P + h * direction, time).vc - at(P - h * direction, time).vc) / (2 * h);
+        return (at(P + h * velocity, time).vc - at(P - h * velocity, time).vc) / (2 * h);
     }
 
     double duration() const { return duration_; }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "runtime/shapes/contact_walk.h"
 
@@ -23,9 +22,7 @@ Contact first_contact_of(const Body& body, const Path& path)
         contact.time = 0;
         contact.n = unit_normal(start.gradient, path.v - start.vc);
         contact.vc = start.vc;
-        // At the edge of the band the field flattens (first_contact.h).
-        const bool flattens = -start.phi > body.band() - std::sqrt(3.0) * body.voxel();
-        contact.depth = slope > 0 && !flattens ? -f / slope : -f;
+        contact.depth = slope > 0 && !is_at_band_edge(start.phi, body.band(), body.voxel()) ? -f / slope : -f;
         return contact;
     }
     // A point slightly below the surface by rounding uses its own height as the level to touch at.

@@ -13,16 +13,16 @@ Vec3d free_position(const Obstacle& obstacle, const Vec3d& P, double radius)
 {
     const double size = obstacle.bounds.sizes().maxCoeff() + 2 * radius;
     if (!std::isfinite(size)) return P;
-    std::array<Vec3d, 26> offsets;
+    std::array<Vec3d, 26> candidates;
     std::array<double, 26> phi;
     for (double reach = std::max(obstacle.feature, 0x1p-10 * size); reach < 2 * size; reach *= 1.25) {
         for (int k = 0, direction = 0; k < 27; ++k) {
             const Vec3d d(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
-            if (!d.isZero()) offsets[direction++] = P + reach * d.normalized();
+            if (!d.isZero()) candidates[direction++] = P + reach * d.normalized();
         }
-        obstacle.shape->distance(offsets, phi, {});
+        obstacle.shape->distance(candidates, phi, {});
         const auto highest = std::max_element(phi.begin(), phi.end());
-        if (*highest >= radius) return offsets[highest - phi.begin()];
+        if (*highest >= radius) return candidates[highest - phi.begin()];
     }
     return P;
 }

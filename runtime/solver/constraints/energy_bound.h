@@ -47,7 +47,8 @@ inline double potential_energy(const Substep& step, std::size_t i, const Vec3d& 
     return energy / step.inverse_mass[i];
 }
 
-// Motion of a driver: its velocity at the end of the substep, m/s, and its path in it, m, without jumps.
+// Motion of a driver: its velocity at the end of the substep, m/s, and its displacement over the substep, m, without
+// jumps.
 struct Drive {
     Vec3d v = Vec3d::Zero(), displacement = Vec3d::Zero();
 

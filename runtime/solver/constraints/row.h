@@ -55,7 +55,7 @@ struct Row {
     Ids ids;
     Points points = filled(IdIndex::none);
     double impulse = 0;          // N s along the gradient, of the last substep; at least 0 if one-sided
-    bool is_overloaded = false;  // in this substep: to satisfy C takes more than the strength of a one-sided row
+    bool is_overloaded = false;  // in this substep: satisfying C needs more force than a one-sided row has
     double first = 0;            // C at the beginning of the substep
     double reference = 0;        // target of C after the row's own force has acted
     double added = 0;            // N s, the part of the impulse due to others, as far as it moves positions

@@ -82,14 +82,14 @@ constexpr double push = 0.5;
 
 }  // namespace
 
-float ShapeQuery::size(const Obstacle& obstacle, std::size_t i) const
+float push_radius(std::span<const float> sizes, const Obstacle& obstacle, std::size_t i)
 {
     return sizes.empty() ? obstacle.radius[i] : std::max(obstacle.radius[i], sizes[i]);
 }
 
 double ShapeQuery::reach(const Obstacle& obstacle, std::size_t i) const
 {
-    return push * size(obstacle, i) + moved[i - begin];
+    return push * push_radius(sizes, obstacle, i) + moved[i - begin];
 }
 
 ShapeClearance::ShapeClearance(std::span<const Obstacle> obstacles, std::size_t size)
@@ -181,7 +181,8 @@ void ShapeClearance::close(const ShapeQuery& query, std::size_t o)
     const float* clearance = clearance_.data() + o * size_;
     for (const std::uint32_t i : query.open)
         if (obstacle.members[i])
-            room_[i] = std::min(room_[i], clearance[i] - static_cast<float>(push) * query.size(obstacle, i));
+            room_[i] =
+                std::min(room_[i], clearance[i] - static_cast<float>(push) * push_radius(query.sizes, obstacle, i));
 }
 
 namespace {
@@ -447,9 +448,8 @@ void ShapeContacts::solve_velocities(Substep& step)
 
 bool ShapeContacts::is_flush(const ShapeContact& contact, const Substep& step) const
 {
-    const float radius = obstacles_[contact.obstacle].radius[contact.i];
-    const double size = sizes_.empty() ? radius : std::max(radius, sizes_[contact.i]);
-    return contact.n.dot(step.points[contact.i].P) - contact.level < flush * size;
+    const double gap = contact.n.dot(step.points[contact.i].P) - contact.level;
+    return gap < flush * push_radius(sizes_, obstacles_[contact.obstacle], contact.i);
 }
 
 void ShapeContacts::drive(EnergyIslands& islands, const Substep& step) const

@@ -43,6 +43,10 @@ std::vector<ShapeGrip> shape_grips(std::span<const std::uint32_t> points, std::s
 // Finds points that may be near shapes from lower bounds of their distances, so that most points need no query in a
 // substep.
 
+// Returns the radius that limits how far a point may be pushed, m: the larger of its radii for the shape and for other
+// points. sizes: the latter by point; empty if points do not meet.
+float push_radius(std::span<const float> sizes, const Obstacle& obstacle, std::size_t i);
+
 // Query of a chunk's points for their distances from a shape. Reused to keep its memory.
 struct ShapeQuery {
     std::span<const Vec3d> free;             // positions after the points' free motion
@@ -56,8 +60,6 @@ struct ShapeQuery {
     std::vector<double> phi, time;       // m, s
     std::span<const float> sizes;        // m: radii at which points meet one another; empty if they do not
 
-    // Returns the radius by which a push on the point is measured, m: it may lie on the shape with its center.
-    float size(const Obstacle& obstacle, std::size_t i) const;
     // Returns the distance that a point may move in a substep, m. Contacts that are farther away are skipped.
     double reach(const Obstacle& obstacle, std::size_t i) const;
 };

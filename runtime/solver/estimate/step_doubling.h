@@ -176,10 +176,8 @@ public:
     std::span<const std::uint32_t> dead() const { return dead_; }
 
     int largest_substeps() const { return largest_substeps_; }
-    std::uint64_t beyond_tolerance() const
-    {
-        return beyond_tolerance_;
-    }  // points that miss the tolerance at max_substeps
+    // Returns the number of points that miss the tolerance at max_substeps.
+    std::uint64_t beyond_tolerance() const { return beyond_tolerance_; }
 
 private:
     class Block;

@@ -19,7 +19,7 @@ return rapid.create { fps = %d, points = rapid.points.from { P = {{0, 0, 0}}, w 
     local result = scene.run("return rapid.create { points = two } :tumble { drag = 1 } :solve {}")
     assert.equal(quat(0, 0, 0, 1), result[3][1].orient)
     assert.near({0, 0, 0}, result[3][1].w, 0)
-    assert.match('node "tumble1": turns nothing, as the angular velocity w of all points is 0; give it a speed in '
+    assert.match('node "tumble1": turns nothing, because the angular velocity w of all points is 0; give it a speed in '
       .. "degrees per second: :tumble { speed = 360 }", table.concat(result.warnings, "\n"))
     for _, chain in ipairs { ":tumble { speed = 90 }", ":attribute { w = {0, 1, 0} } :tumble {}" } do
       assert.same({}, scene.run("return rapid.create { points = two } " .. chain .. " :solve {}").warnings)

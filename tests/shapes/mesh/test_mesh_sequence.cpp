@@ -115,5 +115,5 @@ TEST_CASE("a sequence without a file, or with a gap, says which frame is missing
     folder.tetrahedron(1, 1);
     folder.tetrahedron(3, 1);
     CHECK_THAT(test::error_of([&] { folder.sequence(1, 3); }),
-               Contains("frame 2 of \"body.####.obj\" is missing; each frame from 1 to 3"));
+               Contains("frame 2 of \"body.####.obj\" is missing; each frame from 1 to 3 needs a file"));
 }

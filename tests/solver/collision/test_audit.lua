@@ -82,7 +82,10 @@ describe("the audit of collisions", function()
       30)
     assert.near(9.81 * 2, met.lost, 1e-3)
     assert.equal(0, met.added)
-    assert.equal(0, audit("P = {{0, 2, 0}}", ":gravity {} :solve {}", 4).lost)
+    assert.equal(1, met.contacts)
+    assert.equal(0, met.deepest)
+    local free = audit("P = {{0, 2, 0}}", ":gravity {} :solve {}", 4)
+    for _, name in ipairs { "lost", "added", "contacts" } do assert.equal(0, free[name]) end
   end)
 end)
 

@@ -178,7 +178,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {}
     assert.equal(0, run.status, run.stderr)
     assert.match("\nerror    95 %% of the positions [^\n]+, in one frame %(7 of 42 estimated%); without the sum " ..
       "since birth,"
-      .. " as more than 1,000 points act on", run.stdout)
+      .. " as more than 1,000 points act on one another\n", run.stdout)
     for _, frame in ipairs(json.decode(scene.folder:read "stats.json").frames) do
       assert.falsy(frame.error)
       local n = frame.frame - 1 -- of those that are solved

@@ -143,7 +143,7 @@ std::exception_ptr State::set_up()
 
 State::~State() { close(); }
 
-// LuaJIT cannot close a state that a jump has left, nor one without its ffi library: their memory is leaked.
+// LuaJIT cannot close a state that a jump has left, nor one whose ffi library is incomplete. Their memory is leaked.
 void State::close()
 {
     if (is_broken_ || !has_libraries_) return;
@@ -194,6 +194,10 @@ void* State::allocate(void* self, void* block, std::size_t old_size, std::size_t
 void State::open_libraries()
 {
     luaL_openlibs(L_);
+    // LuaJIT opens its ffi library when a script first asks for it. It is opened here, so that close() knows that it is
+    // complete.
+    lua_pushcfunction(L_, luaopen_ffi);
+    lua_call(L_, 0, 0);
     has_libraries_ = true;
     leave_out_current_folder(L_);
     // Our modules are found in one folder, and named so that a position in them is never taken for graph code.

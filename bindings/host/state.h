@@ -145,7 +145,7 @@ private:
     std::size_t memory_ = 0;
     bool loaded_ = false, runs_kernel_ = false;
     bool limited_ = false;        // to options().script_memory, at present
-    bool has_libraries_ = false;  // LuaJIT's own libraries
+    bool has_libraries_ = false;  // LuaJIT's own libraries, ffi included
     bool is_broken_ = false;      // compiled code was left by a jump
     bool is_at_limit_ = false;    // memory was last refused because the script exceeded its limit
     bool protected_ = false;      // now

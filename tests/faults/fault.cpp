@@ -4,8 +4,8 @@
 //
 // CALL: open, write, fsync, close, link, rename (of output files and their folders), read (of any regular file), alloc
 // (an allocation after main began, through malloc, calloc, realloc or an aligned variant), or state (an allocation
-// while LuaJIT creates a state). ERROR: the number of an error, or "short": half of the bytes, or one, are written or
-// read.
+// while LuaJIT creates a state or opens its ffi library). ERROR: the number of an error, or "short": half of the bytes,
+// or one, are written or read.
 //
 //   RAPID_FAULT_LIST=FILE   a list of faults, one per line. For the kth, a copy of the process, taken after its
 //   libraries
@@ -120,7 +120,7 @@ int error_of(const char* call)
 // How many libraries this thread is opening, nested. Their constructors cannot report that memory has run out.
 thread_local int loading __attribute__((tls_model("initial-exec"))) = 0;
 
-// True while this thread is in lua_newstate(), which a failed allocation may leave by a jump.
+// True while this thread is in lua_newstate() or luaopen_ffi(), which a failed allocation leaves by a jump or an error.
 thread_local bool makes_state __attribute__((tls_model("initial-exec"))) = false;
 
 // Returns true if this allocation by `caller` must fail.
@@ -354,6 +354,15 @@ void* dlopen(const char* file, int mode) noexcept
 }
 
 struct lua_State;
+
+int luaopen_ffi(lua_State* state)
+{
+    static const auto original = next<decltype(&luaopen_ffi)>("luaopen_ffi");
+    makes_state = true;
+    const int results = original(state);
+    makes_state = false;
+    return results;
+}
 
 lua_State* lua_newstate(void* (*allocate)(void*, void*, std::size_t, std::size_t), void* data)
 {

@@ -119,7 +119,7 @@ local function complaints(text, outputs, list, libraries)
   return table.concat(found)
 end
 
--- Returns the number of allocations while LuaJIT creates the first state of a run.
+-- Returns the number of allocations while LuaJIT creates the states of a run and opens their ffi libraries.
 local function requests_of_a_state(text)
   local folder = command.folder()
   folder:write("scene.lua", text)
@@ -142,7 +142,7 @@ describe("a fault of the system", function()
     assert.equal("", complaints(scene, "-o a.####.ply -o b.####.csv -o c.####.vdb", list, deferred))
   end)
 
-  it("of memory while LuaJIT makes a state is an error, whichever request it is", function()
+  it("of memory while LuaJIT makes a state or opens its ffi library is an error, whichever request it is", function()
     local list = {}
     for n = 1, requests_of_a_state(scripted) do
       list[n] = ("state:%d:%d"):format(n, errors.ENOMEM)

@@ -292,21 +292,33 @@ TEST_CASE("births on a moving mesh are the same bits on any number of threads", 
     CHECK(born_on(1) == born_on(4));
 }
 
-TEST_CASE("births on a deforming mesh are uniform by its area at their own times", "[emit]")
+// Returns a sequence of two files. The first face shrinks from the side 1 to 0.2 while the second grows from 0.2 to 1.
+// delays: values of the attribute delay at the corners of each face.
+ObjectPtr shrinking_and_growing(const TemporaryFolder& folder, double first_delay, double second_delay)
 {
-    // One face shrinks to a fifth of its length while the other grows from there to its own.
-    TemporaryFolder folder;
     std::map<int, std::filesystem::path> files;
     for (const int frame : {1, 2}) {
         const double a = frame == 1 ? 1 : 0.2, b = 1.2 - a;
-        files[frame] = folder.write(fmt::format("{}.obj", frame),
-                                    fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 5 0 0\nv {1} 0 0\nv 5 {2} 0\n"
-                                                "f 1 2 3\nf 4 5 6\n",
-                                                a, 5 + b, b));
+        std::string text =
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+            "property float delay\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n";
+        for (const auto& [x, y, delay] : std::vector<std::array<double, 3>>{{0, 0, first_delay},
+                                                                            {a, 0, first_delay},
+                                                                            {0, a, first_delay},
+                                                                            {5, 0, second_delay},
+                                                                            {5 + b, 0, second_delay},
+                                                                            {5, b, second_delay}})
+            text += fmt::format("{} {} 0 {}\n", x, y, delay);
+        files[frame] = folder.write(fmt::format("{}.ply", frame), text + "3 0 1 2\n3 3 4 5\n");
     }
-    const auto mesh =
-        std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "#.obj"), constant_motion({}));
-    NodeTest emit("emit", {{"source", ObjectPtr(mesh)}, {"rate", 20000.0 * fps}, {"motion", "linear"}});
+    return std::make_shared<AnimatedMesh>(std::make_shared<MeshSequence>(files, "#.ply"), constant_motion({}));
+}
+
+TEST_CASE("births on a deforming mesh are uniform by its area at their own times", "[emit]")
+{
+    TemporaryFolder folder;
+    NodeTest emit("emit",
+                  {{"source", shrinking_and_growing(folder, 0, 0)}, {"rate", 20000.0 * fps}, {"motion", "linear"}});
     const PointSet born = emit(2);
     REQUIRE(born.size() == 20000);
     // At t the sides are a = 1 - 0.8 t and b = 0.2 + 0.8 t, and the first face has births with the probability
@@ -321,6 +333,22 @@ TEST_CASE("births on a deforming mesh are uniform by its area at their own times
     const double early = 0.89355, late = 0.65804;  // means of the probability over the first two quarters
     const double expected[] = {early, late, 1 - late, 1 - early};
     for (std::size_t k = 0; k < 4; ++k) CHECK(first[k] / all[k] == Approx(expected[k]).margin(0.025));
+}
+
+TEST_CASE("births on a deforming mesh whose age is an attribute are uniform by its area at their own times", "[emit]")
+{
+    // Births on the first face are at the end of the frame, where its side is 0.2, those on the second half a frame
+    // before, where its side is 0.6: the first has 0.2²/(0.2² + 0.6²) of them.
+    TemporaryFolder folder;
+    NodeTest emit("emit", {{"source", shrinking_and_growing(folder, 0, 0.5 / fps)},
+                           {"rate", 20000.0 * fps},
+                           {"motion", "linear"},
+                           {"age", Value(AttributeRef{"delay"})}});
+    const PointSet born = emit(2);
+    REQUIRE(born.size() == 20000);
+    double first = 0;
+    for (std::size_t i = 0; i < born.size(); ++i) first += born.P()[i].x() < 2.5f;
+    CHECK(first / 20000 == Approx(0.1).margin(0.01));
 }
 
 }  // namespace rapid

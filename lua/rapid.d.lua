@@ -519,6 +519,10 @@ function rapid.mesh.from(options) end
 function rapid.mesh.grid(options) end
 
 ---@class rapid.options.mesh_read
+---@field animation? string  the name of an animation of a glTF file, which moves and deforms the mesh from time 0 on; "" is the only one [string]
+---@field speed? number  seconds of the animation per second [number]
+---@field up? "y"|"z"  the axis of the file that points up: "y" or "z", which becomes y [string, one of y, z, default "y"]
+---@field unit? number  one length unit of the file: 0.01 for centimetres [number, m, above 0, default 1]
 ---@field before? "hold"|"repeat"|"mirror"|"none"  data before the first file of a sequence: that file, all files repeated, all files back and forth, or nothing [string, one of hold, repeat, mirror, none]
 ---@field after? "hold"|"repeat"|"mirror"|"none"  data after the last file of a sequence, as for before [string, one of hold, repeat, mirror, none]
 ---@field offset? number  delay of the files of a sequence: frame f uses the file f - offset [number, frames, from -1000000000 to 1000000000]
@@ -572,6 +576,8 @@ function rapid.scale(factor) end
 function rapid.points.grid(options) end
 
 ---@class rapid.options.points_read
+---@field up? "y"|"z"  the axis of the file that points up: "y" or "z", which becomes y [string, one of y, z, default "y"]
+---@field unit? number  one length unit of the file: 0.01 for centimetres [number, m, above 0, default 1]
 ---@field before? "hold"|"repeat"|"mirror"|"none"  data before the first file of a sequence: that file, all files repeated, all files back and forth, or nothing [string, one of hold, repeat, mirror, none]
 ---@field after? "hold"|"repeat"|"mirror"|"none"  data after the last file of a sequence, as for before [string, one of hold, repeat, mirror, none]
 ---@field offset? number  delay of the files of a sequence: frame f uses the file f - offset [number, frames, from -1000000000 to 1000000000]
@@ -1193,11 +1199,11 @@ function Node:rasterize(params) end
 
 ---@class rapid.params.solve
 ---@field group? string|fun(frame: rapid.Frame): string  limits the node to the points of this group [string]
----@field substeps? integer|fun(frame: rapid.Frame): integer  number of substeps per frame [integer, from 1 to 1048576, default 1]
+---@field substeps? integer|fun(frame: rapid.Frame): integer  number of substeps per frame; the default is 1, or with :contact the number that the points need to hold each other, up to max_substeps [integer, from 1 to 1048576]
 ---@field iterations? integer|fun(frame: rapid.Frame): integer  iterations of the constraints per substep [integer, from 1 to 10000, default 1]
 ---@field sleep? number|fun(frame: rapid.Frame): number  time at rest after which points with constraints sleep until something acts on them; math.huge for never [number, s, above 0, default 0.25]
 ---@field tolerance? number|fun(frame: rapid.Frame): number  maximum error per frame; each point takes 1, 2, 4, ... substeps, as its estimated error needs [number, m per frame, above 0]
----@field max_substeps? integer|fun(frame: rapid.Frame): integer  maximum number of substeps, with a tolerance [integer, from 1 to 1048576, default 64]
+---@field max_substeps? integer|fun(frame: rapid.Frame): integer  maximum number of substeps, with a tolerance or without substeps [integer, from 1 to 1048576, default 64]
 ---@field name? string  name of the node in messages [string]
 
 ---Advances the points by one frame: forces, motion, collisions, constraints.

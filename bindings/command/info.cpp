@@ -50,7 +50,7 @@ public:
                 if (!json_ && cache.sequence) print(path.string() + '\n');
                 if (!json_) print(report.text);
                 for (const std::string& what : points.warnings())
-                    if (!json_) print(fmt::format("skipped     {}\n", shortened(what, max_warning_bytes)));
+                    if (!json_) print(fmt::format("note        {}\n", shortened(what, max_warning_bytes)));
                 if (cache.sequence) json.member("frame", frame);
                 json.add_members(CheckedJson::parse(report.json));
                 json.member("left_out", points.warnings());

@@ -1,10 +1,12 @@
-// Numbers in binary files.
+// Numbers in files.
 #pragma once
 
 #include <Eigen/Core>
 #include <bit>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace rapid {
 
@@ -35,6 +37,21 @@ Scalar load_scalar(const unsigned char* from, ByteOrder order)
     for (std::size_t b = 0; b < sizeof(Scalar); ++b)
         bytes[b] = order == ByteOrder::Little ? from[b] : from[sizeof(Scalar) - 1 - b];
     return std::bit_cast<Scalar>(bytes);
+}
+
+// Parses a number from text. Unlike std::from_chars, it accepts the sign of "+1", and rounds a float that is too small
+// or too large for its type to 0 or infinity.
+template <class Number>
+std::from_chars_result parse_number(const char* begin, const char* end, Number& number)
+{
+    if (end - begin > 1 && *begin == '+' && begin[1] != '-') ++begin;
+    std::from_chars_result parsed = std::from_chars(begin, end, number);
+    if constexpr (std::is_same_v<Number, float>)
+        if (double wide = 0; parsed.ec == std::errc::result_out_of_range) {
+            parsed = std::from_chars(begin, end, wide);
+            number = static_cast<float>(wide);
+        }
+    return parsed;
 }
 
 // Calls f with a value of the corresponding C++ type.

@@ -72,9 +72,9 @@ def Points "a"
       "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0\n")
     local command = require "testing.command"
     local shown = command.rapid("info one.ply", { cwd = scene.folder.path })
-    assert.matches('skipped     its 1 elements "face"', shown.stdout, 1, true)
+    assert.matches('note        not read: its 1 elements "face"', shown.stdout, 1, true)
     local json = require "dkjson"
     local reported = json.decode(command.rapid("info one.ply --json", { cwd = scene.folder.path }).stdout)
-    assert.same({ 'its 1 elements "face"' }, reported.left_out)
+    assert.same({ 'not read: its 1 elements "face"' }, reported.left_out)
   end)
 end)

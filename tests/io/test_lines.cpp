@@ -137,7 +137,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
         CHECK(points.column<std::int32_t>("curve")[i] == expected[i].second);
     }
     const std::vector<std::string> reported = skipped.list();
-    CHECK(std::count(reported.begin(), reported.end(), "its 1 closed polygons") == 1);
+    CHECK(std::count(reported.begin(), reported.end(), "not read: its 1 closed polygons") == 1);
 
     std::string wrong = text;
     wrong[text.size() - 2 - 4 - 4 - 1] = 9;  // the last index
@@ -151,7 +151,7 @@ TEST_CASE("polylines of a .bgeo are read in their order, with the number of the 
     const SkippedContents others;
     CHECK(read(wrong).size() == 5);
     const std::vector<std::string> of_others = others.list();
-    CHECK(std::count(of_others.begin(), of_others.end(), "its 3 primitives") == 1);
+    CHECK(std::count(of_others.begin(), of_others.end(), "not read: its 3 primitives") == 1);
 }
 
 TEST_CASE("a .ply has an edge between each two neighbours on a line", "[io][lines]")

@@ -684,7 +684,7 @@ TEST_CASE("what of a file is no point is told", "[scene]")
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")));
     CHECK(read.size() == 3);
-    CHECK(read.warnings() == std::vector<std::string>{"its 1 elements \"face\""});
+    CHECK(read.warnings() == std::vector<std::string>{"not read: its 1 elements \"face\""});
 }
 
 TEST_CASE("a file that can't be read is an error that names it", "[scene]")

@@ -1,7 +1,7 @@
 # rapid_layer(NAME [LIGHT] SOURCE...)
 #
 # A layer of the runtime as an OBJECT library rapid_NAME. It builds alone, and it is linked as a whole, because nodes
-# and formats register themselves and nothing refers to them by name. Sources that include Assimp or OpenVDB, directly
+# and formats register themselves and nothing refers to them by name. Sources that include OpenVDB, directly
 # or through one of our headers, take seconds each. They are compiled separately (rapid_NAME_deferred), with OpenVDB's
 # headers precompiled. They form the part of the library that is loaded on first use (runtime/base/deferred.h). LIGHT:
 # the layer does not iterate over points (RapidPrecompiled.cmake).
@@ -36,7 +36,7 @@ function(rapid_split_deferred with without)
   set(result_with "")
   set(result_without "")
   foreach(source ${ARGN})
-    file(STRINGS ${source} line REGEX "#include (<openvdb/|<assimp/${headers})" LIMIT_COUNT 1)
+    file(STRINGS ${source} line REGEX "#include (<openvdb/${headers})" LIMIT_COUNT 1)
     if(line)
       list(APPEND result_with ${source})
     else()
@@ -100,7 +100,7 @@ endfunction()
 
 function(rapid_link_parts target)
   # The linker takes from the libraries only the symbols that the parts use.
-  target_link_libraries(${target} PRIVATE ${ARGN} OpenVDB::openvdb assimp::assimp PNG::PNG Minizip::Minizip ZLIB::ZLIB
+  target_link_libraries(${target} PRIVATE ${ARGN} OpenVDB::openvdb PNG::PNG Minizip::Minizip ZLIB::ZLIB
     pugixml::pugixml Blosc::blosc Deflate::deflate Xxhash::Xxhash ${CMAKE_DL_LIBS})
   target_link_options(${target} PRIVATE -Wl,--as-needed)
 endfunction()

@@ -4,7 +4,7 @@
 # the package does not depend on them.
 build_packages=(
     ccache cmake g++ graphviz ninja-build
-    libassimp-dev libblosc-dev libboost-dev libcereal-dev libcli11-dev libdeflate-dev libeigen3-dev libfmt-dev
+    libblosc-dev libboost-dev libcereal-dev libcli11-dev libdeflate-dev libeigen3-dev libfmt-dev
     libjs-three libluajit-5.1-dev libminizip-dev
     libopenvdb-dev libpng-dev libpugixml-dev librandom123-dev libseccomp-dev libstb-dev libtbb-dev libxxhash-dev
     nlohmann-json3-dev zlib1g-dev

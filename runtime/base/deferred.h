@@ -1,4 +1,4 @@
-// Functions in the deferred part of the library, which is everything that needs OpenVDB or Assimp. It is a separate
+// Functions in the deferred part of the library, which is everything that needs OpenVDB. It is a separate
 // library (rapid_deferred) that is loaded when one of its functions is first called: resolving OpenVDB's 60,000 symbols
 // takes 40 ms at each start, and many scenes need none of them, namely those without mesh files, .vdb files, and uses
 // of the grid of a level set (baked_level_set.h).
@@ -7,7 +7,7 @@
 //
 //   RAPID_DEFERRED(offset_level_set, LevelSetPtr(const LevelSetPtr& shape, double metres));
 //
-// The definition is in a source that includes OpenVDB or Assimp and so belongs to the deferred part (RapidLayer.cmake):
+// The definition is in a source that includes OpenVDB and so belongs to the deferred part (RapidLayer.cmake):
 //
 //   LevelSetPtr offset(const LevelSetPtr& shape, double metres) { ... }
 //   RAPID_DEFINE(offset_level_set, offset);

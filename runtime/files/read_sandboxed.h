@@ -1,5 +1,5 @@
-// Reads files with libraries that trust them (OpenVDB, Assimp) in a separate process. A damaged or hostile file then
-// ends that process, by a limit or a signal, and becomes an error of that file here.
+// Reads files with a library that trusts them (OpenVDB) in a separate process. A damaged or hostile file then ends that
+// process, by a limit or a signal, and becomes an error of that file here.
 //
 // The process is a copy of this one (fork). Its limits of memory and time depend on the file's size, and memory also on
 // the rest of the --memory budget. The result is returned in shared memory and checked. A file that this process wrote

@@ -151,7 +151,7 @@ kill -9 $pid]], { cwd = folder.path }).stdout
     assert.equal(0, found.status)
   end)
 
-  -- Both are read in the reader process, by OpenVDB and Assimp.
+  -- OpenVDB reads in the reader process.
   it("reads .vdb and meshes as a run without it does, to the bit", function()
     local folder = new_folder([[
 rapid.levelset.sphere { voxel = 0.1 } :write "out/ball.vdb"
@@ -166,21 +166,6 @@ return rapid.create { points = rapid.points.read "two.vdb" } :emit { source = ra
     command.rapid("run inside/scene.lua -f 1-3 --quiet -o out/b.####.csv", { cwd = folder.path })
     assert.equal(folder:read "out/b.0003.csv", folder:read "out/a.0003.csv")
     assert.match("\n10,", folder:read "out/a.0003.csv")
-  end)
-
-  -- Nodes nested 60,000 deep fill Assimp's stack.
-  it("is not ended by a file that crashed the reader", function()
-    local folder = new_folder "return rapid.create {} :emit { source = rapid.mesh.read 'deep.gltf' } :solve {}"
-    local nodes = {}
-    for n = 1, 60000 do nodes[n] = ('{"children":[%d]}'):format(n) end
-    folder:write("inside/deep.gltf", '{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[' ..
-      table.concat(nodes, ",") .. ",{}]}")
-    for _, arguments in ipairs { "", "--untrusted" } do
-      local result = command.rapid("run inside/scene.lua -f 1-3 --quiet " .. arguments, { cwd = folder.path })
-      assert.equal(2, result.status, result.stderr)
-      assert.match("^inside/scene.lua:3: rapid.mesh.read: .*inside/deep.gltf.*: it crashed the reader with signal 11",
-        result.stderr)
-    end
   end)
 
   it("takes its arguments behind -- as well", function()

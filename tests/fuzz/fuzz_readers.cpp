@@ -25,7 +25,6 @@
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/shapes/mesh/gltf_attributes.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
 namespace {
@@ -111,16 +110,20 @@ std::map<std::string, Reader> readers()
 {
     std::map<std::string, Reader> all = {
         {"farm", [](std::string_view input) { rapid::SubmittedJob::read(path_of(input)); }},
-        {"glb", [](std::string_view input) { rapid::read_gltf_attributes(path_of(binary_gltf(input))); }},
-        {"gltf", [](std::string_view input) { rapid::read_gltf_attributes(path_of(input)); }},
+        {"glb", [](std::string_view input) { rapid::read_gltf_mesh(path_of(binary_gltf(input))); }},
+        {"gltf", [](std::string_view input) { rapid::read_gltf_mesh(path_of(input)); }},
         {"log", read_log},
         {"part", [](std::string_view input) { rapid::PartRecord::read(path_of(input)); }},
+        {"obj_mesh", [](std::string_view input) { rapid::read_obj_mesh(path_of(input)); }},
         {"ply_mesh", [](std::string_view input) { rapid::read_ply_mesh(path_of(input)); }},
         {"state", read_state},
+        {"stl", [](std::string_view input) { rapid::read_stl_mesh(path_of(input)); }},
     };
     for (const rapid::Format& format : rapid::formats())
         if (format.read)
             all[format.extension.substr(1)] = [read = format.read](std::string_view input) { read(path_of(input)); };
+    for (const auto& [extension, read] : rapid::point_readers())
+        all[extension.substr(1)] = [read = read](std::string_view input) { read(path_of(input)); };
     return all;
 }
 

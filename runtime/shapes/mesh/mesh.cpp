@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/math/normal_map.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 
 namespace rapid {
@@ -73,13 +74,13 @@ Mesh::Openness Mesh::openness() const
 
 namespace {
 
-void turn_normals(DetailedMesh::Values& values, const Eigen::Matrix3d& normal_map)
+void turn_normals(DetailedMesh::Values& values, const Eigen::Matrix3d& map)
 {
     const auto normals = values.find("N");
     auto* list = normals == values.end() ? nullptr : std::get_if<std::vector<Vec3f>>(&normals->second);
     if (!list) return;
     for (Vec3f& N : *list) {
-        const Vec3d turned = normal_map * N.cast<double>();
+        const Vec3d turned = map * N.cast<double>();
         if (turned.norm() > 0) N = turned.normalized().cast<float>();
     }
 }
@@ -103,14 +104,14 @@ MeshPtr transformed(const MeshPtr& mesh, const Eigen::Affine3d& map)
     const auto turned = details ? std::make_shared<DetailedMesh>(*details) : nullptr;
     const std::shared_ptr<Mesh> moved = turned ? turned : std::make_shared<Mesh>(*mesh);
     for (Vec3f& P : moved->positions) P = (map * P.cast<double>()).cast<float>();
-    const Eigen::Matrix3d normal_map = map.linear().inverse().transpose();
-    turn_normals(moved->values, normal_map);
+    const Eigen::Matrix3d of_normals = normal_map(map.linear());
+    turn_normals(moved->values, of_normals);
     const bool mirrors = map.linear().determinant() < 0;
     if (mirrors)
         for (Mesh::Triangle& t : moved->triangles) std::swap(t[1], t[2]);
     if (turned) {
-        turn_normals(turned->corner_values, normal_map);
-        turn_normals(turned->face_values, normal_map);
+        turn_normals(turned->corner_values, of_normals);
+        turn_normals(turned->face_values, of_normals);
         if (mirrors) swap_corners(turned->corner_values);
     }
     return moved;

@@ -3,10 +3,10 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "runtime/base/deferred.h"
 #include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {
@@ -28,10 +28,26 @@ struct MeshFile {
 // coordinate that is not finite.
 MeshFile read_mesh_file(const std::filesystem::path& path);
 
-// The readers. Their errors do not name the file. The PLY reader validates everything; Assimp, which reads the other
-// formats, trusts the file (read_sandboxed.h).
+// The readers. They validate everything. Their errors do not name the file.
+MeshFile read_gltf_mesh(const std::filesystem::path& path);
+MeshFile read_obj_mesh(const std::filesystem::path& path);
 MeshFile read_ply_mesh(const std::filesystem::path& path);
-RAPID_DEFERRED(import_mesh, MeshFile(const std::filesystem::path& path));
+MeshFile read_stl_mesh(const std::filesystem::path& path);
+
+// Collects the names of the groups that triangles are in.
+class GroupsOfFaces {
+public:
+    // Returns an index for append(). An empty name is no group.
+    std::size_t add_names(std::set<std::string> names);
+    // Puts the triangles up to this count, from the last call's, in the groups of `names`.
+    void append(std::size_t triangles, std::size_t names) { names_of_triangles_.resize(triangles, names); }
+    // Throws Error if the groups do not fit in memory: a file of n names and n triangles needs n² bytes.
+    void add_to(MeshFile& mesh) const;
+
+private:
+    std::vector<std::set<std::string>> names_;
+    std::vector<std::size_t> names_of_triangles_;
+};
 
 // Returns the vertex of each corner. Coincident corners become one vertex; vertices are numbered in file order.
 std::vector<std::int32_t> join_by_position(const std::vector<Vec3f>& positions);

@@ -8,7 +8,8 @@
 #include <unordered_map>
 
 #include "runtime/base/error.h"
-#include "runtime/files/read_sandboxed.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/files/input_file.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
 #include "runtime/shapes/mesh/mesh_file.h"
 
@@ -21,79 +22,12 @@ std::string lower_case(std::string text)
     return text;
 }
 
-using NamedValues = std::map<std::string, Mesh::VertexValues>;
-
-void send_values(const NamedValues& values, MessageWriter& message)
-{
-    message.put(values.size());
-    for (const auto& [name, any] : values) {
-        message.put_text(name);
-        message.put<std::uint8_t>(static_cast<std::uint8_t>(any.index()));
-        std::visit([&]<class T>(const std::vector<T>& list) { message.put_array(std::span<const T>(list)); }, any);
-    }
-}
-
-NamedValues receive_values(MessageReader& message, std::size_t size)
-{
-    NamedValues values;
-    for (auto left = message.take<std::size_t>(); left > 0; --left) {
-        const std::string name = message.take_text();
-        if (message.take<std::uint8_t>() == 0)
-            values[name] = message.take_vector<float>(size);
-        else
-            values[name] = message.take_vector<Vec3f>(size);
-    }
-    return values;
-}
-
-void send_mesh(const MeshFile& mesh, MessageWriter& message)
-{
-    for (const std::size_t count : {mesh.positions.size(), mesh.colours.size(), mesh.triangles.size()})
-        message.put(count);
-    message.put_array(std::span(mesh.positions));
-    message.put_array(std::span(mesh.colours));
-    message.put_array(std::span(mesh.alphas));
-    message.put_array(std::span(mesh.triangles));
-    send_values(mesh.values, message);
-    send_values(mesh.face_values, message);
-    message.put(mesh.face_groups.size());
-    for (const auto& [name, members] : mesh.face_groups) {
-        message.put_text(name);
-        message.put_array(std::span(members));
-    }
-    message.put(mesh.skipped.size());
-    for (const std::string& what : mesh.skipped) message.put_text(what);
-}
-
-MeshFile receive_mesh(MessageReader& message)
-{
-    const auto positions = message.take<std::size_t>(), colours = message.take<std::size_t>(),
-               triangles = message.take<std::size_t>();
-    if (colours != 0 && colours != positions) throw Error("the reader failed, so it must be damaged");
-    MeshFile mesh;
-    mesh.positions = message.take_vector<Vec3f>(positions);
-    mesh.colours = message.take_vector<Vec3f>(colours);
-    mesh.alphas = message.take_vector<float>(colours);
-    mesh.triangles = message.take_vector<Mesh::Triangle>(triangles);
-    mesh.values = receive_values(message, positions);
-    mesh.face_values = receive_values(message, triangles);
-    for (auto left = message.take<std::size_t>(); left > 0; --left) {
-        const std::string name = message.take_text();
-        mesh.face_groups[name] = message.take_vector<std::uint8_t>(triangles);
-    }
-    for (auto left = message.take<std::size_t>(); left > 0; --left) mesh.skipped.push_back(message.take_text());
-    return mesh;
-}
-
-const SandboxedReader<MeshFile> importer(
-    "mesh", [](const std::filesystem::path& path, const std::string&) { return import_mesh(path); }, send_mesh,
-    receive_mesh);
-
 MeshFile read_any(const std::filesystem::path& path, const std::string& extension)
 {
+    if (extension == ".obj") return read_obj_mesh(path);
     if (extension == ".ply") return read_ply_mesh(path);
-    DeferredFunctions::find("import_mesh");  // loads the library once, instead of in each process that reads a file
-    return importer(path);
+    if (extension == ".stl") return read_stl_mesh(path);
+    return read_gltf_mesh(path);
 }
 
 void check(const MeshFile& file)
@@ -126,12 +60,32 @@ std::vector<T> selected(const std::vector<T>& values, const std::vector<std::siz
 
 }  // namespace
 
+std::size_t GroupsOfFaces::add_names(std::set<std::string> names)
+{
+    names.erase("");
+    names_.push_back(std::move(names));
+    return names_.size() - 1;
+}
+
+void GroupsOfFaces::add_to(MeshFile& mesh) const
+{
+    const std::size_t triangles = mesh.triangles.size();
+    std::set<std::string> all;
+    for (const std::set<std::string>& names : names_) all.insert(names.begin(), names.end());
+    const double bytes = static_cast<double>(all.size()) * static_cast<double>(triangles);
+    if (!fits_in_memory(bytes))
+        throw memory_exceeded(fmt::format("{} groups of {} triangles", all.size(), triangles), bytes, "split the file");
+    for (const std::string& name : all) mesh.face_groups[name].assign(triangles, 0);
+    for (std::size_t f = 0; f < triangles; ++f)
+        for (const std::string& name : names_[names_of_triangles_[f]]) mesh.face_groups[name][f] = 1;
+}
+
 MeshFile read_mesh_file(const std::filesystem::path& path)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no mesh file \"{}\"", path.string()));
     static const std::vector<std::string> extensions{".obj", ".ply", ".stl", ".gltf", ".glb"};
-    const std::string extension = lower_case(path.extension().string());
+    const std::string extension = lower_case(without_gz(path).extension().string());
     if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
         throw Error(
             fmt::format("\"{}\" can't be read as a mesh; it must be .obj, .ply, .stl, .gltf or .glb", path.string()));

@@ -159,7 +159,7 @@ describe("what is born on a mesh of a glTF file", function()
       for i = 1, #points do
         local p = points[i]
         local b, c = p.P.x, -p.P.z
-        -- glTF counts v downwards, Assimp upwards.
+        -- glTF counts v downwards, Rapid upwards.
         assert.near(b, p.uv.x, 1e-5)
         assert.near({0, 1, 0}, p.N, 1e-6)
         assert.near({1 - b - c, b, c}, p.Cd, 1e-5)

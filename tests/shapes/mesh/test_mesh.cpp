@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <array>
 #include <bit>
 #include <cmath>
@@ -325,29 +323,7 @@ TEST_CASE("files that are not meshes are refused with their name and the fault",
                Equals("cannot read the mesh \"broken.ply\": not a valid PLY file: line 2 of its header can't be "
                       "understood"));
     CHECK_THAT(refusal("broken.glb", "this is no header\n"),
-               Catch::Matchers::StartsWith("cannot read the mesh \"broken.glb\": ") &&
-                   Catch::Matchers::EndsWith("; it must be an OBJ, STL or glTF file"));
-}
-
-TEST_CASE("a small file of parts without number is refused for its memory or its time", "[mesh][read]")
-{
-    // Each node has the next one twice, which gives 2^40 copies of the mesh.
-    std::string nodes;
-    for (int k = 1; k <= 40; ++k) nodes += fmt::format("{{\"children\": [{0}, {0}]}}, ", k);
-    const TemporaryFolder folder;
-    const auto path = folder.write("doubled.gltf", R"({"asset": {"version": "2.0"}, "scene": 0,
-        "scenes": [{"nodes": [0]}], "nodes": [)" + nodes +
-                                                       R"({"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)" +
-                                                       std::string(48, 'A') + "\"}]}");
-    // The address sanitizer maps more than any limit, so there the time limit ends the reader.
-    using Catch::Matchers::Contains;
-    CHECK_THAT(test::error_of([&] { read_mesh(path); }),
-               Contains("it needs more than 1024 MB of memory, so it must be damaged") ||
-                   Contains("it takes longer than 5 s to read, so it must be damaged"));
+               Catch::Matchers::StartsWith("cannot read the mesh \"broken.glb\": its JSON is damaged: "));
 }
 
 TEST_CASE("a scanned mesh and an animated one are read as their makers describe them", "[mesh][read]")

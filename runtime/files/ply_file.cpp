@@ -71,15 +71,40 @@ std::size_t PlyElement::stride() const
 
 PlyFile::PlyFile(std::string_view text) : text_(text) { read_header(); }
 
+PlyElement PlyElement::without_lists() const
+{
+    PlyElement scalars{name, count, {}};
+    for (const PlyProperty& property : properties)
+        if (!property.list) scalars.properties.push_back(property);
+    return scalars;
+}
+
+double colour_scale(ScalarType type)
+{
+    if (is_floating(type)) return 1;
+    return 1.0 / (type == ScalarType::UInt16 ? 65535 : 255);
+}
+
+// Throws Error if the header ends before a line does.
+std::string_view PlyFile::take_line(std::string_view line_end)
+{
+    const std::size_t end = text_.find(line_end, at_);
+    if (end == std::string_view::npos) throw Error("not a valid PLY file: its header has no \"end_header\"");
+    const std::string_view line = text_.substr(at_, end - at_);
+    at_ = end + line_end.size();
+    return line;
+}
+
 void PlyFile::read_header()
 {
     if (!text_.starts_with("ply")) throw Error("not a PLY file: it does not begin with \"ply\"");
+    // The first line shows how lines end. The data may begin with any byte, such as one that looks like a newline.
+    const std::size_t first_end = std::min(text_.find_first_of("\r\n"), text_.size());
+    const std::string_view line_end =
+        text_.substr(first_end, 1) == "\r" && text_.substr(first_end, 2) != "\r\n" ? "\r" : "\n";
     bool formatted = false;
     for (int line = 1;; ++line) {
-        const std::size_t end = text_.find('\n', at_);
-        if (end == std::string_view::npos) throw Error("not a valid PLY file: its header has no \"end_header\"");
-        const std::vector<std::string> words = split(text_.substr(at_, end - at_));
-        at_ = end + 1;
+        const std::vector<std::string> words = split(take_line(line_end));
         if (words.empty() || words[0] == "ply" || words[0] == "comment" || words[0] == "obj_info") continue;
         if (words[0] == "end_header") break;
         formatted |= words[0] == "format";
@@ -121,9 +146,10 @@ void PlyFile::read_line(const std::vector<std::string>& words)
 void PlyFile::check_promise(const PlyElement& element) const
 {
     if (element.properties.empty()) return;
-    // In an ascii file a number takes at least a digit and a separator.
-    const std::size_t row = encoding_ == Encoding::Ascii ? 2 * element.properties.size() : element.stride();
-    const std::size_t held = (text_.size() - at_) / row;
+    // In an ascii file a number takes at least a digit and a separator, which the last one may lack.
+    const bool ascii = encoding_ == Encoding::Ascii;
+    const std::size_t row = ascii ? 2 * element.properties.size() : element.stride();
+    const std::size_t held = (text_.size() - at_ + ascii) / row;
     if (element.count > held)
         throw Error(
             fmt::format("the file ends early: its header announces {} of the element \"{}\", but it contains {}{}",
@@ -139,13 +165,12 @@ double PlyFile::parse_number(const PlyElement& element, std::size_t row, const P
     const char* const from = text_.data() + at_;
     const char* const end = text_.data() + text_.size();
     double number = 0;
-    const auto parsed = std::from_chars(from, end, number);
+    const auto parsed = rapid::parse_number(from, end, number);
     if (parsed.ec != std::errc())
         throw wrong(fmt::format("{} is missing; the file ends early or is damaged", property.name));
-    if (parsed.ptr == end)
-        throw wrong(fmt::format("the file ends with the number {} and may be cut off within it", property.name));
+    ends_within_number_ = parsed.ptr == end;
     const std::string_view word(from, static_cast<std::size_t>(parsed.ptr - from));
-    if (white_space.find(*parsed.ptr) == std::string_view::npos || !is_of(type, number))
+    if ((parsed.ptr != end && white_space.find(*parsed.ptr) == std::string_view::npos) || !is_of(type, number))
         throw wrong(fmt::format("{} = {} is not a number of its type", property.name,
                                 text_.substr(at_, std::max<std::size_t>(word.size(), 1))));
     at_ += word.size();
@@ -166,23 +191,49 @@ double PlyFile::take_number(const PlyElement& element, std::size_t row, const Pl
 PlyRecords PlyFile::read_records(const PlyElement& element)
 {
     check_promise(element);
-    PlyRecords records{{}, element.stride(), order(), {}};
-    if (encoding_ != Encoding::Ascii) {
+    PlyRecords records{{}, element.without_lists().stride(), order(), {}};
+    if (encoding_ != Encoding::Ascii && !element.has_lists()) {
         records.bytes = {reinterpret_cast<const unsigned char*>(text_.data() + at_), element.count * records.stride};
         at_ += records.bytes.size();
         return records;
     }
+    records.order = ByteOrder::Little;
     records.parsed.resize(element.count * records.stride);
     unsigned char* to = records.parsed.data();
     for (std::size_t row = 0; row < element.count; ++row)
-        for (const PlyProperty& property : element.properties)
+        for (const PlyProperty& property : element.properties) {
+            if (property.list) {
+                skip_list(element, row, property, take_count(element, row, property));
+                continue;
+            }
             with_scalar(property.type, [&](auto like) {
-                const auto number = static_cast<decltype(like)>(parse_number(element, row, property, property.type));
+                const auto number = static_cast<decltype(like)>(take_number(element, row, property, property.type));
                 std::memcpy(to, &number, sizeof number);
                 to += sizeof number;
             });
+        }
     records.bytes = records.parsed;
     return records;
+}
+
+// Reads the length of a list. Throws Error if the file can't hold as many numbers.
+std::size_t PlyFile::take_count(const PlyElement& element, std::size_t row, const PlyProperty& list)
+{
+    const double count = take_number(element, row, list, list.count_type);
+    const bool ascii = encoding_ == Encoding::Ascii;
+    const std::size_t least = ascii ? 2 : scalar_bytes(list.type);
+    if (!(count >= 0 && count <= static_cast<double>((text_.size() - at_ + ascii) / least)))
+        throw Error(fmt::format("{} {} of {}: a list of {} numbers is longer than the file", element.name, row,
+                                element.count, count));
+    return static_cast<std::size_t>(count);
+}
+
+void PlyFile::skip_list(const PlyElement& element, std::size_t row, const PlyProperty& list, std::size_t count)
+{
+    if (encoding_ != Encoding::Ascii)
+        at_ += count * scalar_bytes(list.type);
+    else
+        for (; count > 0; --count) parse_number(element, row, list, list.type);
 }
 
 void PlyFile::read_lists(const PlyElement& element, std::size_t selected,
@@ -198,22 +249,18 @@ void PlyFile::read_lists(const PlyElement& element, std::size_t selected,
     for (std::size_t i = 0; i < element.count; ++i) {
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
             const PlyProperty& property = element.properties[p];
-            double count = 1;
-            if (property.list) count = take_number(element, i, property, property.count_type);
-            const std::size_t least = encoding_ == Encoding::Ascii ? 2 : scalar_bytes(property.type);
-            if (property.list && !(count >= 0 && count <= static_cast<double>((text_.size() - at_) / least)))
-                throw Error(fmt::format("{} {} of {}: a list of {} numbers is longer than the file", element.name, i,
-                                        element.count, count));
-            if (p == selected) list.clear();
-            if (property.list && p != selected && encoding_ != Encoding::Ascii) {
-                at_ += static_cast<std::size_t>(count) * scalar_bytes(property.type);
+            if (!property.list) {
+                numbers_[p] = take_number(element, i, property, property.type);
                 continue;
             }
-            for (auto left = static_cast<std::size_t>(count); left > 0; --left) {
-                const double number = take_number(element, i, property, property.type);
-                numbers_[p] = number;
-                if (p == selected) list.push_back(static_cast<std::int64_t>(number));
+            const std::size_t count = take_count(element, i, property);
+            if (p != selected) {
+                skip_list(element, i, property, count);
+                continue;
             }
+            list.clear();
+            for (std::size_t k = 0; k < count; ++k)
+                list.push_back(static_cast<std::int64_t>(take_number(element, i, property, property.type)));
         }
         if (selected < element.properties.size()) row(list);
     }

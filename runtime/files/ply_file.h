@@ -28,9 +28,14 @@ struct PlyElement {
 
     bool has_lists() const;
     std::size_t stride() const;  // bytes of its scalar properties and of the counts of its lists
+    PlyElement without_lists() const;
 };
 
-// The rows of an element without lists.
+// Returns the factor for a colour that is stored as an integer: 1 for the largest value of 16 unsigned bits, or for
+// 255, which other integers hold as well.
+double colour_scale(ScalarType type);
+
+// The rows of an element, without its lists.
 struct PlyRecords {
     std::span<const unsigned char> bytes;
     std::size_t stride;
@@ -44,9 +49,11 @@ public:
     explicit PlyFile(std::string_view text);
 
     const std::vector<PlyElement>& elements() const { return elements_; }
+    // Returns true if the file ends with a number that may be cut short, because no newline follows it.
+    bool ends_within_number() const { return ends_within_number_; }
 
     // Elements must be read or skipped in order, all of them, because a file may be truncated in its last one.
-    PlyRecords read_records(const PlyElement& element);
+    PlyRecords read_records(const PlyElement& element);  // skips lists
     void read_lists(const PlyElement& element, std::size_t property,
                     const std::function<void(std::span<const std::int64_t> list)>& row);
     // Returns a scalar property of the row whose list is being passed to `row`.
@@ -57,14 +64,18 @@ private:
     enum class Encoding { Ascii, Little, Big };
 
     void read_header();
+    std::string_view take_line(std::string_view line_end);
     void read_line(const std::vector<std::string>& words);
     ByteOrder order() const { return encoding_ == Encoding::Big ? ByteOrder::Big : ByteOrder::Little; }
     void check_promise(const PlyElement& element) const;
+    std::size_t take_count(const PlyElement& element, std::size_t row, const PlyProperty& list);
+    void skip_list(const PlyElement& element, std::size_t row, const PlyProperty& list, std::size_t count);
     double parse_number(const PlyElement& element, std::size_t row, const PlyProperty& property, ScalarType type);
     double take_number(const PlyElement& element, std::size_t row, const PlyProperty& property, ScalarType type);
 
     std::string_view text_;
     std::size_t at_ = 0;
+    bool ends_within_number_ = false;
     Encoding encoding_ = Encoding::Ascii;
     std::vector<PlyElement> elements_;
     std::vector<double> numbers_;  // of the current row in read_lists()

@@ -4,7 +4,7 @@
 // a quaternion also NAMEw. Integers are int (an int64 that does not fit is refused). A group is uchar group_NAME. Lines
 // (points/point_lines.h) are elements "edge" with vertex1 and vertex2.
 //
-// Reads any PLY whose vertices have no lists (files/ply_file.h). red green blue become Cd.
+// Reads any PLY (files/ply_file.h). red green blue become Cd, and alpha becomes Alpha. Lists are skipped.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -95,14 +95,21 @@ void write_ply(OutputFile& file, const PointSet& given, const FrameInfo&)
 // Returns Rapid's name for a property. The components of an attribute share a stem.
 std::string rapid_name(const std::string& property)
 {
-    static const std::map<std::string, std::string> known = {{"x", "Px"},    {"y", "Py"},      {"z", "Pz"},
-                                                             {"nx", "Nx"},   {"ny", "Ny"},     {"nz", "Nz"},
-                                                             {"red", "Cdx"}, {"green", "Cdy"}, {"blue", "Cdz"}};
+    static const std::map<std::string, std::string> known = {
+        {"x", "Px"},  {"y", "Py"},    {"z", "Pz"},      {"nx", "Nx"},    {"ny", "Ny"},
+        {"nz", "Nz"}, {"red", "Cdx"}, {"green", "Cdy"}, {"blue", "Cdz"}, {"alpha", "Alpha"}};
     const auto found = known.find(property);
     return found == known.end() ? property : found->second;
 }
 
-std::vector<RecordAttribute> attributes_of(const PlyElement& vertex)
+bool is_membership(const Records& records, std::size_t offset)
+{
+    for (std::size_t i = 0; i < records.points; ++i)
+        if (records.bytes[i * records.stride + offset] > 1) return false;
+    return true;
+}
+
+std::vector<RecordAttribute> attributes_of(const PlyElement& vertex, const Records& records)
 {
     std::vector<std::string> names;
     std::vector<std::size_t> offsets;
@@ -117,17 +124,18 @@ std::vector<RecordAttribute> attributes_of(const PlyElement& vertex)
         const PlyProperty& first = vertex.properties[joined.columns[0]];
         const bool one_type = std::all_of(joined.columns.begin(), joined.columns.end(),
                                           [&](std::size_t c) { return vertex.properties[c].type == first.type; });
-        const bool colour = joined.name == "Cd" && first.type == ScalarType::UInt8;
-        if (joined.columns.size() == 1 && first.name.starts_with(group_prefix) && first.type == ScalarType::UInt8) {
-            attributes.push_back(
-                {first.name.substr(group_prefix.size()), first.type, {offsets[joined.columns[0]]}, true});
-        } else if (one_type && (joined.columns.size() == 1 || first.type == ScalarType::Float ||
-                                first.type == ScalarType::Double || colour)) {
+        const bool colour = first.name == "red" || first.name == "alpha";
+        if (one_type && (joined.columns.size() == 1 || first.type == ScalarType::Float ||
+                         first.type == ScalarType::Double || colour)) {
             RecordAttribute& attribute = attributes.emplace_back();
             attribute.name = joined.name;
             attribute.type = first.type;
-            attribute.scale = colour ? 1.0 / 255 : 1;
+            attribute.scale = colour ? colour_scale(first.type) : 1;
             for (const std::size_t c : joined.columns) attribute.offsets.push_back(offsets[c]);
+            // Other programs number groups: only a number that is 0 or 1 for all points is a group of Rapid.
+            attribute.group = first.name.starts_with(group_prefix) && first.type == ScalarType::UInt8 &&
+                              is_membership(records, attribute.offsets[0]);
+            if (attribute.group) attribute.name.erase(0, group_prefix.size());
         } else {
             for (const std::size_t c : joined.columns)
                 attributes.push_back({vertex.properties[c].name, vertex.properties[c].type, {offsets[c]}});
@@ -136,18 +144,21 @@ std::vector<RecordAttribute> attributes_of(const PlyElement& vertex)
     return attributes;
 }
 
-PointSet read_vertices(PlyFile& file, const PlyElement& vertex)
+PointSet read_vertices(PlyFile& file, const PlyElement& element)
 {
-    if (vertex.has_lists()) throw Error("vertices with list properties can't be read");
+    const PlyElement vertex = element.without_lists();
     std::vector<std::string> names;
     for (const PlyProperty& property : vertex.properties) names.push_back(property.name);
     check_column_names(names, "");
-    const std::vector<RecordAttribute> attributes = attributes_of(vertex);
+    for (const PlyProperty& property : element.properties)
+        if (property.list) SkippedContents::add(fmt::format("the list \"{}\" of its vertices", property.name));
+    const PlyRecords rows = file.read_records(element);
+    const Records records{rows.bytes, vertex.count, rows.stride, rows.order};
+    const std::vector<RecordAttribute> attributes = attributes_of(vertex, records);
     const bool placed = std::any_of(attributes.begin(), attributes.end(),
                                     [](const RecordAttribute& a) { return a.name == "P" && a.offsets.size() == 3; });
     if (!placed) throw Error("the vertices have no x y z");
-    const PlyRecords records = file.read_records(vertex);
-    return read_records({records.bytes, vertex.count, records.stride, records.order}, attributes);
+    return read_records(records, attributes);
 }
 
 PointSet read_ply(const std::filesystem::path& path)
@@ -162,6 +173,7 @@ PointSet read_ply(const std::filesystem::path& path)
             file.pass_over(element);
     }
     if (!points) throw Error("the PLY file has no element \"vertex\"");
+    if (file.ends_within_number()) SkippedContents::note(no_last_newline);
     const bool has_trails = points->find_group(trail_places_group) != nullptr;  // the points define the trails
     for (const PlyElement& element : file.elements())
         if (element.name != "vertex" && element.count > 0 && !(has_trails && element.name == "edge"))

@@ -1,7 +1,7 @@
 // Reads meshes from PLY files. The element "vertex" has x y z, optionally red green blue (alpha), and any other
 // numbers: nx ny nz becomes N, NAMEx NAMEy NAMEz a vec3, the rest floats. The element "face" has a list of indices,
-// vertex_indices or vertex_index; its numbers are read in the same way, and uchar group_NAME is a group of faces. Other
-// lists of faces and other elements are ignored.
+// vertex_indices or vertex_index; its numbers are read in the same way, and uchar group_NAME is a group of faces if it
+// is 0 or 1. The element "tristrips" has lists of strips, which end with -1. Other lists and elements are ignored.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,16 +18,14 @@
 namespace rapid {
 namespace {
 
-// A column of the vertices, as floats. Integer colours are divided by the largest value of their type.
+// A column of the vertices, as floats.
 class Property {
 public:
     Property() = default;  // reads as missing
     Property(const PlyProperty& property, std::size_t offset, const PlyRecords& records, bool colour)
         : records_(&records), offset_(offset), type_(property.type)
     {
-        if (colour && !is_floating(type_))
-            scale_ = with_scalar(
-                type_, [](auto like) { return 1 / static_cast<double>(std::numeric_limits<decltype(like)>::max()); });
+        if (colour) scale_ = colour_scale(type_);
     }
 
     explicit operator bool() const { return records_ != nullptr; }
@@ -120,12 +118,14 @@ void read_values(const PlyElement& vertex, const Properties& values_of, MeshFile
     }
 }
 
-void read_vertices(PlyFile& file, const PlyElement& vertex, MeshFile& mesh)
+void read_vertices(PlyFile& file, const PlyElement& element, MeshFile& mesh)
 {
-    if (vertex.has_lists()) throw Error("vertices with list properties can't be read");
+    const PlyElement vertex = element.without_lists();
+    for (const PlyProperty& property : element.properties)
+        if (property.list) add_skipped(mesh.skipped, fmt::format("the list \"{}\" of its vertices", property.name));
     if (vertex.count > std::numeric_limits<std::int32_t>::max())
         throw Error(fmt::format("{} vertices are too many for a mesh", vertex.count));
-    const PlyRecords records = file.read_records(vertex);
+    const PlyRecords records = file.read_records(element);
     const Properties properties(vertex, records);
     const Property x = properties.find("x"), y = properties.find("y"), z = properties.find("z");
     if (!x || !y || !z) throw Error("the vertices have no x y z");
@@ -164,12 +164,9 @@ public:
             const PlyProperty& property = numbers[k];
             if (property.name == "red" && k + 2 < numbers.size() && numbers[k + 1].name == "green" &&
                 numbers[k + 2].name == "blue") {
-                const bool whole = !is_floating(property.type);
                 add("Cd", {property_indices[k], property_indices[k + 1], property_indices[k + 2]},
-                    whole ? 1.0 / 255 : 1);
+                    colour_scale(property.type));
                 k += 2;
-            } else if (property.type == ScalarType::UInt8 && property.name.starts_with(group_prefix)) {
-                groups_.push_back({&mesh.face_groups[property.name.substr(group_prefix.size())], property_indices[k]});
             } else if (const std::string name = vec3_name(numbers, k); !name.empty()) {
                 add(name, {property_indices[k], property_indices[k + 1], property_indices[k + 2]}, 1);
                 k += 2;
@@ -193,8 +190,21 @@ public:
                     .insert(std::get<std::vector<Vec3f>>(*part.values).end(), triangles,
                             Vec3f(number(0), number(1), number(2)));
         }
-        for (const auto& [members, index] : groups_)
-            members->insert(members->end(), triangles, file.number_of_row(index) != 0);
+    }
+
+    // Turns numbers of groups that are 0 or 1 into groups. Those of other programs may be indices.
+    void finish(const PlyElement& face)
+    {
+        for (const PlyProperty& property : face.properties) {
+            const auto found = mesh_.face_values.find(property.name);
+            if (property.type != ScalarType::UInt8 || !property.name.starts_with(group_prefix) ||
+                found == mesh_.face_values.end())
+                continue;
+            const auto& numbers = std::get<std::vector<float>>(found->second);
+            if (std::any_of(numbers.begin(), numbers.end(), [](float number) { return number > 1; })) continue;
+            mesh_.face_groups[property.name.substr(group_prefix.size())].assign(numbers.begin(), numbers.end());
+            mesh_.face_values.erase(found);
+        }
     }
 
 private:
@@ -212,19 +222,26 @@ private:
 
     MeshFile& mesh_;
     std::vector<Part> parts_;
-    std::vector<std::pair<std::vector<std::uint8_t>*, std::size_t>> groups_;
 };
+
+// Returns the property that holds the vertices of faces.
+std::size_t index_list(const PlyElement& faces)
+{
+    const auto indices = std::find_if(faces.properties.begin(), faces.properties.end(), [](const PlyProperty& p) {
+        return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
+    });
+    if (indices == faces.properties.end())
+        throw Error(fmt::format("the {} have no list vertex_indices",
+                                faces.name == "face" ? std::string("faces") : faces.name));
+    return static_cast<std::size_t>(indices - faces.properties.begin());
+}
 
 void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
 {
-    const auto indices = std::find_if(face.properties.begin(), face.properties.end(), [](const PlyProperty& p) {
-        return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
-    });
-    if (indices == face.properties.end()) throw Error("the faces have no list vertex_indices");
     const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
     std::size_t row = 0;
     std::vector<std::int32_t> corners;
-    const auto index = static_cast<std::size_t>(indices - face.properties.begin());
+    const std::size_t index = index_list(face);
     FaceValues values(face, index, mesh);
     PolygonCutter cutter;
     file.read_lists(face, index, [&](std::span<const std::int64_t> list) {
@@ -242,12 +259,37 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
         values.append(file, mesh.triangles.size() - before);
         ++row;
     });
+    values.finish(face);
+}
+
+// Appends the triangles of strips. Every second one is turned.
+void read_strips(PlyFile& file, const PlyElement& strips, MeshFile& mesh)
+{
+    const std::size_t indices = index_list(strips);
+    const auto vertices = static_cast<std::int64_t>(mesh.positions.size());
+    file.read_lists(strips, indices, [&](std::span<const std::int64_t> list) {
+        std::size_t first = 0;  // of the current strip
+        for (std::size_t k = 0; k < list.size(); ++k) {
+            if (list[k] == -1) {
+                first = k + 1;
+                continue;
+            }
+            if (list[k] < 0 || list[k] >= vertices)
+                throw Error(fmt::format("a strip has the vertex {}; there are {}, from 0", list[k], vertices));
+            if (k < first + 2) continue;
+            const auto corner = [&](std::size_t back) { return static_cast<std::int32_t>(list[k - back]); };
+            if ((k - first) % 2 == 0)
+                mesh.triangles.emplace_back(corner(2), corner(1), corner(0));
+            else
+                mesh.triangles.emplace_back(corner(1), corner(2), corner(0));
+        }
+    });
 }
 
 void skip_others(const std::vector<PlyElement>& elements, MeshFile& mesh)
 {
     for (const PlyElement& element : elements)
-        if (element.name != "vertex" && element.name != "face" && element.count > 0)
+        if (element.name != "vertex" && element.name != "face" && element.name != "tristrips" && element.count > 0)
             add_skipped(mesh.skipped, fmt::format("the {} elements \"{}\"", element.count, element.name));
 }
 
@@ -267,11 +309,15 @@ MeshFile read_ply_mesh(const std::filesystem::path& path)
             if (!has_vertices) throw Error("the faces come before the vertices");
             read_faces(file, element, mesh);
             has_faces = true;
+        } else if (element.name == "tristrips" && !has_faces && has_vertices) {
+            read_strips(file, element, mesh);
+            has_faces = true;
         } else {
             file.pass_over(element);
         }
     }
     if (has_faces) skip_others(file.elements(), mesh);
+    if (file.ends_within_number()) add_note(mesh.skipped, no_last_newline);
     return mesh;
 }
 

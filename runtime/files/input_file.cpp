@@ -4,9 +4,13 @@
 #include <sys/stat.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
+#include <limits>
+#include <new>
 
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/file_error.h"
@@ -77,6 +81,59 @@ InputFile::InputFile(const std::filesystem::path& path)
     tbb::parallel_for(std::size_t{0}, (size_ + block - 1) / block, [&](std::size_t i) {
         read_block(file.descriptor.number(), bytes_.get(), i * block, std::min(size_, (i + 1) * block));
     });
+    constexpr unsigned char gzip_mark[] = {0x1f, 0x8b, 8};
+    if (size_ >= sizeof gzip_mark && std::memcmp(bytes_.get(), gzip_mark, sizeof gzip_mark) == 0) expand();
+}
+
+// Expands the members of a gzip file (RFC 1952), one after the other.
+void InputFile::expand()
+{
+    struct Stream : z_stream {
+        Stream() : z_stream{}
+        {
+            constexpr int gzip = 16;
+            if (::inflateInit2(this, MAX_WBITS + gzip) != Z_OK) throw std::bad_alloc();
+        }
+        ~Stream() { ::inflateEnd(this); }
+    } stream;
+    constexpr std::size_t most = std::numeric_limits<uInt>::max() / 2;  // per call of zlib
+    std::size_t used = 0, expanded = 0, room = 0;
+    std::unique_ptr<unsigned char[]> to;
+    for (;;) {
+        if (expanded == room) {
+            const std::size_t more = std::max<std::size_t>(4 * size_, 2 * room);
+            if (!fits_in_memory(static_cast<double>(more)))
+                throw memory_exceeded("the file, which is compressed,", static_cast<double>(more),
+                                      "read a smaller file");
+            auto larger = std::make_unique_for_overwrite<unsigned char[]>(more);
+            if (expanded > 0) std::memcpy(larger.get(), to.get(), expanded);
+            to = std::move(larger);
+            room = more;
+        }
+        stream.next_in = bytes_.get() + used;
+        stream.avail_in = static_cast<uInt>(std::min(size_ - used, most));
+        stream.next_out = to.get() + expanded;
+        stream.avail_out = static_cast<uInt>(std::min(room - expanded, most));
+        const int result = ::inflate(&stream, Z_NO_FLUSH);
+        used = static_cast<std::size_t>(stream.next_in - bytes_.get());
+        expanded = static_cast<std::size_t>(stream.next_out - to.get());
+        if (result == Z_MEM_ERROR) throw std::bad_alloc();
+        if (result == Z_STREAM_END) {
+            if (used == size_) break;
+            ::inflateReset(&stream);
+        } else if (result != Z_OK && result != Z_BUF_ERROR) {
+            throw Error("can't be read: its compressed data is damaged");
+        } else if (used == size_ && expanded < room) {
+            throw Error("can't be read: its compressed data ends early");
+        }
+    }
+    bytes_ = std::move(to);
+    size_ = expanded;
+}
+
+std::filesystem::path without_gz(const std::filesystem::path& path)
+{
+    return path.extension() == ".gz" || path.extension() == ".GZ" ? path.parent_path() / path.stem() : path;
 }
 
 std::size_t check_readable(const std::filesystem::path& path) { return open_regular(path).bytes; }

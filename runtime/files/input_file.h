@@ -1,4 +1,5 @@
-// A whole file read into memory. Unlike a mapped file, it stays intact if another process truncates it.
+// A whole file read into memory, and expanded if gzip compressed it. Unlike a mapped file, it stays intact if another
+// process truncates it.
 #pragma once
 
 #include <cstddef>
@@ -24,9 +25,14 @@ public:
     std::string_view text() const;
 
 private:
+    void expand();
+
     std::unique_ptr<unsigned char[]> bytes_;
     std::size_t size_ = 0;
 };
+
+// Returns the name of a compressed file without its last extension: cloud.bgeo of cloud.bgeo.gz.
+std::filesystem::path without_gz(const std::filesystem::path& path);
 
 // Returns the size of a file, for a library that opens files itself. Throws Error like the constructor of InputFile.
 std::size_t check_readable(const std::filesystem::path& path);

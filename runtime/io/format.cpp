@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <type_traits>
+#include <variant>
+#include <vector>
 
+#include "runtime/files/input_file.h"
 #include "runtime/io/text_table.h"
 
 namespace rapid {
@@ -15,12 +19,49 @@ std::vector<Format>& registry()
     return formats;
 }
 
+std::map<std::string, ReadPoints>& reader_registry()
+{
+    static std::map<std::string, ReadPoints> readers;
+    return readers;
+}
+
 std::string lower_extension(const std::filesystem::path& path)
 {
     std::string extension = path.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
     return extension;
+}
+
+// Makes numbers of Rapid's own names floats: other programs write whole ones as integers.
+void take_floats(PointSet& points)
+{
+    for (const char* name : {"age", "life", "pscale", "mass", "Alpha"}) {
+        const AnyColumn* column = points.find(name);
+        if (!column) continue;
+        std::visit(
+            [&]<class T>(const Column<T>& numbers) {
+                if constexpr (std::is_integral_v<T>) {
+                    std::vector<float> floats(points.size());
+                    for (std::size_t i = 0; i < floats.size(); ++i) floats[i] = static_cast<float>(numbers[i]);
+                    points.set(name, Column<float>(std::span<const float>(floats)));
+                }
+            },
+            *column);
+    }
+}
+
+// Makes the velocity of another program v, unless the file has that.
+void take_velocity(PointSet& points)
+{
+    const Column<Vec3f>* v = points.find<Vec3f>("v");
+    if (!v || (!v->is_uniform() && !points.empty()) || (!points.empty() && !(*v)[0].isZero(0))) return;
+    for (const char* name : {"velocity", "Velocity"})
+        if (const auto* velocity = points.find<Vec3f>(name)) {
+            points.v() = *velocity;
+            points.remove(name);
+            return;
+        }
 }
 
 // Throws Error if P, v or id of a file has another type than Rapid's.
@@ -43,6 +84,13 @@ FormatRegistration::FormatRegistration(Format format)
 
 const std::vector<Format>& formats() { return registry(); }
 
+PointReaderRegistration::PointReaderRegistration(const char* extension, ReadPoints read)
+{
+    reader_registry()[extension] = read;
+}
+
+const std::map<std::string, ReadPoints>& point_readers() { return reader_registry(); }
+
 const Format& format_of(const std::filesystem::path& path)
 {
     const std::string extension = lower_extension(path);
@@ -63,11 +111,14 @@ void write_as(const Format& format, OutputFile& file, const PointSet& points, co
 
 PointSet read_points(const std::filesystem::path& path)
 {
-    const Format& format = format_of(path);
-    if (!format.read)
-        throw Error(fmt::format("points can't be read from a {} file", format.extension)).at({path.string(), 0});
+    const auto only_read = point_readers().find(lower_extension(without_gz(path)));
+    const Format* format = only_read == point_readers().end() ? &format_of(without_gz(path)) : nullptr;
+    if (format && !format->read)
+        throw Error(fmt::format("points can't be read from a {} file", format->extension)).at({path.string(), 0});
     try {
-        PointSet points = format.read(path);
+        PointSet points = format ? format->read(path) : only_read->second(path);
+        take_floats(points);
+        take_velocity(points);
         check_type(points, "P", AttributeType::Vec3);
         check_type(points, "v", AttributeType::Vec3);
         check_type(points, "id", AttributeType::Int64);

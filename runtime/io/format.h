@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -44,6 +45,17 @@ struct FormatRegistration {
 #define RAPID_FORMAT(...) RAPID_FORMAT_COUNTED(__COUNTER__, __VA_ARGS__)  // files may be compiled as one
 #define RAPID_FORMAT_COUNTED(count, ...) RAPID_FORMAT_NUMBER(count, __VA_ARGS__)
 #define RAPID_FORMAT_NUMBER(count, ...) static const ::rapid::FormatRegistration format_##count(__VA_ARGS__)
+
+// Registers a format that is only read: `RAPID_POINT_READER(".vtk", read_vtk);`.
+using ReadPoints = PointSet (*)(const std::filesystem::path& path);
+struct PointReaderRegistration {
+    PointReaderRegistration(const char* extension, ReadPoints read);
+};
+#define RAPID_POINT_READER(extension, read) \
+    static const ::rapid::PointReaderRegistration read##_registration(extension, read)
+
+// Returns the formats that are only read, by extension.
+const std::map<std::string, ReadPoints>& point_readers();
 
 // Calls Format::write, without the strings if the format holds none.
 void write_as(const Format& format, OutputFile& file, const PointSet& points, const FrameInfo& frame);

@@ -2,6 +2,8 @@
 
 #include <sys/stat.h>
 
+#include <cstdlib>
+
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -27,6 +29,30 @@ TEST_CASE("a file that is truncated after it was read is as it was", "[files]")
     const InputFile file(folder / "a");
     std::filesystem::resize_file(folder / "a", 0);
     CHECK((file.text() == std::string(100000, 'x')));
+}
+
+TEST_CASE("a file that gzip compressed is read as it was before", "[files]")
+{
+    const std::size_t size = GENERATE(0, 1, 100000, 9 << 20);
+    const TemporaryFolder folder;
+    std::string text(size, '\0');
+    for (std::size_t i = 0; i < size; ++i) text[i] = static_cast<char>(i / 1000 * 2654435761u >> 24);
+    folder.write("a", text.substr(0, size / 2));
+    folder.write("b", text.substr(size / 2));
+    // A file of two members, as `cat a.gz b.gz` makes it.
+    const std::string make = "cd " + folder.path().string() + " && (gzip -c a; gzip -c b) >both.gz";
+    REQUIRE(std::system(make.c_str()) == 0);
+    CHECK((InputFile(folder / "both.gz").text() == text));
+
+    const std::string whole = file_text(folder / "both.gz");
+    const auto error = [&](const std::string& bytes) {
+        return error_of([&] { InputFile(folder.write("c.gz", bytes)); });
+    };
+    CHECK(error(whole.substr(0, whole.size() - 1)) == "can't be read: its compressed data ends early");
+    CHECK(error(whole.substr(0, whole.size() - 8) + std::string(8, 'x')) ==
+          "can't be read: its compressed data is damaged");
+    CHECK(without_gz("x/a.bgeo.gz") == "x/a.bgeo");
+    CHECK(without_gz("x.gz/a.bgeo") == "x.gz/a.bgeo");
 }
 
 TEST_CASE("a folder, a device and a pipe that nobody writes to are no files", "[files]")

@@ -3,18 +3,27 @@
 //   id,Px,Py,Pz,vx,vy,vz, then further attributes by name (NAMEx NAMEy NAMEz (NAMEw)), then group:NAME, 0 or 1
 //
 // Floats have 9 significant digits, which identify the float. Strings are quoted, with quotes inside doubled (RFC
-// 4180). The file does not store types. On reading, a column whose first value is not a number holds strings. Any other
-// column except id is float, unless it contains only integers and float would round one of them. It is then int32, or
-// int64 if that is too small.
+// 4180), and so is the name of a column of strings, because a file without points has no values. The file does not
+// store other types. On reading, a column whose first value is not a number holds strings. Any other column except id
+// is float, unless it contains only integers and float would round one of them. It is then int32, or int64 if that is
+// too small.
+//
+// Files of other programs may have blanks after commas, quoted names, and lines that end with CR. Their vectors NAME:0
+// NAME:1 NAME:2 (ParaView), NAME.x NAME.y NAME.z and NAME[0] NAME[1] NAME[2] are read as well, and P may be called x y
+// z, Points or position.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <cmath>
+#include <set>
 
 #include "runtime/base/memory_budget.h"
 #include "runtime/base/parallel.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/scalars.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/id_order.h"
@@ -89,7 +98,11 @@ CsvTable csv_table(const PointSet& points)
         names.push_back(std::string(group_column) + name);
     }
     check_column_names(names, ",\"\r\n");
-    for (const std::string& name : names) table.header += (table.header.empty() ? "" : ",") + name;
+    for (const std::string& name : names) {
+        const AnyColumn* column = points.find(name);
+        const bool is_text = column && type_of(*column) == AttributeType::String;
+        table.header += (table.header.empty() ? "" : ",") + (is_text ? '"' + name + '"' : name);
+    }
     table.header += '\n';
     table.numbers = names.size();
     return table;
@@ -154,16 +167,22 @@ std::unique_ptr<PointStream> stream_csv(OutputFile& file, const PointSet& like)
     return std::make_unique<CsvStream>(file, like);
 }
 
-// Returns the end of the line that begins here: a newline outside quotes.
+// Returns the end of the line that begins here: a newline outside quotes, or the end of the text.
 std::size_t line_end(std::string_view text, std::size_t begin, bool has_quotes)
 {
-    if (!has_quotes) return text.find('\n', begin);
+    if (!has_quotes) return std::min(text.find('\n', begin), text.size());
     bool quoted = false;
     for (std::size_t i = begin; i < text.size(); ++i) {
         quoted ^= text[i] == '"';
         if (text[i] == '\n' && !quoted) return i;
     }
-    return std::string_view::npos;
+    return text.size();
+}
+
+const char* without_blanks(const char* at, const char* stop)
+{
+    while (at != stop && (*at == ' ' || *at == '\t')) ++at;
+    return at;
 }
 
 // Returns the start of each line, without the header and trailing empty lines.
@@ -173,9 +192,7 @@ std::vector<std::size_t> line_starts(std::string_view text, std::size_t begin)
     std::vector<std::size_t> starts;
     while (begin < text.size()) {
         starts.push_back(begin);
-        const std::size_t end = line_end(text, begin, has_quotes);
-        if (end == std::string_view::npos) break;
-        begin = end + 1;
+        begin = line_end(text, begin, has_quotes) + 1;
     }
     while (!starts.empty() && text.substr(starts.back()).find_first_not_of("\r\n") == std::string_view::npos)
         starts.pop_back();
@@ -212,12 +229,13 @@ Error csv_error(std::size_t line, const std::string& what) { return Error(fmt::f
 const char* parse_text(const char* at, const char* stop, std::string& text)
 {
     text.clear();
+    at = without_blanks(at, stop);
     if (at == stop || *at != '"') {
         while (at != stop && *at != ',' && *at != '\n' && *at != '\r') text += *at++;
         return at;
     }
     for (++at; at != stop; ++at) {
-        if (*at == '"' && (++at == stop || *at != '"')) return at;
+        if (*at == '"' && (++at == stop || *at != '"')) return without_blanks(at, stop);
         text += *at;
     }
     return nullptr;
@@ -227,9 +245,9 @@ const char* parse_text(const char* at, const char* stop, std::string& text)
 bool is_text(const char* at, const char* stop)
 {
     double number = 0;
-    const auto parsed = std::from_chars(at, stop, number);
-    return parsed.ec == std::errc::invalid_argument ||
-           (parsed.ptr != stop && *parsed.ptr != ',' && *parsed.ptr != '\n' && *parsed.ptr != '\r');
+    const auto parsed = parse_number(without_blanks(at, stop), stop, number);
+    const char* const end = without_blanks(parsed.ptr, stop);
+    return parsed.ec == std::errc::invalid_argument || (end != stop && *end != ',' && *end != '\n' && *end != '\r');
 }
 
 // Marks columns as strings if the first line has no number there. may_be_text: columns for which this is allowed.
@@ -246,7 +264,8 @@ void find_strings(std::string_view line, const std::vector<bool>& may_be_text, s
 }
 
 std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<std::size_t>& starts,
-                                     const std::vector<std::string>& names, const std::vector<bool>& may_be_text)
+                                     const std::vector<std::string>& names, const std::vector<bool>& may_be_text,
+                                     const std::vector<bool>& is_quoted)
 {
     constexpr double bytes_per_number = sizeof(double) + sizeof(std::int64_t);  // per number, until all lines are read
     const double bytes = bytes_per_number * static_cast<double>(names.size()) * static_cast<double>(starts.size());
@@ -255,6 +274,8 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                               "split the file, or write .bgeo instead");
     std::vector<CsvColumn> columns(names.size());
     if (!starts.empty()) find_strings(text.substr(starts[0]), may_be_text, columns);
+    for (std::size_t c = 0; c < columns.size() && starts.empty(); ++c)
+        columns[c].is_text = may_be_text[c] && is_quoted[c];
     for (CsvColumn& column : columns) {
         if (column.is_text) {
             column.strings.resize(starts.size());
@@ -286,12 +307,13 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
                 }
                 double& number = columns[c].numbers[i];
                 std::int64_t& whole = columns[c].whole[i];
-                const auto parsed = std::from_chars(at, stop, number);
+                at = without_blanks(at, stop);
+                const auto parsed = parse_number(at, stop, number);
                 if (parsed.ec != std::errc()) throw csv_error(i + 2, fmt::format("{} is not a number", names[c]));
-                const auto parsed_whole = std::from_chars(at, stop, whole);
+                const auto parsed_whole = parse_number(at, stop, whole);
                 if (parsed_whole.ec != std::errc() || parsed_whole.ptr != parsed.ptr)
                     broken[c].store(true, std::memory_order_relaxed);
-                at = parsed.ptr;
+                at = without_blanks(parsed.ptr, stop);
             }
             if (at != stop && *at == '\r') ++at;
             if (at != stop && *at != '\n')
@@ -300,6 +322,18 @@ std::vector<CsvColumn> parse_columns(std::string_view text, const std::vector<st
     });
     for (std::size_t c = 0; c < names.size(); ++c) columns[c].is_whole = !broken[c];
     return columns;
+}
+
+// Returns ids that are written with a point: 3.0.
+Column<std::int64_t> whole_ids(const CsvColumn& column)
+{
+    std::vector<std::int64_t> ids;
+    for (const double number : column.numbers) {
+        if (!(std::abs(number) <= 0x1p53 && number == std::floor(number)))
+            throw csv_error(ids.size() + 2, fmt::format("the column id holds numbers that are not whole: {}", number));
+        ids.push_back(static_cast<std::int64_t>(number));
+    }
+    return Column<std::int64_t>(std::span<const std::int64_t>(ids));
 }
 
 template <class T, class Number>
@@ -319,19 +353,62 @@ Column<T> joined(const std::vector<CsvColumn>& columns, const std::vector<std::s
     return column;
 }
 
+// Reads the names of the columns, and for each if it is in quotes.
+std::vector<std::string> header_names(std::string_view header, std::vector<bool>& is_quoted)
+{
+    std::vector<std::string> names;
+    const char *at = header.data(), *const stop = header.data() + header.size();
+    for (;; ++at) {
+        at = without_blanks(at, stop);
+        is_quoted.push_back(at != stop && *at == '"');
+        at = parse_text(at, stop, names.emplace_back());
+        if (!at) throw csv_error(1, "a name has no closing quote");
+        if (!is_quoted.back()) names.back().erase(names.back().find_last_not_of(" \t") + 1);
+        if (at == stop || *at == '\r') return names;
+        if (*at != ',')
+            throw csv_error(1, fmt::format("what follows the name \"{}\" can't be understood", names.back()));
+    }
+}
+
+// Renames the components of vectors that other programs write to those of Rapid.
+void take_names_of_others(std::vector<std::string>& names)
+{
+    static const std::string patterns[][4] = {
+        {":0", ":1", ":2", ":3"}, {".x", ".y", ".z", ".w"}, {"[0]", "[1]", "[2]", "[3]"}};
+    static const std::set<std::string> positions = {"Points", "points", "position", "Position"};
+    for (std::size_t c = 0; c + 2 < names.size(); ++c)
+        for (const auto& suffixes : patterns) {
+            if (!names[c].ends_with(suffixes[0]) || names[c].size() == suffixes[0].size()) continue;
+            const std::string stem = names[c].substr(0, names[c].size() - suffixes[0].size());
+            std::size_t count = 1;
+            while (count < 4 && c + count < names.size() && names[c + count] == stem + suffixes[count]) ++count;
+            if (count < 3) continue;
+            const std::vector<std::string> ours = component_names(positions.count(stem) ? "P" : stem, count);
+            std::copy(ours.begin(), ours.end(), names.begin() + static_cast<std::ptrdiff_t>(c));
+        }
+    if (std::find(names.begin(), names.end(), "Px") != names.end()) return;
+    for (const std::string& xyz : {std::string("xyz"), std::string("XYZ")})
+        for (std::size_t c = 0; c + 2 < names.size(); ++c)
+            if (names[c] == xyz.substr(0, 1) && names[c + 1] == xyz.substr(1, 1) && names[c + 2] == xyz.substr(2, 1))
+                for (std::size_t k = 0; k < 3; ++k) names[c + k] = std::string("P") + "xyz"[k];
+}
+
 PointSet read_csv(const std::filesystem::path& path)
 {
     const InputFile file(path);
     std::string_view text = file.text();
-    const std::size_t header_end = std::min(text.find('\n'), text.size());
-    std::string_view header = text.substr(0, header_end);
-    if (header.ends_with('\r')) header.remove_suffix(1);
-    std::vector<std::string> names;
-    for (std::size_t begin = 0; begin <= header.size();) {
-        const std::size_t end = std::min(header.find(',', begin), header.size());
-        names.emplace_back(header.substr(begin, end - begin));
-        begin = end + 1;
+    std::string with_newlines;
+    if (text.find('\n') == std::string_view::npos && text.find('\r') != std::string_view::npos) {
+        with_newlines = text;
+        std::replace(with_newlines.begin(), with_newlines.end(), '\r', '\n');
+        text = with_newlines;
     }
+    const std::size_t header_end = std::min(text.find('\n'), text.size());
+    std::vector<bool> is_quoted;
+    std::vector<std::string> names = header_names(text.substr(0, header_end), is_quoted);
+    take_names_of_others(names);
+    if (std::find(is_quoted.begin(), is_quoted.end(), false) == is_quoted.end())
+        is_quoted.assign(names.size(), false);  // another program quotes all names
     const std::vector<JoinedColumns> attributes = join_components(names);
     const bool placed = std::any_of(attributes.begin(), attributes.end(),
                                     [](const JoinedColumns& a) { return a.name == "P" && a.columns.size() == 3; });
@@ -339,15 +416,12 @@ PointSet read_csv(const std::filesystem::path& path)
     check_column_names(names, "");
 
     const std::vector<std::size_t> starts = line_starts(text, header_end + 1);
-    if (!text.ends_with('\n'))
-        throw csv_error(starts.size() + 1,
-                        "there is no newline at the end, so the last number may be cut off; if the file is complete, "
-                        "append a newline (echo >> FILE)");
+    if (!text.ends_with('\n')) SkippedContents::note(no_last_newline);
     std::vector<bool> may_be_text(names.size());
     for (const JoinedColumns& attribute : attributes)
         may_be_text[attribute.columns[0]] =
             attribute.columns.size() == 1 && attribute.name != "id" && !attribute.name.starts_with(group_prefix);
-    const std::vector<CsvColumn> columns = parse_columns(text, starts, names, may_be_text);
+    const std::vector<CsvColumn> columns = parse_columns(text, starts, names, may_be_text, is_quoted);
     PointSet points;
     points.append(starts.size());
     for (const JoinedColumns& attribute : attributes) {
@@ -364,8 +438,7 @@ PointSet read_csv(const std::filesystem::path& path)
                 points.group(std::string_view(attribute.name).substr(group_column.size())).overwrite();
             for (std::size_t i = 0; i < members.size(); ++i) members[i] = first.numbers[i] != 0;
         } else if (attribute.name == "id") {
-            if (!first.is_whole) throw Error("the column id holds numbers that are not whole");
-            points.set("id", joined<std::int64_t, std::int64_t>(columns, which));
+            points.set("id", first.is_whole ? joined<std::int64_t, std::int64_t>(columns, which) : whole_ids(first));
         } else if (first.is_whole && first.float_would_round()) {
             if (first.fits_int32())
                 points.set(attribute.name, joined<std::int32_t, std::int32_t>(columns, which));

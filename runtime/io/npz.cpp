@@ -368,6 +368,21 @@ PointSet read_npz(const std::filesystem::path& path)
     return points;
 }
 
+// Reads an array of shape (n, 3), as numpy.save writes it.
+PointSet read_npy(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    const std::optional<Array> array = array_in(file.bytes());
+    if (!array || array->numbers != 3 || array->type.characters > 0 || !is_floating(array->type.scalar))
+        throw Error("the array is not one of floats with the shape (n, 3)");
+    PointSet points;
+    points.append(array->rows);
+    if (!points.empty()) read_array(points, "P", *array);
+    number_points(points);
+    return points;
+}
+
+RAPID_POINT_READER(".npy", read_npy);
 RAPID_FORMAT(Format{".npz", "NumPy's arrays, one for each attribute; all types", write_npz, read_npz});
 
 }  // namespace

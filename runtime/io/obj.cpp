@@ -1,20 +1,21 @@
 // .obj: Wavefront's text format, as lines.
 //
 //   v x y z       each point, followed by the positions of trails
-//   p 1           a point on no line
+//   p 1 2 ...     points on no line, if there are lines
 //   l 1 7 8 ...   a line: a trail, from the point itself backwards, or a curve (points/point_lines.h)
 //
 // It stores only positions, without velocities, attributes and groups. From any .obj file, the vertices of its lines
-// are read as points in line order, with the index of the line as the attribute `curve`, from 0. If there are no lines,
-// all vertices are read.
+// are read as points in line order, with the index of the line as the attribute `curve`, from 0; then its points, with
+// -1. If there are no lines, all vertices are read, without `curve`.
 #include <fmt/format.h>
-
-#include <charconv>
 
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/input_file.h"
+#include "runtime/files/skipped_contents.h"
+#include "runtime/files/text_statements.h"
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
+#include "runtime/io/records.h"
 #include "runtime/points/point_lines.h"
 
 namespace rapid {
@@ -42,8 +43,8 @@ void write_obj(OutputFile& file, const PointSet& given, const FrameInfo&)
     append_chunks(file, points.size(), [&](std::size_t first, std::size_t last) {
         std::string text;
         for (std::size_t i = first; i < last; ++i)
-            if (!is_on_line[i]) text += fmt::format("p {}\n", i + 1);
-        return text;
+            if (!is_on_line[i]) text += fmt::format(" {}", i + 1);
+        return text.empty() || lines.sizes.empty() ? std::string() : "p" + text + "\n";
     });
     append_chunks(file, lines.sizes.size(), [&](std::size_t first, std::size_t last) {
         std::string text;
@@ -57,25 +58,6 @@ void write_obj(OutputFile& file, const PointSet& given, const FrameInfo&)
     });
 }
 
-// The words of a line, one after the other.
-class Words {
-public:
-    explicit Words(std::string_view line) : line_(line) {}
-
-    std::string_view next()
-    {
-        const std::size_t begin = line_.find_first_not_of(" \t\r");
-        if (begin == std::string_view::npos) return line_ = {};
-        line_.remove_prefix(begin);
-        const std::string_view word = line_.substr(0, line_.find_first_of(" \t\r"));
-        line_.remove_prefix(word.size());
-        return word;
-    }
-
-private:
-    std::string_view line_;
-};
-
 // Throws Error if that many positions do not fit in memory. A line takes at least two bytes per position. A growing
 // list briefly takes three times its size, before the columns are created.
 void check_memory(std::size_t positions)
@@ -85,70 +67,55 @@ void check_memory(std::size_t positions)
         throw memory_exceeded(fmt::format("lines of at least {} positions", positions), bytes, "split the file");
 }
 
-// Parses a complete word. Throws Error if it is not a number.
-template <class T>
-T number_of(std::string_view word, std::size_t line)
-{
-    T number{};
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-    if (error != std::errc() || end != word.data() + word.size())
-        throw Error(fmt::format("line {}: \"{}\" is not a number", line, word.substr(0, 40)));
-    return number;
-}
-
-// Returns the vertex that an element of a line refers to: from 1, or backwards from the last one if negative. The part
-// after a slash is its texture.
-std::size_t vertex_of(std::string_view word, std::size_t vertices, std::size_t line)
-{
-    const auto index = number_of<std::int64_t>(word.substr(0, word.find('/')), line);
-    const auto count = static_cast<std::int64_t>(vertices);
-    const std::int64_t place = index < 0 ? count + index : index - 1;
-    if (place < 0 || place >= count)
-        throw Error(fmt::format("line {}: there is no vertex {} of {}", line, index, vertices));
-    return static_cast<std::size_t>(place);
-}
+// Returns true if the file has only comments, as an .obj file of no points has.
+bool has_only_comments(std::string_view text) { return !text.empty() && !TextStatements(text).next(); }
 
 PointSet read_obj(const std::filesystem::path& path)
 {
     const InputFile file(path);
-    std::string_view text = file.text();
-    const bool ends = text.ends_with('\n');
+    const std::string_view text = file.text();
     std::vector<Vec3f> vertices, positions;
     std::vector<std::int32_t> curves;
+    std::vector<std::size_t> alone;  // points on no line
     std::int32_t curve = 0;
-    for (std::size_t number = 1; !text.empty(); ++number) {
-        const std::string_view line = text.substr(0, text.find('\n'));
-        text.remove_prefix(std::min(text.size(), line.size() + 1));
-        Words words(line);
-        const std::string_view kind = words.next();
-        if (text.empty() && !ends && !kind.empty() && !kind.starts_with('#'))
+    TextStatements statements(text);
+    // Returns the vertex of an element. The part after a slash is its texture.
+    const auto vertex_of = [&](std::string_view word) {
+        const std::int64_t index = statements.index(word.substr(0, word.find('/')), vertices.size());
+        if (index >= static_cast<std::int64_t>(vertices.size()))
             throw Error(
-                fmt::format("line {}: there is no newline at the end, so the last number may be cut off; if the file "
-                            "is complete, append a newline (echo >> FILE)",
-                            number));
-        if (kind == "v") {
-            Vec3f P;
-            for (int axis = 0; axis < 3; ++axis) P[axis] = number_of<float>(words.next(), number);
-            if (!P.allFinite()) throw Error(fmt::format("line {}: a position must be finite", number));
+                fmt::format("line {}: there is no vertex {} of {}", statements.line(), index + 1, vertices.size()));
+        return static_cast<std::size_t>(index);
+    };
+    while (statements.next()) {
+        if (statements.keyword() == "v") {
+            const Vec3f P = statements.vector();
+            if (!P.allFinite()) throw Error(fmt::format("line {}: a position must be finite", statements.line()));
             vertices.push_back(P);
-        } else if (kind == "l") {
-            for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+        } else if (statements.keyword() == "l") {
+            for (std::string_view word = statements.word(); !word.empty(); word = statements.word()) {
                 if (positions.size() == positions.capacity()) check_memory(positions.size());
-                positions.push_back(vertices[vertex_of(word, vertices.size(), number)]);
+                positions.push_back(vertices[vertex_of(word)]);
                 curves.push_back(curve);
             }
             ++curve;
+        } else if (statements.keyword() == "p") {
+            for (std::string_view word = statements.word(); !word.empty(); word = statements.word())
+                alone.push_back(vertex_of(word));
         }
     }
-    if (vertices.empty()) throw Error("is not an .obj file with vertices");
-    if (curve == 0) positions = vertices, curves.assign(vertices.size(), 0);
+    if (vertices.empty() && !has_only_comments(text)) throw Error("is not an .obj file with vertices");
+    if (!text.empty() && !text.ends_with('\n') && !text.ends_with('\r')) SkippedContents::note(no_last_newline);
+    const bool has_lines = curve > 0;
+    if (!has_lines) positions = vertices;
+    for (const std::size_t vertex : alone)
+        if (has_lines) positions.push_back(vertices[vertex]), curves.push_back(-1);
 
     PointSet points;
     points.append(positions.size());
     points.P() = Column<Vec3f>(std::span<const Vec3f>(positions));
-    const std::span<std::int64_t> id = points.id().overwrite();
-    for (std::size_t i = 0; i < id.size(); ++i) id[i] = static_cast<std::int64_t>(i);
-    points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
+    number_points(points);
+    if (has_lines) points.set(curve_attribute, Column<std::int32_t>(std::span<const std::int32_t>(curves)));
     return points;
 }
 

@@ -34,6 +34,7 @@
 #include "runtime/files/skipped_contents.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
+#include "runtime/io/point_file.h"
 #include "runtime/io/records.h"
 #include "runtime/io/text_table.h"
 #include "runtime/points/token.h"
@@ -116,7 +117,7 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
         for (std::size_t i = 0; i < count; ++i) {
             text = without_space(text);
             Number number = 0;
-            const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
+            const auto parsed = parse_number(text.data(), text.data() + text.size(), number);
             text.remove_prefix(static_cast<std::size_t>(parsed.ptr - text.data()));
             if (parsed.ec != std::errc() || (!text.empty() && xml_space.find(text[0]) == std::string_view::npos))
                 throw Error(fmt::format("its number {} is not a number of its type", i));
@@ -124,6 +125,19 @@ std::vector<unsigned char> parsed_numbers(std::string_view text, ScalarType type
         }
         if (!without_space(text).empty()) throw Error(fmt::format("the array has more than its {} numbers", count));
     });
+    return bytes;
+}
+
+// Parses bytes, which other programs write with a sign or without.
+std::vector<unsigned char> parsed_bytes(std::string_view text, std::size_t count)
+{
+    const std::vector<unsigned char> numbers = parsed_numbers(text, ScalarType::Int16, count);
+    std::vector<unsigned char> bytes;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto number = load_scalar<std::int16_t>(numbers.data() + sizeof(std::int16_t) * i, ByteOrder::Little);
+        if (number < -128 || number > 255) throw Error(fmt::format("its number {} is not a byte", i));
+        bytes.push_back(static_cast<unsigned char>(number));
+    }
     return bytes;
 }
 
@@ -275,7 +289,7 @@ std::vector<Token> VtkFile::strings(pugi::xml_node node, std::size_t rows) const
             for (std::size_t i = 0; i < text.size(); ++i)
                 count += xml_space.find(text[i]) == std::string_view::npos &&
                          (i == 0 || xml_space.find(text[i - 1]) != std::string_view::npos);
-            bytes = parsed_numbers(text, ScalarType::UInt8, count);
+            bytes = parsed_bytes(text, count);
         } else {
             const auto [data, base64] = data_of(node, text);
             const std::size_t size = bytes_of(data, base64);
@@ -502,27 +516,12 @@ RecordAttribute attribute_of_array(const std::string& name, const VtkArray& arra
 
 Column<Token> text_column(const std::vector<Token>& strings) { return Column<Token>(std::span<const Token>(strings)); }
 
-pugi::xml_node only_piece(const pugi::xml_document& document)
+PointSet read_piece(const VtkFile& vtk, const pugi::xml_node& piece, bool& has_id)
 {
-    pugi::xml_node piece;
-    for (const pugi::xml_node child : document.child("VTKFile").child("PolyData").children("Piece")) {
-        if (piece) throw Error("the file has several pieces; it must have one");
-        piece = child;
-    }
-    if (!piece) throw Error("the file has no piece");
-    return piece;
-}
-
-PointSet read_vtp(const std::filesystem::path& path)
-{
-    const InputFile file(path);
-    const VtkFile vtk(file.text(), "PolyData");
-    const pugi::xml_node piece = only_piece(vtk.document());
     const std::optional<std::size_t> n = whole_number(piece.attribute("NumberOfPoints").value());
     if (!n) throw Error("its piece has no NumberOfPoints");
 
     PointSet points;
-    bool has_id = false;
     const auto read = [&](const std::string& name, const VtkArray& array) {
         const RecordAttribute attribute = attribute_of_array(name, array);
         const std::size_t stride = array.numbers * scalar_bytes(array.type);
@@ -563,8 +562,41 @@ PointSet read_vtp(const std::filesystem::path& path)
         if (const unsigned found = piece.attribute(count).as_uint(); found > 0)
             SkippedContents::add(fmt::format("its {} {}", found, what));
     check_column_names(names, "");
-    if (!has_id) number_points(points);
     return points;
+}
+
+void append_piece(PointSet& to, const PointSet& from)
+{
+    const auto same = [](const auto& a, const auto& b) {
+        return a.first == b.first && type_of(a.second) == type_of(b.second);
+    };
+    if (!std::equal(to.columns().begin(), to.columns().end(), from.columns().begin(), from.columns().end(), same) ||
+        to.group_names() != from.group_names())
+        throw Error("its pieces have different arrays; they must have the same");
+    const std::size_t before = to.size();
+    append_points(to, from);
+    for (const auto& [name, members] : from.groups()) {
+        const std::span<std::uint8_t> of_all = to.group(name).write();
+        for (std::size_t i = 0; i < from.size(); ++i) of_all[before + i] = members[i];
+    }
+}
+
+PointSet read_vtp(const std::filesystem::path& path)
+{
+    const InputFile file(path);
+    const VtkFile vtk(file.text(), "PolyData");
+    std::optional<PointSet> points;
+    bool has_id = false;
+    for (const pugi::xml_node& piece : vtk.document().child("VTKFile").child("PolyData").children("Piece")) {
+        PointSet of_piece = read_piece(vtk, piece, has_id);
+        if (!points || points->empty())
+            points = std::move(of_piece);
+        else if (!of_piece.empty())
+            append_piece(*points, of_piece);
+    }
+    if (!points) throw Error("the file has no piece");
+    if (!has_id) number_points(*points);
+    return std::move(*points);
 }
 
 RAPID_FORMAT(Format{".vtp", "VTK's points, for ParaView; all types", write_vtp, read_vtp});

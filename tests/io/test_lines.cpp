@@ -169,7 +169,7 @@ TEST_CASE("an .obj has a line through each curve, and the other points", "[io][l
 {
     const TemporaryFolder folder;
     write_points(folder / "a.obj", with_curves());
-    CHECK_THAT(file_text(folder / "a.obj"), Catch::EndsWith("\np 4\np 7\nl 1 2 3\nl 5 6\n"));
+    CHECK_THAT(file_text(folder / "a.obj"), Catch::EndsWith("\np 4 7\nl 1 2 3\nl 5 6\n"));
     write_points(folder / "b.obj", points_with_trails(3));
     CHECK_THAT(file_text(folder / "b.obj"), Catch::EndsWith("\np 1\nl 2 4\nl 3 5 6\n"));
 }

@@ -6,6 +6,9 @@
 // P is points, v is velocities, id is ids, pscale is half of widths, N is normals, Cd is primvars:displayColor, Alpha
 // is primvars:displayOpacity. Any other attribute is primvars:NAME, and a group is bool[] primvars:group_NAME. Floats
 // have 9 significant digits, which identify the float.
+//
+// Files of other programs are read in metres with the y axis up, by their metersPerUnit and upAxis, and where the
+// transforms of the prim and of those around it put it. Values of primvars go by their indices.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,6 +20,7 @@
 #include <limits>
 #include <list>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -33,6 +37,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/records.h"
+#include "runtime/math/normal_map.h"
 #include "runtime/points/token.h"
 
 namespace rapid {
@@ -50,12 +55,18 @@ struct UsdArray {
     std::int64_t least, most;  // range of integers
     std::vector<unsigned char> bytes;
     bool strings = false;
+    enum Role { Number, Point, Vector, Normal } role = Number;  // how a transform changes it
 
     std::size_t rows() const { return bytes.size() / (tuple * scalar_bytes(type)); }
 };
 
+struct UsdPoints {
+    std::vector<UsdArray> arrays;
+    Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  // to metres, y up
+};
+
 // Throws Error if the text is not USD, has no Points prim or several, or has several time samples.
-std::vector<UsdArray> usda_points(std::string_view text);
+UsdPoints usda_points(std::string_view text);
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 bool is_word(char c)
@@ -87,6 +98,10 @@ std::optional<UsdArray> array_of(std::string_view type)
     if (type == "uint64") return integers_of(ScalarType::Int64, std::uint64_t{});
     UsdArray array = integers_of(ScalarType::Double, std::int32_t{});
     array.quaternion = type.starts_with("quat");
+    array.role = type.starts_with("point")    ? UsdArray::Point
+                 : type.starts_with("vector") ? UsdArray::Vector
+                 : type.starts_with("normal") ? UsdArray::Normal
+                                              : UsdArray::Number;
     static constexpr std::string_view integers[] = {"int", "int2", "int3", "int4"};
     static constexpr std::string_view floats[] = {
         "half", "float", "double", "point3", "vector3", "normal3", "color3", "color4",  "texCoord2", "texCoord3",
@@ -105,31 +120,74 @@ std::optional<UsdArray> array_of(std::string_view type)
     return array;
 }
 
+// Throws Error if the array is too large. A number takes at least two bytes of text, and more memory while its
+// array grows and is converted to a column.
+void check_array_memory(const UsdArray& array)
+{
+    if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
+        throw memory_exceeded(fmt::format("an array of at least {} rows", array.rows()), bytes, "write .bgeo instead");
+}
+
+// Returns the map of an operation such as xformOp:rotateXYZ:pivot.
+Eigen::Affine3d operation(std::string_view name, const std::vector<double>& numbers)
+{
+    name.remove_prefix(std::string_view("xformOp:").size());
+    name = name.substr(0, name.find(':'));
+    const auto check = [&](std::size_t count) {
+        if (numbers.size() != count)
+            throw Error(fmt::format("xformOp:{} has {} numbers; there must be {}", name, numbers.size(), count));
+    };
+    Eigen::Affine3d map = Eigen::Affine3d::Identity();
+    if (name == "transform") {
+        check(16);
+        map.matrix() = Eigen::Map<const Eigen::Matrix4d>(numbers.data());  // of row vectors, row by row
+    } else if (name == "orient") {
+        check(4);
+        map = Eigen::Quaterniond(numbers[0], numbers[1], numbers[2], numbers[3]).normalized();
+    } else if (name == "translate" || name == "scale") {
+        check(3);
+        const Vec3d vector(numbers[0], numbers[1], numbers[2]);
+        if (name == "scale")
+            map = Eigen::Scaling(vector);
+        else
+            map = Eigen::Translation3d(vector);
+    } else if (constexpr std::string_view rotate = "rotate"; name.starts_with(rotate)) {
+        const std::string_view axes = name.substr(rotate.size());  // X, or XYZ: about x first
+        check(axes.size());
+        for (std::size_t k = 0; k < axes.size(); ++k) {
+            const int axis = axes[k] - 'X';
+            if (axis < 0 || axis > 2) throw Error(fmt::format("xformOp:{} is unknown", name));
+            const double angle = numbers[axes.size() == 1 ? 0 : static_cast<std::size_t>(axis)];
+            map = Eigen::AngleAxisd(angle * std::numbers::pi / 180, Vec3d::Unit(axis)) * map;
+        }
+    } else {
+        throw Error(fmt::format("xformOp:{} is unknown", name));
+    }
+    return map;
+}
+
 class UsdaReader {
 public:
     explicit UsdaReader(std::string_view text) : text_(text) {}
 
-    std::vector<UsdArray> read()
+    UsdPoints read()
     {
         if (!text_.starts_with("#usda")) throw Error("not a USD text file: it does not begin with \"#usda\"");
-        bool found = false;
+        if (skip_space(), is_at('(')) read_metadata();
+        prims_.push_back({.to_world = to_metres_});
         while (skip_space(), at_ < text_.size()) {
-            if (!is_word(text_[at_])) {
-                skip_mark();
-                continue;
+            if (is_at('}') && prims_.size() > 1) {
+                ++at_;
+                prims_.pop_back();
+            } else {
+                read_statement();
             }
-            if (word() != "def" || (skip_space(), !at_word()) || word() != "Points") continue;
-            if (std::exchange(found, true))
-                throw wrong("there are several prims of the type Points; there must be one");
-            skip_space();
-            skip_value();  // name
-            if (skip_space(), is_at('(')) skip_value();
-            if (skip_space(), !is_at('{')) throw wrong("the prim of points has no { }");
-            ++at_;
-            read_properties();
         }
-        if (!found) throw Error("there is no prim of the type Points");
-        return {std::move_iterator(arrays_.begin()), std::move_iterator(arrays_.end())};
+        if (prims_.size() > 1)
+            throw wrong(
+                fmt::format("the file ends within {}", prims_.back().is_points ? "the prim of points" : "a prim"));
+        if (!found_) throw Error("there is no prim of the type Points");
+        return {{std::move_iterator(arrays_.begin()), std::move_iterator(arrays_.end())}, to_world_};
     }
 
 private:
@@ -228,20 +286,146 @@ private:
         } while (depth > 0);
     }
 
-    void read_properties()
+    // A prim whose body is being read.
+    struct Prim {
+        bool is_points = false;
+        Eigen::Affine3d to_parent = Eigen::Affine3d::Identity();
+        Eigen::Affine3d to_world = Eigen::Affine3d::Identity();      // with that of the prim itself
+        std::map<std::string, std::vector<double>> operations = {};  // xformOp:..., as numbers
+    };
+
+    // Reads the unit and axis of the layer, which are in brackets.
+    void read_metadata()
     {
-        while (true) {
-            skip_space();
-            if (at_ >= text_.size()) throw wrong("the file ends within the prim of points");
-            if (is_at('}')) {
-                ++at_;
-                return;
+        double metres = 1;
+        bool z_up = false;
+        ++at_;
+        while (skip_space(), !is_at(')')) {
+            if (at_ >= text_.size()) throw wrong("the file ends within its metadata");
+            const std::string_view name = at_word() ? word() : std::string_view();
+            if (name.empty()) {
+                skip_mark_or_brackets();
+                continue;
             }
-            read_statement();
+            if (skip_space(), !is_at('=')) continue;
+            ++at_;
+            skip_space();
+            if (name == "metersPerUnit") {
+                const std::vector<double> numbers = numbers_of_value();
+                metres = numbers.size() == 1 ? numbers[0] : 0;
+                if (!(metres > 0 && std::isfinite(metres))) throw wrong("metersPerUnit must be a number above 0");
+            } else if (name == "upAxis") {
+                z_up = text_value() == "Z";
+            } else {
+                skip_value();
+            }
         }
+        ++at_;
+        to_metres_ = Eigen::Scaling(metres);
+        // z becomes y, and y becomes -z.
+        if (z_up) to_metres_ = to_metres_ * Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3d::UnitX());
+        if (z_up) to_metres_.linear() = (to_metres_.linear() / metres).array().round().matrix() * metres;
     }
 
-    // Reads [custom] TYPE NAME [= VALUE] [(METADATA)], or skips a prim within this one.
+    // Begins the body of a prim, after its specifier. A class is only there where others refer to it.
+    void open_prim(std::string_view specifier)
+    {
+        skip_space();
+        const bool is_points = at_word() && word() == "Points";
+        skip_space();
+        if (is_at('"') || is_at('\'')) skip_mark();
+        if (skip_space(), is_at('(')) skip_value();
+        if (skip_space(), !is_at('{')) throw wrong("a prim has no { }");
+        if (specifier == "class") return skip_value();
+        ++at_;
+        if (is_points && std::exchange(found_, true))
+            throw wrong("there are several prims of the type Points; there must be one");
+        const Eigen::Affine3d to_world = prims_.back().to_world;
+        prims_.push_back({.is_points = is_points, .to_parent = to_world, .to_world = to_world});
+        if (is_points) to_world_ = to_world;
+    }
+
+    // Applies the operations of a prim, the last one first.
+    void order_operations(const std::vector<std::string>& names)
+    {
+        Prim& prim = prims_.back();
+        prim.to_world = prim.to_parent;
+        for (std::string name : names) {
+            constexpr std::string_view inverse = "!invert!";
+            if (name == "!resetXformStack!") {
+                prim.to_world = to_metres_;
+                continue;
+            }
+            const bool inverted = name.starts_with(inverse);
+            if (inverted) name.erase(0, inverse.size());
+            const auto found = prim.operations.find(name);
+            if (found == prim.operations.end()) throw wrong(fmt::format("{} has no value", name));
+            const Eigen::Affine3d map = operation(name, found->second);
+            prim.to_world = prim.to_world * (inverted ? map.inverse() : map);
+        }
+        if (prim.is_points) to_world_ = prim.to_world;
+    }
+
+    // Returns all numbers of a value, or of its only time sample, whatever its brackets.
+    std::vector<double> numbers_of_value()
+    {
+        std::vector<double> numbers;
+        std::size_t depth = 0;
+        do {
+            skip_space();
+            if (at_ >= text_.size()) throw wrong("the file ends within a value");
+            const char c = text_[at_];
+            if (c == '(' || c == '[') ++depth;
+            if ((c == ')' || c == ']') && depth-- == 0) throw wrong("a closing bracket has no opening one");
+            if (std::string_view("()[],").find(c) != std::string_view::npos) {
+                ++at_;
+                continue;
+            }
+            double number = 0;
+            const auto parsed = parse_number(text_.data() + at_, text_.data() + text_.size(), number);
+            if (parsed.ec != std::errc()) throw wrong("a number is missing");
+            at_ = static_cast<std::size_t>(parsed.ptr - text_.data());
+            numbers.push_back(number);
+        } while (depth > 0);
+        return numbers;
+    }
+
+    // Reads an operation of a transform, or the order of them.
+    void read_transform(std::string_view name)
+    {
+        if (name == "xformOpOrder") {
+            std::vector<std::string> names;
+            expect('[');
+            while (skip_space(), !is_at(']')) {
+                names.push_back(text_value());
+                if (skip_space(), !is_at(']')) expect(',');
+            }
+            ++at_;
+            return order_operations(names);
+        }
+        constexpr std::string_view samples = ".timeSamples";
+        if (!name.ends_with(samples)) {
+            prims_.back().operations[std::string(name)] = numbers_of_value();
+            return;
+        }
+        name.remove_suffix(samples.size());
+        expect('{');
+        bool found = false;
+        while (skip_space(), !is_at('}')) {
+            if (std::exchange(found, true))
+                throw wrong(fmt::format(
+                    "{} has several time samples; give a file with one frame (usdcat can extract one)", name));
+            if (!at_word()) throw wrong("a time sample has no time");
+            word();
+            if (skip_space(), is_at(':')) ++at_;
+            skip_space();
+            prims_.back().operations[std::string(name)] = numbers_of_value();
+            if (skip_space(), is_at(',')) ++at_;
+        }
+        ++at_;
+    }
+
+    // Reads [custom] TYPE NAME [= VALUE] [(METADATA)], or the beginning of a prim.
     void read_statement()
     {
         std::string_view type, name;
@@ -249,6 +433,7 @@ private:
         while (!line && at_word()) {
             type = name;
             name = word();
+            if (type.empty() && (name == "def" || name == "over" || name == "class")) return open_prim(name);
             line = skip_space();
         }
         if (!line && is_at('=')) {
@@ -269,6 +454,8 @@ private:
     void read_value(std::string_view type, std::string_view name)
     {
         constexpr std::string_view samples = ".timeSamples";
+        if (name == "xformOpOrder" || name.starts_with("xformOp:")) return read_transform(name);
+        if (!prims_.back().is_points) return skip_value();
         std::optional<UsdArray> array = array_of(type);
         // Strings other than primvars describe how the prim is placed and drawn.
         if (!array || (array->strings && !name.starts_with("primvars:"))) {
@@ -280,7 +467,7 @@ private:
             if (!is_at('[')) return skip_value();  // None
             array->name = std::string(name);
             read_numbers(*array);
-            if (!by_name_.contains(name)) add(name, std::move(*array));
+            if (!by_name_.contains(name)) by_name_.emplace(name, arrays_.insert(arrays_.end(), std::move(*array)));
             return;
         }
         name.remove_suffix(samples.size());
@@ -307,13 +494,8 @@ private:
             arrays_.erase(before->second);
             by_name_.erase(before);
         }
-        if (found) add(name, std::move(*array));
+        if (found) by_name_.emplace(name, arrays_.insert(arrays_.end(), std::move(*array)));
     }
-    void add(std::string_view name, UsdArray array)
-    {
-        by_name_.emplace(name, arrays_.insert(arrays_.end(), std::move(array)));
-    }
-
     // Reads [1, 2] or [(1, 2, 3), (4, 5, 6)].
     void read_numbers(UsdArray& array)
     {
@@ -338,25 +520,16 @@ private:
         ++at_;
     }
 
-    // Throws Error if the array is too large. A number takes at least two bytes of text, and more memory while its
-    // array grows and is converted to a column.
-    void check_memory(const UsdArray& array) const
-    {
-        if (const double bytes = 4.0 * static_cast<double>(array.bytes.size()); !fits_in_memory(bytes))
-            throw memory_exceeded(fmt::format("an array of at least {} rows", array.rows()), bytes,
-                                  "write .bgeo instead");
-    }
-
     void read_number(UsdArray& array)
     {
         const char *from = text_.data() + at_, *end = text_.data() + text_.size();
         const auto put = [&](auto number) {
-            if (array.bytes.size() == array.bytes.capacity()) check_memory(array);
+            if (array.bytes.size() == array.bytes.capacity()) check_array_memory(array);
             const auto* bytes = reinterpret_cast<const unsigned char*>(&number);
             array.bytes.insert(array.bytes.end(), bytes, bytes + sizeof number);
         };
         const auto parse = [&](auto number) {
-            const auto parsed = std::from_chars(from, end, number);
+            const auto parsed = parse_number(from, end, number);
             bool fits = parsed.ec == std::errc();
             if constexpr (std::is_integral_v<decltype(number)>) fits &= number >= array.least && number <= array.most;
             if (!fits) throw wrong("a number of its type is missing");
@@ -380,12 +553,15 @@ private:
 
     std::string_view text_;
     std::size_t at_ = 0;
+    Eigen::Affine3d to_metres_ = Eigen::Affine3d::Identity(), to_world_ = Eigen::Affine3d::Identity();
+    std::vector<Prim> prims_;  // the open ones, the innermost last
+    bool found_ = false;
     std::list<UsdArray> arrays_;
     std::map<std::string_view, std::list<UsdArray>::iterator> by_name_;
     std::set<std::string_view> names_;  // of all arrays so far, with and without time samples
 };
 
-std::vector<UsdArray> usda_points(std::string_view text) { return UsdaReader(text).read(); }
+UsdPoints usda_points(std::string_view text) { return UsdaReader(text).read(); }
 
 constexpr std::string_view primvar = "primvars:";
 
@@ -603,15 +779,71 @@ Column<Token> strings_of(const UsdArray& array, std::size_t size)
     return Column<Token>(std::span<const Token>(strings));
 }
 
+// Replaces values by those that their indices select, and removes the indices.
+void expand_indices(std::vector<UsdArray>& arrays)
+{
+    constexpr std::string_view suffix = ":indices";
+    std::map<std::string, const UsdArray*> indices;
+    for (const UsdArray& array : arrays)
+        if (array.name.ends_with(suffix) && array.type == ScalarType::Int32)
+            indices[array.name.substr(0, array.name.size() - suffix.size())] = &array;
+    std::set<std::string> used;
+    for (UsdArray& array : arrays) {
+        const auto found = indices.find(array.name);
+        if (found == indices.end()) continue;
+        const std::size_t row = array.tuple * scalar_bytes(array.type), rows = array.rows();
+        std::vector<unsigned char> expanded;
+        for (std::size_t i = 0; i < found->second->rows(); ++i) {
+            const auto index = load_scalar<std::int32_t>(found->second->bytes.data() + 4 * i, ByteOrder::Little);
+            if (index < 0 || static_cast<std::size_t>(index) >= rows)
+                throw Error(fmt::format("{} has the index {}; there are {} values, from 0", array.name, index, rows));
+            const auto from = array.bytes.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(index) * row);
+            expanded.insert(expanded.end(), from, from + static_cast<std::ptrdiff_t>(row));
+        }
+        used.insert(found->second->name);
+        array.bytes = std::move(expanded);
+    }
+    std::erase_if(arrays, [&](const UsdArray& array) { return used.count(array.name) > 0; });
+}
+
+// Moves the points to the world, with their velocities, normals, turns and radii.
+void place(PointSet& points, const std::vector<UsdArray>& arrays, const Eigen::Affine3d& to_world)
+{
+    if (to_world.matrix().isIdentity(0)) return;
+    const Eigen::Matrix3d linear = to_world.linear(), of_normals = normal_map(linear);
+    const double scale = std::cbrt(std::abs(linear.determinant()));
+    const auto turn = Eigen::Quaterniond(to_world.rotation()).cast<float>();
+    for (const UsdArray& array : arrays) {
+        const std::string name = attribute_of_property(array.name);
+        if (auto* vectors = points.find<Vec3f>(name); vectors && array.role != UsdArray::Number) {
+            for (Vec3f& value : vectors->write()) {
+                const Vec3d before = value.cast<double>();
+                const Vec3d after = array.role == UsdArray::Point    ? (to_world * before).eval()
+                                    : array.role == UsdArray::Vector ? (linear * before).eval()
+                                                                     : (of_normals * before).stableNormalized();
+                value = after.cast<float>();
+            }
+        } else if (auto* radii = points.find<float>(name); radii && name == "pscale") {
+            for (float& radius : radii->write()) radius = static_cast<float>(radius * scale);
+        } else if (auto* turns = points.find<Quatf>(name)) {
+            for (Quatf& value : turns->write()) value = turn * value;
+        }
+    }
+}
+
 PointSet read_usda(const std::filesystem::path& path)
 {
     const InputFile file(path);
-    const std::vector<UsdArray> arrays = usda_points(file.text());
-    const auto place = std::find_if(arrays.begin(), arrays.end(), [](const UsdArray& a) { return a.name == "points"; });
-    if (place == arrays.end() || place->tuple != 3) throw Error("the prim of points has no positions of three numbers");
+    UsdPoints prim = usda_points(file.text());
+    std::vector<UsdArray>& arrays = prim.arrays;
+    expand_indices(arrays);
+    const auto of_points =
+        std::find_if(arrays.begin(), arrays.end(), [](const UsdArray& a) { return a.name == "points"; });
+    if (of_points == arrays.end() || of_points->tuple != 3)
+        throw Error("the prim of points has no positions of three numbers");
 
     PointSet points;
-    points.append(place->rows());
+    points.append(of_points->rows());
     bool has_id = false;
     std::vector<std::string> names;
     for (const UsdArray& array : arrays) {
@@ -646,6 +878,7 @@ PointSet read_usda(const std::filesystem::path& path)
     }
     check_column_names(names, "");
     if (!has_id) number_points(points);
+    place(points, arrays, prim.to_world);
     return points;
 }
 

@@ -142,7 +142,7 @@ def Xform "world" (
     const PointSet points = read_points(folder / "a.usda");
 
     REQUIRE(points.size() == 2);
-    CHECK_THAT(points.P()[1], close_to(Vec3f(3, 4, 0.5f), 0));
+    CHECK_THAT(points.P()[1], close_to(Vec3f(4, 6, 3.5f), 0));  // moved by the world
     CHECK_THAT(points.v()[1], close_to(Vec3f(0, 1, 0), 0));
     CHECK(points.column<float>("pscale")[1] == 0.25f);
     CHECK(points.column<float>("uv0")[1] == 2);

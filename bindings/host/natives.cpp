@@ -60,7 +60,7 @@ int suggest(State& state)
 // native.names_frames(path): returns true if the path names a sequence of files.
 int names_frames(State& state)
 {
-    lua_pushboolean(state.lua(), FramePattern(text_at(state.lua(), 1)).has_frame());
+    lua_pushboolean(state.lua(), FramePattern::of_files(state.host().folder() / text_at(state.lua(), 1)).has_frame());
     return 1;
 }
 

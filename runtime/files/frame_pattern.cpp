@@ -29,6 +29,20 @@ int read_width(const std::string& text, std::size_t& at)
     return width;
 }
 
+// Returns the start of the last component of a path.
+std::size_t start_of_name(std::string_view path)
+{
+    const std::size_t slash = path.find_last_of('/');
+    return slash == std::string_view::npos ? 0 : slash + 1;
+}
+
+// Returns true at a backslash that takes the next character literally.
+bool is_escape(std::string_view text, std::size_t at)
+{
+    return text[at] == '\\' && at + 1 < text.size() &&
+           std::string_view("#$%").find(text[at + 1]) != std::string_view::npos;
+}
+
 std::optional<FrameNumber> frame_number_at(const std::string& text, std::size_t begin)
 {
     std::size_t end = begin;
@@ -46,7 +60,7 @@ std::optional<FrameNumber> frame_number_at(const std::string& text, std::size_t 
         end = begin + 1;
         const int width = read_width(text, end);
         if (end == text.size() || text[end] != 'd')
-            throw Error(fmt::format("\"{}\": the % must be a frame number such as %04d", text));
+            throw Error(fmt::format("\"{}\": the % must be a frame number such as %04d; \\% is the character", text));
         return FrameNumber{begin, end + 1, std::max(1, width)};
     }
     return std::nullopt;
@@ -54,20 +68,34 @@ std::optional<FrameNumber> frame_number_at(const std::string& text, std::size_t 
 
 }  // namespace
 
-FramePattern::FramePattern(std::string text) : text_(std::move(text)), before_(text_)
+FramePattern::FramePattern(std::string text) : text_(std::move(text))
 {
+    const std::size_t name = start_of_name(text_);
+    std::string* part = &before_;
     for (std::size_t at = 0; at < text_.size(); ++at) {
-        const std::optional<FrameNumber> number = frame_number_at(text_, at);
-        if (!number) continue;
+        if (at >= name && is_escape(text_, at)) {
+            *part += text_[++at];
+            continue;
+        }
+        const std::optional<FrameNumber> number = at < name ? std::nullopt : frame_number_at(text_, at);
+        if (!number) {
+            *part += text_[at];
+            continue;
+        }
         if (digits_) throw Error(fmt::format("\"{}\" has two frame numbers; it must have one", text_));
-        before_ = text_.substr(0, number->begin);
-        after_ = text_.substr(number->end);
+        part = &after_;
         digits_ = number->digits;
         at = number->end - 1;
     }
-    if (digits_ && after_.find('/') != std::string::npos)
-        throw Error(fmt::format(
-            "\"{}\": the frame number must be in the name of the file, not in the name of its folder", text_));
+}
+
+FramePattern FramePattern::of_files(const std::filesystem::path& path)
+{
+    std::error_code none;
+    if (!fs::exists(path, none)) return FramePattern(path.string());
+    FramePattern literal;
+    literal.text_ = literal.before_ = path.string();
+    return literal;
 }
 
 namespace {
@@ -97,7 +125,7 @@ std::size_t separator_before(std::string_view text)
 
 std::string FramePattern::expand(int frame, std::string_view output) const
 {
-    if (!digits_) return with_output(text_, output);
+    if (!digits_) return with_output(before_, output);
     // The minus sign does not count as a digit: -1 is -0001, as in Houdini.
     const std::string number =
         fmt::format("{}{:0{}}", frame < 0 ? "-" : "", std::abs(static_cast<long long>(frame)), *digits_);
@@ -108,7 +136,7 @@ std::string FramePattern::for_output(std::string_view output) const { return wit
 
 std::string FramePattern::without_frame(std::string_view output) const
 {
-    if (!digits_) return with_output(text_, output);
+    if (!digits_) return with_output(before_, output);
     return with_output(before_.substr(0, separator_before(before_)), output) + with_output(after_, output);
 }
 
@@ -117,7 +145,7 @@ std::map<int, fs::path> FramePattern::existing(std::string_view output) const
     std::map<int, fs::path> found;
     std::error_code error;
     if (!digits_) {
-        const fs::path path = with_output(text_, output);
+        const fs::path path = with_output(before_, output);
         if (fs::exists(path, error)) found.emplace(0, path);
         return found;
     }
@@ -149,10 +177,13 @@ std::string part_name(int number, int count)
 std::string with_part(const std::string& pattern, std::string_view part)
 {
     if (has_part(pattern)) return with_value(pattern, part_variable, part);
-    const std::size_t slash = pattern.find_last_of('/'), name = slash == std::string::npos ? 0 : slash + 1;
+    const std::size_t name = start_of_name(pattern);
     std::size_t place = pattern.size();
     for (std::size_t at = name; at < pattern.size() && place == pattern.size(); ++at)
-        if (frame_number_at(pattern, at)) place = separator_before(std::string_view(pattern).substr(0, at));
+        if (is_escape(pattern, at))
+            ++at;
+        else if (frame_number_at(pattern, at))
+            place = separator_before(std::string_view(pattern).substr(0, at));
     if (place == pattern.size())
         if (const std::size_t dot = pattern.find_last_of('.'); dot != std::string::npos && dot > name) place = dot;
     return fmt::format("{}_part{}{}", pattern.substr(0, place), part, pattern.substr(place));
@@ -161,7 +192,7 @@ std::string with_part(const std::string& pattern, std::string_view part)
 OutputTarget parse_output_target(const std::string& text)
 {
     // Attributes follow the last colon of the file's name, after the extension. C:/x.vdb and a:b.vdb have none.
-    const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
+    const std::size_t name = start_of_name(text);
     const std::size_t colon = text.find_last_of(':');
     const bool has_attributes =
         colon != std::string::npos && colon > name && text.find('.', colon) == std::string::npos;

@@ -1,5 +1,6 @@
 // Patterns of file names for a sequence of frames: `####` (one digit each, but a single # means four), $F4 or $F, %04d
-// or %d. {output} is the name of a graph's output, and {part} that of a part of the points.
+// or %d, in the last component of a path. A backslash before #, $ or % takes it literally. {output} is the name of a
+// graph's output, and {part} that of a part of the points.
 #pragma once
 
 #include <filesystem>
@@ -16,6 +17,9 @@ public:
     // Throws Error if a `%` is not a frame number (%s), or if the file's name has more than one frame number.
     explicit FramePattern(std::string text);
 
+    // Returns the pattern of files that are read. The name of an existing file is not a pattern, whatever it contains.
+    static FramePattern of_files(const std::filesystem::path& path);
+
     const std::string& text() const { return text_; }
     // Return true if the name depends on the frame, and on the output.
     bool has_frame() const { return digits_.has_value(); }
@@ -31,8 +35,10 @@ public:
     std::map<int, std::filesystem::path> existing(std::string_view output = "main") const;
 
 private:
+    FramePattern() = default;
+
     std::string text_;
-    std::string before_, after_;  // text around the frame number
+    std::string before_, after_;  // text around the frame number, without backslashes; before_ is all if there is none
     std::optional<int> digits_;   // minimum digits of the number
 };
 

@@ -28,10 +28,32 @@ TEST_CASE("every way to write a frame number in a name is expanded and padded", 
 
 TEST_CASE("a pattern that is not one frame number in a file's name is refused", "[files][pattern]")
 {
-    CHECK(error_of([] { FramePattern("a.%s.vdb"); }) == "\"a.%s.vdb\": the % must be a frame number such as %04d");
+    CHECK(error_of([] { FramePattern("a.%s.vdb"); }) ==
+          "\"a.%s.vdb\": the % must be a frame number such as %04d; \\% is the character");
     CHECK(error_of([] { FramePattern("a.##.$F4.vdb"); }) == "\"a.##.$F4.vdb\" has two frame numbers; it must have one");
-    CHECK(error_of([] { FramePattern("####/a.vdb"); }) ==
-          "\"####/a.vdb\": the frame number must be in the name of the file, not in the name of its folder");
+}
+
+TEST_CASE("folders and escaped characters are no pattern, and neither is the name of an existing file",
+          "[files][pattern]")
+{
+    const FramePattern pattern("shot#3/50%/$F/a\\#2_100\\%.####.vdb");
+    CHECK(pattern.expand(7) == "shot#3/50%/$F/a#2_100%.0007.vdb");
+    CHECK(pattern.without_frame() == "shot#3/50%/$F/a#2_100%.vdb");
+    CHECK_FALSE(FramePattern("####/a\\$F.vdb").has_frame());
+    CHECK(FramePattern("####/a\\$F.vdb").expand(7) == "####/a$F.vdb");
+    CHECK(with_part("a\\#.####.vdb", "03of16") == "a\\#_part03of16.####.vdb");
+
+    const TemporaryFolder folder;
+    for (const char* name : {"take#2.obj", "100%.obj", "50%s.0003.obj"}) std::ofstream(folder / name) << "x";
+    for (const char* name : {"take#2.obj", "100%.obj"}) {
+        CAPTURE(name);
+        const FramePattern of_file = FramePattern::of_files(folder / name);
+        CHECK_FALSE(of_file.has_frame());
+        CHECK(of_file.expand(7) == (folder / name).string());
+        CHECK(of_file.existing().at(0) == folder / name);
+    }
+    CHECK(FramePattern::of_files(folder / "50\\%s.####.obj").existing().at(3) == folder / "50%s.0003.obj");
+    CHECK(FramePattern::of_files(folder / "take#3.obj").has_frame());
 }
 
 TEST_CASE("the existing files of a sequence are those that the pattern would write", "[files][pattern]")

@@ -112,7 +112,7 @@ struct ReadCurve : SequenceOptions {
     }
     ObjectPtr make(MakeContext& context) const
     {
-        const FramePattern pattern((context.folder / path).string());
+        const auto pattern = FramePattern::of_files(context.folder / path);
         check(path, pattern.has_frame());
         if (!pattern.has_frame()) return read_curves(context.resolve(path), closed);
         const auto files = existing_files(pattern);

@@ -7,7 +7,7 @@ namespace {
 
 FramePattern pattern_of(const MakeContext& context, const std::string& path)
 {
-    return FramePattern((context.folder / path).string());  // an absolute path stays itself
+    return FramePattern::of_files(context.folder / path);  // an absolute path stays itself
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -16,6 +17,7 @@
 #include "runtime/graph/point_function.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/points/attribute_like.h"
+#include "runtime/shapes/motion/animated.h"
 #include "runtime/shapes/shape.h"
 #include "runtime/solver/collision/hits.h"
 
@@ -287,6 +289,38 @@ void warn_of_moves_without_velocity(const Plan& plan, std::vector<std::string>& 
     }
 }
 
+// Returns the first frame of the scene.
+double start_of(const Plan& plan)
+{
+    double start = std::numeric_limits<double>::infinity();
+    for (const PlannedNode& planned : plan.nodes) {
+        if (planned.node->type->kind != NodeKind::Source) continue;
+        const auto given = planned.node->arguments.find("start");
+        const double* frame = given == planned.node->arguments.end() ? nullptr : given->second.get<double>();
+        start = std::min(start, frame ? *frame : 1.0);
+    }
+    return start;
+}
+
+// Warns of mesh files that begin later after the scene than they last, and are probably meant to begin with it.
+void warn_of_late_sequences(const Plan& plan, std::vector<std::string>& warnings)
+{
+    const double start = start_of(plan);
+    for (const PlannedNode& planned : plan.nodes)
+        for (const auto& [name, value] : planned.node->arguments) {
+            const auto mesh = value.object<AnimatedMesh>();
+            if (!mesh || !mesh->deforms()) continue;
+            const FrameRange files = mesh->range();
+            if (files.empty() || !(files.first - start > files.last - files.first)) continue;
+            warnings.push_back(warning_of(
+                *planned.node,
+                fmt::format(
+                    "the files of its {} begin at frame {}, and the scene at frame {}; until then the first one "
+                    "stands still: give rapid.mesh.read offset = {}, or rapid.create start = {}",
+                    name, files.first, start, start - files.first, files.first)));
+        }
+}
+
 // Returns warnings, with advice, about nodes whose result is dropped, that wait for something that never comes, or
 // that make something unused. plan: the plan of the graph, after its attributes are found.
 std::vector<std::string> warnings_about(const Graph& graph, const Plan& plan)
@@ -300,6 +334,7 @@ std::vector<std::string> warnings_about(const Graph& graph, const Plan& plan)
     warn_of_other_names(plan, warnings);
     warn_of_units(plan, warnings);
     warn_of_moves_without_velocity(plan, warnings);
+    warn_of_late_sequences(plan, warnings);
     return warnings;
 }
 

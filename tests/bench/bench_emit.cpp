@@ -14,6 +14,7 @@
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
+#include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/animated.h"
 
 namespace rapid {

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "runtime/base/parallel.h"
+#include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/scatter/scatter.h"
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "runtime/shapes/analytic/analytic.h"
+#include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/animated.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/operators/node_test.h"

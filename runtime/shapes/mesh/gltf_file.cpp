@@ -415,7 +415,8 @@ private:
         if (const auto indices = json_primitive.find("indices"); indices != json_primitive.end()) {
             for (const double index : document_.values(*indices).all) {
                 if (!(index >= 0 && index < static_cast<double>(vertices_)))
-                    throw Error(fmt::format("a face has the vertex {}; there are {}, from 0", index, vertices_));
+                    throw Error(
+                        fmt::format("a face has the vertex {}; the mesh has {}, numbered from 0", index, vertices_));
                 corners.push_back(static_cast<std::int32_t>(index));
             }
         } else {

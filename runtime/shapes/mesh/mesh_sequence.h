@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "runtime/base/frame_sequence.h"
-#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/mesh/deforming_mesh.h"
 
 namespace rapid {
 
-class MeshSequence {
+class MeshSequence final : public DeformingMesh {
 public:
     // Reads the first file. `name`: the pattern, for messages. order: first and last are replaced by those of the
     // files. Throws Error if there are no files, if a frame is missing in between, or if read_mesh() does.
@@ -28,14 +28,17 @@ public:
     int first() const { return files_.begin()->first; }  // frame of the first file
     int last() const { return files_.rbegin()->first; }
     const FrameSequence& order() const { return order_; }
-    const MeshPtr& rest() const { return rest_; }  // mesh of the first file
+    const MeshPtr& rest() const override { return rest_; }  // mesh of the first file
+    double begins() const override { return order_.begins(); }
+    double ends() const override { return order_.ends(); }
 
     // Returns true if the sequence has a mesh at this frame.
-    bool has(std::int64_t frame) const { return order_.file_of(frame).has_value(); }
+    bool has(std::int64_t frame) const override { return order_.file_of(frame).has_value(); }
     // Returns the mesh of this frame, with the faces of the first file and its own values. If there is none, returns
     // that of the nearest file. Thread-safe. Throws Error if the number of vertices or faces differs from the first
     // file (the message has the frame and both counts).
     MeshPtr at(std::int64_t frame) const;
+    MeshPtr at(const FrameClock&, std::int64_t frame) const override { return at(frame); }
 
 private:
     MeshPtr read(int frame) const;
@@ -50,7 +53,5 @@ private:
     mutable std::mutex mutex_;
     mutable std::deque<std::pair<int, MeshPtr>> recent_;  // most recent first
 };
-
-using MeshSequencePtr = std::shared_ptr<const MeshSequence>;
 
 }  // namespace rapid

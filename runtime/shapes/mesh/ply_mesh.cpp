@@ -275,7 +275,8 @@ void read_strips(PlyFile& file, const PlyElement& strips, MeshFile& mesh)
                 continue;
             }
             if (list[k] < 0 || list[k] >= vertices)
-                throw Error(fmt::format("a strip has the vertex {}; there are {}, from 0", list[k], vertices));
+                throw Error(
+                    fmt::format("a strip has the vertex {}; the mesh has {}, numbered from 0", list[k], vertices));
             if (k < first + 2) continue;
             const auto corner = [&](std::size_t back) { return static_cast<std::int32_t>(list[k - back]); };
             if ((k - first) % 2 == 0)

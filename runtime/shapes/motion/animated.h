@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "runtime/shapes/mesh/mesh_sequence.h"
+#include "runtime/shapes/mesh/deforming_mesh.h"
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/shapes/shape.h"
 
@@ -16,21 +16,21 @@ public:
     static constexpr std::string_view param_type = "moving mesh";
 
     AnimatedMesh(MeshPtr mesh, MotionPtr motion) : rest_(std::move(mesh)), motion_(std::move(motion)) {}
-    AnimatedMesh(MeshSequencePtr sequence, MotionPtr motion)
-        : rest_(sequence->rest()), sequence_(std::move(sequence)), motion_(std::move(motion))
+    AnimatedMesh(DeformingMeshPtr deforming, MotionPtr motion)
+        : rest_(deforming->rest()), deforming_(std::move(deforming)), motion_(std::move(motion))
     {
     }
 
     std::string_view kind() const override { return "moving mesh"; }
     bool varies() const override { return true; }
 
-    bool deforms() const { return sequence_ != nullptr; }
+    bool deforms() const { return deforming_ != nullptr; }
     const MeshPtr& rest() const { return rest_; }  // mesh of the first file of a sequence, without the motion
     const MotionPtr& motion() const { return motion_; }
     FrameRange range() const;
 
     // Returns true if there is a mesh at a whole frame. A sequence may have none beyond its files.
-    bool has(std::int64_t frame) const { return !sequence_ || sequence_->has(frame); }
+    bool has(std::int64_t frame) const { return !deforming_ || deforming_->has(frame); }
     // Returns true if there is a mesh throughout the time between two frames, which may be fractional.
     bool has(double from, double to) const
     {
@@ -45,7 +45,7 @@ public:
 
 private:
     MeshPtr rest_;
-    MeshSequencePtr sequence_;  // null if the mesh does not deform
+    DeformingMeshPtr deforming_;  // null if the mesh does not deform
     MotionPtr motion_;
 };
 

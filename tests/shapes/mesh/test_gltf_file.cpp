@@ -181,7 +181,8 @@ TEST_CASE("what a glTF file gets wrong, or requires in vain, is an error that na
     Gltf gltf;
     gltf.add_floats(corners, "VEC3", 3);
     gltf.add(std::vector<std::uint8_t>{0, 1, 9}, byte_type, "SCALAR", 3);
-    CHECK_THAT(gltf.error(one_mesh("", R"(,"indices":1)")), Contains("a face has the vertex 9; there are 3, from 0"));
+    CHECK_THAT(gltf.error(one_mesh("", R"(,"indices":1)")),
+               Contains("a face has the vertex 9; the mesh has 3, numbered from 0"));
     CHECK_THAT(gltf.error(one_mesh("") + R"(,"extensionsRequired":["KHR_draco_mesh_compression"])"),
                Contains("it requires the extension \"KHR_draco_mesh_compression\", which can't be read"));
     CHECK(gltf.error(one_mesh("") + R"(,"extensionsRequired":["KHR_materials_unlit","KHR_texture_transform",)"

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "runtime/shapes/mesh/mesh_sequence.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

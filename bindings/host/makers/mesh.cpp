@@ -3,16 +3,21 @@
 
 #include <fmt/format.h>
 
+#include "bindings/host/makers/file_axes.h"
 #include "bindings/host/makers/sequence_options.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/shapes/mesh/detailed_mesh.h"
+#include "runtime/shapes/mesh/gltf_animation.h"
+#include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/animated.h"
 
 namespace rapid {
 namespace {
 
-struct ReadMesh : SequenceOptions {
+struct ReadMesh : SequenceOptions, FileAxes {
     std::string path;
+    std::optional<std::string> animation;
+    std::optional<double> speed;
 
     static Maker declare()
     {
@@ -22,32 +27,53 @@ struct ReadMesh : SequenceOptions {
             .param(&ReadMesh::path, "path", Value(), any_number(), "",
                    "path, relative to the graph file; with #### or $F4 a file for each frame, for a mesh that deforms")
             .required();
+        declaration
+            .param(
+                &ReadMesh::animation, "animation", Value(), any_number(), "",
+                "the name of an animation of a glTF file, which moves and deforms the mesh from time 0 on; \"\" is the "
+                "only one")
+            .param(&ReadMesh::speed, "speed", Value(), any_number(), "", "seconds of the animation per second");
+        FileAxes::declare(declaration);
         return SequenceOptions::declare(declaration);
     }
     ObjectPtr make(MakeContext& context) const
     {
-        const FramePattern pattern((context.folder / path).string());  // an absolute path stays itself
+        if (animation) return animated(context);
+        if (speed) throw Error("speed is for an animation; give its name as animation");
+        const auto pattern = FramePattern::of_files(context.folder / path);  // an absolute path stays itself
         check(path, pattern.has_frame());
         if (!pattern.has_frame()) {
             const MeshPtr mesh = read_mesh(context.resolve(path));
             warn_of_skipped(*mesh, context);
-            return mesh;
+            return are_ours() ? mesh : transformed(mesh, pose().affine());
         }
         const auto files = pattern.existing();
         if (context.on_read)
             for (const auto& [frame, file] : files) context.on_read(file);
         auto sequence = std::make_shared<MeshSequence>(files, pattern.text(), order());
         warn_of_skipped(*sequence->rest(), context);
-        return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion({}));
+        return std::make_shared<AnimatedMesh>(std::move(sequence), constant_motion(pose()));
     }
 
 private:
+    ObjectPtr animated(MakeContext& context) const
+    {
+        const std::filesystem::path file = context.resolve(path);
+        if (std::error_code none; !std::filesystem::exists(file, none))
+            throw Error(fmt::format("there is no mesh file \"{}\"", file.string()));
+        if (file.extension() != ".gltf" && file.extension() != ".glb")
+            throw Error(fmt::format("animation is for .gltf and .glb, and \"{}\" is neither", path));
+        auto mesh = std::make_shared<GltfAnimatedMesh>(file, *animation, speed.value_or(1), order());
+        warn_of_skipped(*mesh->rest(), context);
+        return std::make_shared<AnimatedMesh>(std::move(mesh), constant_motion(pose()));
+    }
+
     static void warn_of_skipped(const Mesh& mesh, MakeContext& context)
     {
         const auto* detailed = dynamic_cast<const DetailedMesh*>(&mesh);
         if (!detailed) return;
         for (const std::string& what : detailed->skipped)
-            context.warnings.push_back(fmt::format("rapid.mesh.read: \"{}\": not read: {}", mesh.name, what));
+            context.warnings.push_back(fmt::format("rapid.mesh.read: \"{}\": {}", mesh.name, what));
     }
 };
 RAPID_MAKER(ReadMesh);

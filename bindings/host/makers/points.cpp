@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "bindings/host/makers/file_axes.h"
 #include "bindings/host/makers/sequence_options.h"
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/frame_pattern.h"
@@ -23,7 +24,7 @@ ObjectPtr numbered(PointSet points)
     return object;
 }
 
-struct ReadPoints : SequenceOptions {
+struct ReadPoints : SequenceOptions, FileAxes {
     std::string path;
     std::optional<double> frame;  // the frame of a sequence, requested by lua/rapid.lua
 
@@ -37,13 +38,14 @@ struct ReadPoints : SequenceOptions {
                    "function of the frame")
             .required();
         declaration.param(&ReadPoints::frame, "frame", Value(), any_number(), "", "frame of a sequence").internal();
+        FileAxes::declare(declaration);
         return SequenceOptions::declare(declaration);
     }
     ObjectPtr make(MakeContext& context) const
     {
         check(path, frame.has_value());
         if (!frame) return read(context.resolve(path), context);
-        const FramePattern pattern((context.folder / path).string());
+        const auto pattern = FramePattern::of_files(context.folder / path);
         const auto files = existing_files(pattern);
         if (const auto file = file_at(pattern, files, *frame)) return read(context.resolve(file->string()), context);
         // A frame without points still has the attributes of the other frames.
@@ -55,16 +57,29 @@ struct ReadPoints : SequenceOptions {
 
 private:
     // Reads points. The file's ids identify the same points in other files; without ids their order does.
-    static ObjectPtr read(const std::filesystem::path& file, MakeContext& context)
+    ObjectPtr read(const std::filesystem::path& file, MakeContext& context) const
     {
         const SkippedContents skipped;
         PointSet points = read_points(file);
+        check_finite(points, file);
+        apply(points);
         for (const std::string& what : skipped.list())
-            context.warnings.push_back(fmt::format("rapid.points.read: \"{}\": not read: {}", file.string(), what));
+            context.warnings.push_back(fmt::format("rapid.points.read: \"{}\": {}", file.string(), what));
         if (!has_ids(points)) return numbered(std::move(points));
         auto object = std::make_shared<PointsObject>();
         object->points = std::move(points);
         return object;
+    }
+
+    static void check_finite(const PointSet& points, const std::filesystem::path& file)
+    {
+        for (const auto& [name, column] : {std::pair("P", &points.P()), std::pair("v", &points.v())})
+            for (std::size_t i = 0; i < points.size(); ++i)
+                if (const Vec3f& value = (*column)[i]; !value.allFinite())
+                    throw Error(
+                        fmt::format("\"{}\": the point in row {}, with id {}, has {} = {{{}, {}, {}}}; it must "
+                                    "be finite",
+                                    file.string(), i + 1, points.id()[i], name, value.x(), value.y(), value.z()));
     }
 
     // Returns true if every point has a unique id.

@@ -5,6 +5,7 @@
 
 #include "bindings/host/maker.h"
 #include "bindings/host/makers/sequence_options.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/level_set/grid_sequence.h"
 
 namespace rapid {
@@ -29,13 +30,23 @@ struct GridFiles : SequenceOptions {
     // Returns the files of a sequence. Throws Error if there are none.
     SequenceFiles files(MakeContext& context) const;
 
+    // Reads a single file and adds the reader's notes to the warnings.
+    template <class Read>
+    auto read_one(MakeContext& context, const Read& read) const
+    {
+        const SkippedContents notes;
+        auto object = read(context.resolve(path), grid);
+        for (const std::string& note : notes.list()) context.warnings.push_back(fmt::format("\"{}\": {}", path, note));
+        return object;
+    }
+
     // Returns the grid, or the sequence of grids, that read(path, grid) reads. The first file is read at once to report
     // its errors.
     template <class G, class Read>
     ObjectPtr make_with(MakeContext& context, const Read& read) const
     {
         check(path, is_sequence(context));
-        if (!is_sequence(context)) return read(context.resolve(path), grid);
+        if (!is_sequence(context)) return read_one(context, read);
         SequenceFiles sequence = files(context);
         const std::int64_t first = sequence.files.begin()->first + sequence.order.offset;
         const auto read_file = [&read, name = grid](const std::filesystem::path& file) { return read(file, name); };

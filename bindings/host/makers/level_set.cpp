@@ -267,7 +267,7 @@ struct ReadLevelSet : GridFiles {
     ObjectPtr make(MakeContext& context) const
     {
         check(path, is_sequence(context));
-        if (!is_sequence(context)) return read_level_set(context.resolve(path), grid);
+        if (!is_sequence(context)) return read_one(context, read_level_set);
         const SequenceFiles sequence = files(context);
         const auto read = [name = grid](const std::filesystem::path& file) { return read_level_set(file, name); };
         const std::int64_t first = sequence.files.begin()->first + sequence.order.offset;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "runtime/base/error.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
@@ -136,12 +137,32 @@ FloatGrid::Ptr read_fog(const std::filesystem::path& file_path, const std::strin
 
 const SandboxedReader<FloatGrid::Ptr> fog_reader("fog", read_fog, send_grid<FloatGrid>, receive_grid<FloatGrid>);
 
+// Sets small negative densities to 0: an advection overshoots, so smoke often has them.
+void drop_overshoots(FloatGrid& grid)
+{
+    constexpr float max_overshoot = 1e-3f;  // of the largest density
+    float largest = 0;
+    for (auto value = grid.tree().cbeginValueOn(); value; ++value) largest = std::max(largest, *value);
+    std::size_t dropped = 0;
+    float lowest = 0;
+    for (auto value = grid.tree().beginValueOn(); value; ++value) {
+        if (!(*value < 0) || *value < -max_overshoot * largest) continue;
+        lowest = std::min(lowest, *value);
+        value.setValue(0);
+        ++dropped;
+    }
+    if (dropped > 0)
+        SkippedContents::note(fmt::format("{} densities of grid \"{}\" are below 0, the lowest {}; they are taken as 0",
+                                          dropped, grid.getName(), lowest));
+}
+
 DensityGridPtr fog_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
     const FloatGrid::Ptr grid = read_grid_sandboxed<FloatGrid>(fog_reader, path, name);
+    drop_overshoots(*grid);
     try {
         return std::make_shared<OpenDensityGrid>(grid);
     } catch (const Error& error) {

@@ -1,9 +1,13 @@
 // Reads level sets from .vdb files by grid name.
 #include <fmt/format.h>
+#include <openvdb/tools/ChangeBackground.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "runtime/base/error.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
@@ -47,12 +51,6 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
             throw Error(fmt::format("grid \"{}\" of \"{}\" is {} with the class \"{}\"; it must be a float level set",
                                     chosen->getName(), path, chosen->valueType(),
                                     openvdb::GridBase::gridClassToString(chosen->getGridClass())));
-        // Exact, because a rotation, a shear or unequal scales would require resampling.
-        if (!is_uniform(chosen->transform()))
-            throw Error(
-                fmt::format("the transform of grid \"{}\" of \"{}\" is not a uniform scale and a translation; resample "
-                            "the grid to cubic voxels along the axes",
-                            chosen->getName(), path));
         const auto grid = openvdb::gridPtrCast<FloatGrid>(file.read(chosen));
         if (grid->tree().hasActiveTiles()) grid->tree().voxelizeActiveTiles(/*threaded=*/false);
         return grid;
@@ -64,16 +62,67 @@ FloatGrid::Ptr read_level_set_grid(const std::filesystem::path& file_path, const
 const SandboxedReader<FloatGrid::Ptr> level_set_reader("level set", read_level_set_grid, send_grid<FloatGrid>,
                                                        receive_grid<FloatGrid>);
 
+// Returns the median length of the gradient at voxels next to the surface: 1 if the values are distances.
+double gradient_near_surface(const FloatGrid& grid)
+{
+    const double voxel = grid.voxelSize()[0];
+    openvdb::tree::ValueAccessor<const FloatGrid::TreeType, /*IsSafe=*/false> accessor(grid.tree());
+    constexpr std::size_t enough = 4096;
+    std::vector<double> lengths;
+    for (auto value = grid.cbeginValueOn(); value; ++value) {
+        const openvdb::Coord at = value.getCoord();
+        double squares = 0;
+        bool changes_sign = false;
+        for (int axis = 0; axis < 3; ++axis) {
+            openvdb::Coord before = at, after = at;
+            --before[axis], ++after[axis];
+            const float a = accessor.getValue(before), b = accessor.getValue(after);
+            squares += std::pow((double(b) - a) / (2 * voxel), 2);
+            changes_sign |= (a < 0) != (b < 0);
+        }
+        if (changes_sign) lengths.push_back(std::sqrt(squares));
+        if (lengths.size() == enough) break;
+    }
+    if (lengths.empty()) return 1;
+    const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+    std::nth_element(lengths.begin(), middle, lengths.end());
+    return *middle;
+}
+
+// Converts distances in voxels to metres. Notes values that are not distances.
+void check_distances(FloatGrid& grid)
+{
+    const double voxel = grid.voxelSize()[0], gradient = gradient_near_surface(grid);
+    constexpr double tolerance = 0.1, most = 2;  // features of a voxel's size lower the gradient
+    if (gradient > 1 / most && gradient < most) return;
+    if (std::abs(gradient * voxel - 1) < tolerance) {
+        SkippedContents::note(fmt::format("the distances of grid \"{}\" are in voxels; they are multiplied by {:g} m",
+                                          grid.getName(), voxel));
+        const auto metres = [voxel](float distance) { return static_cast<float>(distance * voxel); };
+        for (auto value = grid.beginValueAll(); value; ++value) value.setValue(metres(*value));
+        openvdb::tools::changeBackground(grid.tree(), metres(grid.background()));
+        return;
+    }
+    SkippedContents::note(
+        fmt::format("the values of grid \"{}\" change by {:.3g} per metre at its surface; distances change by 1, "
+                    "so that points will stop at a wrong distance: rebuild the level set",
+                    grid.getName(), gradient));
+}
+
 LevelSetPtr level_set_of_file(const std::filesystem::path& path, const std::string& name)
 {
     if (std::error_code none; !std::filesystem::exists(path, none))
         throw Error(fmt::format("there is no file \"{}\"", path.string()));
     initialize_openvdb();
-    const FloatGrid::Ptr grid = read_grid_sandboxed<FloatGrid>(level_set_reader, path, name);
+    FloatGrid::Ptr grid = read_grid_sandboxed<FloatGrid>(level_set_reader, path, name);
     if (grid->activeVoxelCount() == 0)
         throw Error(
             fmt::format("grid \"{}\" of \"{}\" is empty; a level set needs a surface", grid->getName(), path.string()));
 
+    if (is_uniform(grid->transform()))
+        check_distances(*grid);
+    else
+        grid = on_cubic_voxels(*grid);
     const auto level_set = level_set_of(grid, [grid](double half_width) { return widened(*grid, half_width); });
     if (!level_set->has_surface())
         throw Error(

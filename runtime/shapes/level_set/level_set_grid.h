@@ -38,6 +38,10 @@ LevelSetGridPtr level_set_grid(const openvdb::FloatGrid::Ptr& grid);
 // the mesh, and existing ones stay bit-identical.
 openvdb::FloatGrid::Ptr widened(const openvdb::FloatGrid& grid, double half_width);
 
+// Resamples the surface of a grid whose map turns, mirrors, shears or scales its axes unequally to cubes along the
+// axes, and notes that (files/skipped_contents.h).
+openvdb::FloatGrid::Ptr on_cubic_voxels(const openvdb::FloatGrid& grid);
+
 // Resamples the surface of any level set to other voxels, through a mesh.
 openvdb::FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform,
                                      double half_width);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/base/error.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/level_set/buildable.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
@@ -52,6 +53,30 @@ FloatGrid::Ptr widened(const FloatGrid& grid, double half_width)
     openvdb::tools::compReplace(*wide, grid);
     wide->setName(grid.getName());
     return wide;
+}
+
+FloatGrid::Ptr on_cubic_voxels(const FloatGrid& grid)
+{
+    const double voxel = std::min({grid.voxelSize()[0], grid.voxelSize()[1], grid.voxelSize()[2]});
+    constexpr double half_width = 3;
+    Box3d bounds;
+    const auto index = grid.evalActiveVoxelBoundingBox();
+    for (int corner = 0; corner < 8; ++corner) {
+        const openvdb::Vec3d P = grid.indexToWorld(openvdb::Coord(corner & 1 ? index.max().x() : index.min().x(),
+                                                                  corner & 2 ? index.max().y() : index.min().y(),
+                                                                  corner & 4 ? index.max().z() : index.min().z()));
+        bounds.extend(Vec3d(P.x(), P.y(), P.z()));
+    }
+    const double volume = std::abs(grid.transform().baseMap()->determinant());
+    require_buildable(fmt::format("grid \"{}\"", grid.getName()),
+                      double(grid.activeVoxelCount()) * volume / (2 * half_width * voxel), bounds, {voxel, half_width});
+    const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+    auto cubic = openvdb::tools::levelSetRebuild(grid, 0.0f, static_cast<float>(half_width), transform.get());
+    cubic->setName(grid.getName());
+    SkippedContents::note(
+        fmt::format("the voxels of grid \"{}\" are not cubes along the axes; it is resampled to cubes of {:g} m",
+                    grid.getName(), voxel));
+    return cubic;
 }
 
 FloatGrid::Ptr resampled_to(const LevelSetPtr& shape, const openvdb::math::Transform& transform, double half_width)

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <optional>
+
 #include "runtime/base/error.h"
 #include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/grid_message.h"
@@ -29,17 +33,75 @@ openvdb::GridBase::Ptr choose_vectors(const std::string& path, const std::string
                             grids_of(vectors)));
 }
 
+// Three grids of floats that hold the components of a vector.
+struct Components {
+    std::string name;
+    std::array<openvdb::GridBase::Ptr, 3> grids;
+};
+
+// Returns the components NAME.x NAME.y NAME.z, or with _ for the dot, of the only vector of that form, or of the one
+// with this name.
+std::optional<Components> find_components(const std::string& name, const openvdb::GridPtrVec& grids)
+{
+    std::vector<Components> found;
+    for (const char separator : {'.', '_'})
+        for (const auto& grid : grids) {
+            const std::string& first = grid->getName();
+            const std::string stem = first.substr(0, first.size() < 2 ? 0 : first.size() - 2);
+            if (stem.empty() || first != stem + separator + 'x' || (!name.empty() && stem != name)) continue;
+            Components components{stem, {}};
+            for (const auto& other : grids)
+                for (int axis = 0; axis < 3; ++axis)
+                    if (other->isType<openvdb::FloatGrid>() && other->getName() == stem + separator + "xyz"[axis])
+                        components.grids[static_cast<std::size_t>(axis)] = other;
+            if (components.grids[0] && components.grids[1] && components.grids[2])
+                found.push_back(std::move(components));
+        }
+    if (found.size() != 1) return std::nullopt;
+    return found[0];
+}
+
+Vec3SGrid::Ptr joined_components(VdbFile& file, const Components& components)
+{
+    Vec3SGrid::Ptr vectors = Vec3SGrid::create();
+    vectors->setName(components.name);
+    vectors->setTransform(components.grids[0]->transform().copy());
+    auto to = vectors->getAccessor();
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto& component = components.grids[static_cast<std::size_t>(axis)];
+        if (component->transform() != vectors->transform())
+            throw Error(
+                fmt::format("the grids \"{}\" and \"{}\" have different maps; the components of a vector must "
+                            "have the same",
+                            components.grids[0]->getName(), component->getName()));
+        const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.read(component));
+        grid->tree().voxelizeActiveTiles(/*threaded=*/false);
+        for (auto value = grid->cbeginValueOn(); value; ++value) {
+            openvdb::Vec3s vector = to.getValue(value.getCoord());
+            vector[axis] = *value;
+            to.setValue(value.getCoord(), vector);
+        }
+    }
+    return vectors;
+}
+
 Vec3SGrid::Ptr read_vectors(const std::filesystem::path& file_path, const std::string& name)
 {
     initialize_openvdb();
     const std::string path = file_path.string();
     try {
         VdbFile file(file_path);
+        const bool has_vectors = std::any_of(file.grids().begin(), file.grids().end(), [&](const auto& grid) {
+            return name.empty() ? grid->template isType<Vec3SGrid>() : grid->getName() == name;
+        });
+        if (!has_vectors)
+            if (const auto components = find_components(name, file.grids()))
+                return joined_components(file, *components);
         const auto chosen = choose_vectors(path, name, file.grids());
         if (!chosen->isType<Vec3SGrid>())
             throw Error(
-                fmt::format("grid \"{}\" of \"{}\" is {}; it must have vectors (vec3s); merge three grids of floats "
-                            "into one in the program that writes them",
+                fmt::format("grid \"{}\" of \"{}\" is {}; it must have vectors (vec3s), or be three grids of "
+                            "floats, NAME.x NAME.y NAME.z",
                             chosen->getName(), path, chosen->valueType()));
         return openvdb::gridPtrCast<Vec3SGrid>(file.read(chosen));
     } catch (const openvdb::Exception& e) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/base/error.h"
+#include "runtime/files/skipped_contents.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -119,4 +120,27 @@ TEST_CASE("what is no fog is an error that says what is, and what is in the file
                Catch::EndsWith("grid \"density\" is -1 at voxel 1 2 3; a density must be at least 0"));
     CHECK_THAT(folder.error({empty}), Catch::EndsWith("has no density above 0, so it can't emit points"));
     CHECK_THAT(error_of([&] { read_density_grid(folder / "none.vdb", ""); }), Catch::Contains("there is no file"));
+}
+
+TEST_CASE("small densities below 0 are taken as 0 with a note, and larger ones are refused", "[density_grid]")
+{
+    const DensityFolder folder;
+    const auto grid = fog();
+    grid->tree().setValue({0, 0, 0}, 2.0f);
+    grid->tree().setValue({1, 0, 0}, -1e-7f);
+    grid->tree().setValue({2, 0, 0}, -1e-3f);
+    const SkippedContents notes;
+    const DensityGridPtr read = folder.read({grid});
+    CHECK(notes.list() == std::vector<std::string>{
+                              "2 densities of grid \"density\" are below 0, the lowest -0.001; they are taken as 0"});
+    CHECK(read->total() == 2);
+    const Vec3d P(2, 0, 0);
+    double density;
+    read->sample({&P, 1}, {&density, 1});
+    CHECK(density == 0);
+
+    grid->tree().setValue({3, 0, 0}, -0.01f);
+    CHECK_THAT(folder.error({grid}), Catch::Contains("is -0.01 at voxel 3 0 0; a density must be at least 0"));
+    grid->tree().setValue({3, 0, 0}, std::nanf(""));
+    CHECK_THAT(folder.error({grid}), Catch::Contains("has a value that is not finite, at voxel 3 0 0"));
 }

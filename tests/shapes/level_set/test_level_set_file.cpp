@@ -1,5 +1,6 @@
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
+#include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <filesystem>
@@ -8,6 +9,7 @@
 
 #include "runtime/base/error.h"
 #include "runtime/base/openvdb_grids.h"
+#include "runtime/files/skipped_contents.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "tests/files/other_circumstances.h"
 #include "tests/files/temporary_folder.h"
@@ -148,13 +150,6 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
         Equals(
             "grid \"empty\" of \"positive.vdb\" has 1 active voxels but no surface; a level set must change its sign"));
 
-    auto turned = sphere_grid("turned");
-    turned->transform().postRotate(0.5, openvdb::math::Y_AXIS);
-    folder.write_grids("turned.vdb", {turned});
-    CHECK_THAT(refusal("turned.vdb", ""),
-               Equals("the transform of grid \"turned\" of \"turned.vdb\" is not a uniform scale and a translation; "
-                      "resample the grid to cubic voxels along the axes"));
-
     folder.write_grids("fog.vdb", {[] {
                            auto fog = openvdb::FloatGrid::create(0);
                            fog->setName("density");
@@ -162,6 +157,60 @@ TEST_CASE("files without a level set are refused by name", "[level set][file]")
                        }()});
     CHECK_THAT(refusal("fog.vdb", ""),
                Equals("there is no level set in \"fog.vdb\"; its grids are \"density\" (float)"));
+}
+
+TEST_CASE("a level set whose map turns, mirrors or stretches is resampled to cubes, with a note", "[level set][file]")
+{
+    const LevelSetFolder folder;
+    const auto map = GENERATE(0, 1, 2);
+    CAPTURE(map);
+    auto grid = sphere_grid("surface");
+    if (map == 0) grid->transform().postRotate(0.5, openvdb::math::Y_AXIS);
+    if (map == 1)
+        grid->setTransform(openvdb::math::Transform::createLinearTransform(
+            openvdb::Mat4R(-0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0)));
+    if (map == 2)
+        grid->setTransform(openvdb::math::Transform::createLinearTransform(
+            openvdb::Mat4R(0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 3.0, 0.0, 0.0, 1.0)));
+    folder.write_grids("map.vdb", {grid});
+    const SkippedContents notes;
+    const auto read = read_level_set(folder / "map.vdb", "");
+    CHECK(notes.list() == std::vector<std::string>{"the voxels of grid \"surface\" are not cubes along the axes; it is "
+                                                   "resampled to cubes of 0.1 m"});
+    CHECK(read->voxel() == Approx(0.1));
+    const Vec3d center(map == 2 ? 3 : 0, 0, 0);
+    for (const double outside : {-0.15, 0.15})
+        for (const Vec3d& direction : {Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, -1)}) {
+            const double radius = map == 2 && direction.y() != 0 ? 2 : 1;
+            const Vec3d P = center + (radius + outside) * direction;
+            double phi;
+            read->distance({&P, 1}, {&phi, 1}, {});
+            CHECK(phi == Approx(outside).margin(0.02));  // voxel² / radius of curvature, at least 0.5
+        }
+}
+
+TEST_CASE("distances in voxels become metres, and values that are not distances are noted", "[level set][file]")
+{
+    const LevelSetFolder folder;
+    const auto scaled = [&](float factor) {
+        auto grid = sphere_grid("surface");
+        for (auto value = grid->beginValueAll(); value; ++value) value.setValue(factor * *value);
+        openvdb::tools::changeBackground(grid->tree(), factor * grid->background());
+        folder.write_grids("scaled.vdb", {grid});
+        return read_level_set(folder / "scaled.vdb", "");
+    };
+    const auto plain = distances(*scaled(1));
+    const SkippedContents notes;
+    const auto in_metres = distances(*scaled(10));
+    CHECK(notes.list() ==
+          std::vector<std::string>{"the distances of grid \"surface\" are in voxels; they are multiplied by 0.1 m"});
+    for (std::size_t i = 0; i < plain.size(); ++i) REQUIRE(in_metres[i] == Approx(plain[i]).margin(1e-6));
+
+    const SkippedContents others;
+    scaled(4);
+    REQUIRE(others.list().size() == 1);
+    CHECK_THAT(others.list()[0], Catch::StartsWith("the values of grid \"surface\" change by ") &&
+                                     Catch::EndsWith("rebuild the level set"));
 }
 
 TEST_CASE("a level set from a file is widened without moving its surface", "[level set][file]")

@@ -113,3 +113,26 @@ TEST_CASE("a file without the requested grid is refused with the grids that it h
                Contains("there is no grid of vectors (vec3s) in") && Contains("\"density\" (float)"));
     CHECK_THAT(test::error_of([&] { read_vector_grid(folder / "none.vdb", ""); }), Contains("there is no file"));
 }
+
+TEST_CASE("three grids of floats that are the components of a vector are read as one grid", "[vector grid]")
+{
+    const VectorFolder folder;
+    const auto transform = openvdb::math::Transform::createLinearTransform(0.25);
+    const auto vectors = linear_grid("vel", transform, false);
+    openvdb::GridPtrVec components;
+    for (int axis = 0; axis < 3; ++axis) {
+        auto grid = openvdb::FloatGrid::create();
+        grid->setName(std::string("vel.") + "xyz"[axis]);
+        grid->setTransform(transform->copy());
+        for (auto value = vectors->cbeginValueOn(); value; ++value)
+            grid->tree().setValue(value.getCoord(), (*value)[axis]);
+        components.push_back(grid);
+    }
+    const auto path = folder.write_grids(components);
+    const Vec3d P(0.3, -0.7, 1.1);
+    for (const char* name : {"", "vel"}) CHECK((sample(*read_vector_grid(path, name), P) - linear(P)).norm() < 1e-5);
+
+    components[1]->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+    folder.write_grids(components);
+    CHECK_THAT(test::error_of([&] { read_vector_grid(path, ""); }), Contains("have different maps"));
+}

@@ -24,12 +24,14 @@ ContactEnergy& ContactEnergy::operator+=(const ContactEnergy& other)
 
 ErrorQuantiles ErrorQuantiles::of(std::vector<double> errors)
 {
-    const auto quantile = [&](double part) {
-        const auto nth = errors.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(errors.size() - 1));
+    // The smallest error that this percentage of the points does not exceed.
+    const auto quantile = [&](std::size_t percentage) {
+        const std::size_t points = (percentage * errors.size() + 99) / 100;
+        const auto nth = errors.begin() + static_cast<std::ptrdiff_t>(points - 1);
         std::nth_element(errors.begin(), nth, errors.end());
         return *nth;
     };
-    return {quantile(0.5), quantile(0.95), quantile(1)};
+    return {quantile(50), quantile(95), quantile(100)};
 }
 
 DriftSummary DriftSummary::of(const std::vector<double>& drifts)

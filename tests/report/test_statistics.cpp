@@ -175,6 +175,19 @@ TEST_CASE("the summary has the largest error of a single frame, and the number o
                                              "frame (2 of 5 estimated); without the rest (from frame 12 on)\n"));
 }
 
+TEST_CASE("95 % of fewer than 20 points are all points", "[report]")
+{
+    const auto p95_of_points = [](int points) {
+        std::vector<double> errors;
+        for (int i = 1; i <= points; ++i) errors.push_back(i);
+        return ErrorQuantiles::of(errors).p95;
+    };
+    for (const int points : {1, 2, 19}) CHECK(p95_of_points(points) == points);
+    CHECK(p95_of_points(20) == 19);
+    CHECK(p95_of_points(21) == 20);
+    CHECK(p95_of_points(100) == 95);
+}
+
 TEST_CASE("the error by rounding is in the file, apart from the estimated error", "[report]")
 {
     FrameResult result = frame_result();

@@ -133,10 +133,11 @@ function entry.runner(f, layout, memory)
   return watched(f, runner, true), set_params, translate
 end
 
--- Returns the userdata that a function reaches.
+-- Returns the userdata that a function reaches, or nil if it reaches too many values.
 function entry.objects_of(f)
   local objects, walked = {}, shared_state.walk(f, env)
-  for place = 1, walked and walked.count or 0 do
+  if not walked then return nil end
+  for place = 1, walked.count do
     local value = walked.values[place]
     if type(value) == "userdata" then objects[#objects + 1] = value end
   end

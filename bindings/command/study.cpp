@@ -162,11 +162,8 @@ Study study_of(const json& fields)
 
 json json_of(const StudyRow& row)
 {
-    return {{"error", row.error},
-            {"rounding", row.rounding},
-            {"seconds", row.seconds},
-            {"compared", row.compared},
-            {"missing", row.missing}};
+    return {{"error", row.error},       {"rounding", row.rounding}, {"seconds", row.seconds},
+            {"compared", row.compared}, {"missing", row.missing},   {"unmeasured", row.unmeasured}};
 }
 
 StudyRow row_of(const json& fields, const Knobs& knobs)
@@ -177,7 +174,8 @@ StudyRow row_of(const json& fields, const Knobs& knobs)
             fields.at("seconds").get<std::vector<double>>(),
             fields.at("compared"),
             fields.at("missing"),
-            ""};
+            "",
+            fields.at("unmeasured").get<std::vector<std::string>>()};
 }
 
 // The result of a child, or the reason why there is none.

@@ -6,6 +6,7 @@
 #include "bindings/host/script_host.h"
 #include "runtime/points/members.h"
 #include "runtime/points/point_names.h"
+#include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {
 
@@ -13,7 +14,10 @@ void Kernel::analyse()
 {
     analysis_ = analyse_kernel(host_.main(), source);
     fingerprint = fingerprint_of(host_.main(), source.number);
-    if (!source.of_the_set) moving_ = moving_shapes_of(host_.main(), source.number);
+    if (source.of_the_set) return;
+    objects_ = objects_of(host_.main(), source.number);
+    for (const ObjectPtr& object : objects_.value_or(std::vector<ObjectPtr>()))
+        if (is_moving_shape(*object) || dynamic_cast<const Mesh*>(object.get())) moving_.push_back(object);
 }
 
 void Kernel::begin_step(const FrameClock& clock, const Frame& frame) const

@@ -42,6 +42,7 @@ public:
 
     void uses(Uses& uses) const override;
     bool reads_indices() const override { return analysis_.reads_indices; }
+    std::optional<std::vector<ObjectPtr>> objects() const override { return objects_; }
     void edit(PointSet& points, std::size_t first, const Evaluation& now) const override;
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const override;
 
@@ -102,7 +103,8 @@ private:
 
     ScriptHost& host_;
     KernelAnalysis analysis_;
-    std::vector<ObjectPtr> moving_;
+    std::optional<std::vector<ObjectPtr>> objects_ = std::vector<ObjectPtr>();
+    std::vector<ObjectPtr> moving_;   // the moving shapes and the meshes among them
     mutable StepShapes step_shapes_;  // written between passes, on one thread
 };
 

@@ -8,9 +8,8 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
-#include "runtime/graph/step_shape.h"
+#include "runtime/graph/node_handle.h"
 #include "runtime/points/point_names.h"
-#include "runtime/shapes/mesh/mesh.h"
 
 namespace rapid {
 namespace {
@@ -165,23 +164,25 @@ KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel)
     return found;
 }
 
-std::vector<ObjectPtr> moving_shapes_of(State& state, std::size_t kernel)
+std::optional<std::vector<ObjectPtr>> objects_of(State& state, std::size_t kernel)
 {
     lua_State* L = state.lua();
     state.push_entry("objects_of");
     state.push_kernel(kernel);
     state.call(1, 1);
-    std::vector<ObjectPtr> shapes;
-    for (int i = 1;; ++i) {
+    std::optional<std::vector<ObjectPtr>> objects;
+    if (lua_istable(L, -1)) objects.emplace();
+    for (int i = 1; objects; ++i) {
         lua_rawgeti(L, -1, i);
-        const ObjectPtr object = lua_isnil(L, -1) ? nullptr : to_object(state, lua_gettop(L));
         const bool ends = lua_isnil(L, -1);
+        const ObjectPtr object = ends ? nullptr : to_object(state, lua_gettop(L));
         lua_pop(L, 1);
         if (ends) break;
-        if (object && (is_moving_shape(*object) || dynamic_cast<const Mesh*>(object.get()))) shapes.push_back(object);
+        // A node may own this kernel, which must not own the node in turn.
+        if (object && !dynamic_cast<const NodeHandle*>(object.get())) objects->push_back(object);
     }
     lua_pop(L, 1);
-    return shapes;
+    return objects;
 }
 
 std::string fingerprint_of(State& state, std::size_t kernel)

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -52,8 +53,9 @@ struct KernelSource {
 // assigns a read-only attribute, or calls an unknown method.
 KernelAnalysis analyse_kernel(State& state, const KernelSource& kernel);
 
-// Returns the moving shapes and the meshes that the kernel reaches by its upvalues and globals.
-std::vector<ObjectPtr> moving_shapes_of(State& state, std::size_t kernel);
+// Returns the objects, except nodes, that the kernel reaches by its upvalues and globals. Nothing if it reaches more
+// values than are looked at.
+std::optional<std::vector<ObjectPtr>> objects_of(State& state, std::size_t kernel);
 
 // Returns a fingerprint of its bytecode, the same in each state that has run the same file.
 std::string fingerprint_of(State& state, std::size_t kernel);

@@ -43,10 +43,10 @@ void StatisticsFile::add_writing(std::int64_t frame, double seconds)
         if (waiting.frame == frame) waiting.seconds.write += seconds;
 }
 
-void StatisticsFile::write_before(std::optional<std::int64_t> frame)
+void StatisticsFile::write_before(std::optional<std::int64_t> frame, const ErrorSources& errors)
 {
     while (!waiting_.empty() && (!frame || waiting_.front().frame < *frame)) {
-        append(json_line(waiting_.front(), std::exchange(is_first_, false)));
+        append(json_line(waiting_.front(), std::exchange(is_first_, false), &errors));
         waiting_.pop_front();
     }
 }
@@ -54,7 +54,7 @@ void StatisticsFile::write_before(std::optional<std::int64_t> frame)
 void StatisticsFile::finish(const RunStatistics& run)
 {
     if (std::exchange(is_finished_, true)) return;
-    write_before(std::nullopt);
+    write_before(std::nullopt, run.errors);
     append(json_end(run));
     try {
         if (error_) throw Error(*error_);
@@ -295,7 +295,7 @@ void RunReport::add_writing()
         if (cache_) cache_->written(file);
     }
     if (cache_) cache_->complete_before(unwritten, now(), std::max(earlier_peak_, peak_memory()));
-    if (statistics_) statistics_->write_before(unwritten);
+    if (statistics_) statistics_->write_before(unwritten, run_.errors);
 }
 
 void RunReport::write_statistics()

@@ -34,7 +34,7 @@ public:
     void add(const FrameFigures& frame);
     void add_writing(std::int64_t frame, double seconds);
     // Writes the frames before this one, whose files are all complete; without a value, all frames.
-    void write_before(std::optional<std::int64_t> frame);
+    void write_before(std::optional<std::int64_t> frame, const ErrorSources& errors);
 
     // Writes all frames and the end, and names the file; a second call does nothing. Throws Error if it could not be
     // written.
@@ -94,6 +94,9 @@ public:
     // The run's time begins here. files: those that the run writes; cache: is notified of all frames; null if there is
     // none.
     RunReport(Options options, Listener listener, FrameFiles& files, RunCache* cache);
+
+    // Must be called before the first frame: the sources of error that no estimate includes.
+    void set_error_sources(ErrorSources errors) { run_.errors = std::move(errors); }
 
     // Reports a frame that an earlier run has computed; is_before: before all that this one computes.
     void known_frame(const FrameRecord& record, bool is_before);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "runtime/base/stopwatch.h"
+#include "runtime/graph/error_sources.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/override.h"
 #include "runtime/io/compare.h"
@@ -204,6 +205,7 @@ StudyRow StudyScene::measure(const RecordLog* reference, const Progress& progres
         progress(run + 1);
     }
     StudyRow row = measure.row();
+    for (UnmeasuredError& error : error_sources_of(plan()).unmeasured) row.unmeasured.push_back(std::move(error.text));
     row.knobs = knobs_;
     row.seconds = std::move(seconds);
     return row;

@@ -10,6 +10,7 @@
 
 #include "include/rapid/scene.h"
 #include "include/rapid/shapes.h"
+#include "runtime/graph/error_sources.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/graph/value.h"
 #include "runtime/picture/scene.h"
@@ -19,6 +20,7 @@ namespace rapid {
 struct [[gnu::visibility("hidden")]] SceneFrame::Data
 {
     FrameResult result;
+    std::shared_ptr<const ErrorSources> errors;  // null if its figures are not known
     std::vector<std::string> warnings;
     std::uint64_t scene = 0;  // number of the scene to whose plan it belongs; 0: none
 

@@ -226,7 +226,7 @@ FrameStatisticsSummary SceneFrame::statistics() const
 
 std::string SceneFrame::statistics_json() const
 {
-    const std::string line = json_line(statistics_of(data_->result), true);
+    const std::string line = json_line(statistics_of(data_->result), true, data_->errors.get());
     const std::size_t begin = line.find('{'), end = line.rfind('}');
     return line.substr(begin, end - begin + 1);
 }

@@ -184,6 +184,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     ended_by = nullptr;
     if (!options.estimate_errors) evaluator->disable_error_estimates();
     if (hooks.per_point_diagnostics) evaluator->add_per_point_diagnostics();
+    errors = std::make_shared<ErrorSources>(error_sources_of(*plan));
     next = plan->first_frame();
     has_advanced = false;
 }
@@ -205,6 +206,7 @@ SceneFrame Scene::Impl::advance()
         evaluator.reset();
         throw;
     }
+    data->errors = errors;
     data->warnings = session->take_warnings();
     data->warnings.insert(data->warnings.end(), data->result.warnings.begin(), data->result.warnings.end());
     data->scene = number;

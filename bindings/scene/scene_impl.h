@@ -58,8 +58,9 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     std::vector<SceneOutput> outputs;
     std::vector<std::string> warnings;
     std::unique_ptr<Plan> plan;
-    std::unique_ptr<Evaluator> evaluator;  // null after an error
-    std::exception_ptr ended_by;           // the error of a separate frame that left the scene without an evaluator
+    std::shared_ptr<const ErrorSources> errors;  // of the plan
+    std::unique_ptr<Evaluator> evaluator;        // null after an error
+    std::exception_ptr ended_by;  // the error of a separate frame that left the scene without an evaluator
     std::unique_ptr<SceneOfPlan> picture_scene;
     std::map<std::string, SceneFrame> node_results;  // the points after the nodes in the last requested frame
     std::optional<std::int64_t> node_results_frame;  // its number

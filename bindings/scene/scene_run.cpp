@@ -17,6 +17,7 @@
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/graph/coupling.h"
+#include "runtime/graph/error_sources.h"
 
 namespace rapid {
 namespace {
@@ -164,6 +165,7 @@ struct [[gnu::visibility("hidden")]] SceneRun::Impl
         scene.load(std::move(set));
         const Plan& plan = *scene.plan;
         first = plan.first_frame();
+        report.set_error_sources(error_sources_of(plan));
         const RunPart part = options.part.value_or(RunPart());
         if (const Subset subset(part.number, part.count, options.sample.value_or(1)); !subset.is_all())
             take_subset(plan, subset);

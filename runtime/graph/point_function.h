@@ -2,7 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "runtime/base/object.h"
 #include "runtime/base/parallel.h"
@@ -34,6 +36,8 @@ public:
     // Returns true if it may read a point's index in the set; for a function of all points at once, if it may read any
     // point.
     virtual bool reads_indices() const = 0;
+    // Returns the objects, such as shapes, that its code can query. Nothing if they are not known.
+    virtual std::optional<std::vector<ObjectPtr>> objects() const = 0;
 
     // Creates the test. The set and `now` must outlive it.
     virtual std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation& now) const = 0;

@@ -18,6 +18,7 @@
 #include "runtime/base/memory_budget.h"
 #include "runtime/base/parallel.h"
 #include "runtime/graph/coupling.h"
+#include "runtime/graph/error_sources.h"
 #include "runtime/graph/frame_set.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/stateful.h"
@@ -302,6 +303,7 @@ private:
 };
 RAPID_NODE(Emit);
 RAPID_COUPLING("emit", Emit);
+RAPID_GRAPH_ERROR("emit", Emit, "");  // each birth has its own time in the frame, and a newborn point moves from there
 
 void Emit::move_source(const Simulation& simulation, const Evaluation& now)
 {

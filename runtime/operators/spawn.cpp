@@ -13,6 +13,7 @@
 
 #include "runtime/base/memory_budget.h"
 #include "runtime/graph/coupling.h"
+#include "runtime/graph/error_sources.h"
 #include "runtime/graph/node_handle.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/operators/spawn/offspring.h"
@@ -203,6 +204,7 @@ private:
 };
 RAPID_NODE(Spawn);
 RAPID_COUPLING("spawn", Spawn);
+RAPID_GRAPH_ERROR("spawn", Spawn, "whose births inherit the errors of their parents");
 
 // Inherited attributes have the type that the nodes of the source, or Rapid, define. Throws Error if none of them
 // does.

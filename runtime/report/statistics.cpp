@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/base/json_text.h"
+#include "runtime/report/error_budget.h"
 #include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
@@ -114,7 +115,36 @@ void write(JsonText& json, const std::vector<T>& values)
     json.end();
 }
 
-std::string to_json(const FrameFigures& frame)
+void write(JsonText& json, const ErrorBudget& budget)
+{
+    const auto quantiles = [&](const ErrorQuantiles& error) {
+        json.members("position_p50", error.p50, "position_p95", error.p95, "position_max", error.max);
+    };
+    const auto source = [&](const char* name, const std::optional<ErrorQuantiles>& error,
+                            const std::vector<std::string>& missing) {
+        json.key(name);
+        json.begin_object();
+        if (error && missing.empty())
+            quantiles(*error);
+        else
+            json.member("not_estimated", missing);
+        json.end();
+    };
+    json.begin_object();
+    source("solver", budget.solver, budget.not_of_solver);
+    source("graph", ErrorQuantiles(), budget.not_of_graph);
+    source("shapes", ErrorQuantiles(), budget.not_of_shapes);
+    json.key("rounding");
+    json.object("position_max", budget.rounding);
+    json.key("total");
+    json.begin_object();
+    quantiles(budget.total);
+    json.member("is_complete", budget.is_complete);
+    json.end();
+    json.end();
+}
+
+std::string to_json(const FrameFigures& frame, const ErrorSources* errors)
 {
     JsonText json;
     json.begin_object();
@@ -125,6 +155,10 @@ std::string to_json(const FrameFigures& frame)
     }
     RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE
+    if (const auto budget = errors ? error_budget_of(frame, *errors) : std::nullopt) {
+        json.key("error_by_source");
+        write(json, *budget);
+    }
     json.end();
     return json.text();
 }
@@ -138,9 +172,9 @@ std::string json_head(const RunStatistics& run)
     return fmt::format("{{ \"graph\": {}, \"threads\": {},\n  \"frames\": [", graph, run.threads);
 }
 
-std::string json_line(const FrameFigures& frame, bool first)
+std::string json_line(const FrameFigures& frame, bool first, const ErrorSources* errors)
 {
-    return fmt::format("{}\n    {}", first ? "" : ",", to_json(frame));
+    return fmt::format("{}\n    {}", first ? "" : ",", to_json(frame, errors));
 }
 
 std::string json_end(const RunStatistics& run)

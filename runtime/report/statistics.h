@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "runtime/graph/error_sources.h"
 #include "runtime/graph/evaluate.h"
 #include "runtime/solver/figures.h"
 
@@ -23,12 +24,13 @@ struct RunStatistics {
     std::uint64_t peak_bytes = 0;
     double seconds = 0;            // wall time from loading the graph to the last file
     std::vector<Stiffness> stiff;  // the worst of each node
+    ErrorSources errors;           // that no estimate includes
 };
 
 // Parts of a statistics file, in the order in which a run knows them: its head; a line for each frame, after that of
 // the previous one; and the totals at the end. A run that ended early has the frames that it completed.
 std::string json_head(const RunStatistics& run);
-std::string json_line(const FrameFigures& frame, bool first);
+std::string json_line(const FrameFigures& frame, bool first, const ErrorSources* errors = nullptr);
 std::string json_end(const RunStatistics& run);
 
 // The total of a figure over the frames of a run, by its type; nothing for most. Its size does not depend on the number
@@ -101,8 +103,9 @@ struct RunTotals {
     void add_file(const std::string& path, bool is_film, std::uint64_t points_of_file, double seconds_of_file);
 };
 
-// Returns the summary for the user: points, frames, the slowest part, the estimated error, the files, and `all fine` or
-// a line for each thing to look at. The slowest part is missing if no pass was timed, the error if no point was solved.
+// Returns the summary for the user: points, frames, the slowest part, the error, the files, and a line for each thing
+// to look at. If there is none, the last line is `all fine`, unless a part of the error is not estimated. The slowest
+// part is missing if no pass was timed, the error if no point was solved.
 std::string summary(const RunStatistics& run, const RunTotals& totals);
 
 // Returns a line for each stiff node.

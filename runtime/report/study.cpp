@@ -177,6 +177,25 @@ std::vector<StudyLine> StudyResult::lines() const
     return lines;
 }
 
+std::vector<std::string> StudyResult::held_fixed() const
+{
+    std::optional<std::vector<std::string>> fixed;
+    for (const StudyRow& row : rows) {
+        if (!row.failed.empty()) continue;
+        if (!fixed) fixed = row.unmeasured;
+        std::erase_if(*fixed, [&](const std::string& text) {
+            return std::find(row.unmeasured.begin(), row.unmeasured.end(), text) == row.unmeasured.end();
+        });
+    }
+    return study.reference ? fixed.value_or(std::vector<std::string>()) : std::vector<std::string>();
+}
+
+bool StudyResult::shows_all() const
+{
+    return !study.reference ||
+           std::all_of(rows.begin(), rows.end(), [](const StudyRow& row) { return row.unmeasured.empty(); });
+}
+
 std::vector<bool> StudyResult::best() const
 {
     const auto error_of = [](const StudyRow& row) { return row.at_rounding() ? 0.0 : row.error; };

@@ -53,6 +53,8 @@ struct StudyRow {
     std::uint64_t compared = 0;   // points, summed over frames
     std::uint64_t missing = 0;    // points only in the run or only in the reference
     std::string failed;           // the reason; empty if it ran
+    // The sources of error that no estimate includes (graph/error_sources.h).
+    std::vector<std::string> unmeasured = {};
 
     double median_seconds() const;
     bool at_rounding() const;
@@ -71,6 +73,11 @@ struct StudyResult {
     std::vector<std::pair<std::string, std::string>> machine;
 
     std::vector<StudyLine> lines() const;
+    // Returns the unmeasured sources of error that are the same in all rows, which no row shows. Empty if the reference
+    // is a closed form, which includes them, or if nothing is compared.
+    std::vector<std::string> held_fixed() const;
+    // Returns true if the errors of the rows include all sources.
+    bool shows_all() const;
     // Returns true for each row that ran and is Pareto-optimal in error and time. Errors at rounding are equal.
     std::vector<bool> best() const;
 };

@@ -180,9 +180,10 @@ std::string marker(const Axes& axes, const StudyRow& row, const std::string& ste
     return svg;
 }
 
-std::string order_words(const StudyLine& line, std::size_t failed)
+std::string order_words(const StudyLine& line, std::size_t failed, bool shows_all)
 {
-    std::string words = line.order ? fmt::format("order {:.2f}", *line.order) : line.at_rounding ? "exact" : "";
+    std::string words = line.order ? fmt::format("order {:.2f}", *line.order) : "";
+    if (line.at_rounding) words = shows_all ? "exact" : "at rounding";
     if (failed > 0) words += fmt::format("{}{} failed", words.empty() ? "" : ", ", failed);
     return words;
 }
@@ -240,7 +241,7 @@ std::string to_svg(const StudyResult& result)
         const double y = top + 14 + legend_step * static_cast<double>(l);
         svg += fmt::format("  <path class=\"line\" stroke=\"{}\" d=\"M{} {} h22\"/>\n", colour, legend_x, y - 4);
         svg += text_at(legend_x + 30, y, lines[l].name);
-        svg += text_at(legend_x + 30, y + 17, order_words(lines[l], failed), "start", "small");
+        svg += text_at(legend_x + 30, y + 17, order_words(lines[l], failed, result.shows_all()), "start", "small");
     }
     const double y = top + 14 + legend_step * static_cast<double>(lines.size());
     svg += fmt::format("  <circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"frame\" style=\"fill: #8c959f\"/>\n",

@@ -54,10 +54,11 @@ std::string frames_text(const Study& study)
                                  : fmt::format("frames {} to {}", study.first + 1, study.last);
 }
 
-std::string order_text(const StudyLine& line)
+std::string order_text(const StudyLine& line, bool shows_all)
 {
     if (line.order) return fmt::format("order {:.2f}, fitted to {} rows", *line.order, line.fitted);
-    return line.at_rounding ? "exact: every error is at rounding" : "no order: fewer than two rows to fit";
+    if (!line.at_rounding) return "no order: fewer than two rows to fit";
+    return shows_all ? "exact: every error is at rounding" : "the varied settings make no error above rounding";
 }
 
 // Returns a row for each setting, below a row of titles; the knobs come first.
@@ -99,7 +100,9 @@ std::string to_text(const StudyResult& result)
     std::string text = fmt::format("{}: {}, {}{}; median of {} runs\n\n", study.name, error_title(study),
                                    frames_text(study), reference_text(study), study.repeat_runs);
     text += table_text(table_of(result), study.lines.size() + 1) + '\n';
-    for (const StudyLine& line : result.lines()) text += fmt::format("{}: {}\n", line.name, order_text(line));
+    for (const StudyLine& line : result.lines())
+        text += fmt::format("{}: {}\n", line.name, order_text(line, result.shows_all()));
+    for (const std::string& source : result.held_fixed()) text += fmt::format("held fixed: {}\n", source);
     for (const StudyRow& row : result.rows)
         if (!row.failed.empty()) text += fmt::format("failed: {}: {}\n", study.label(row.knobs), row.failed);
     return text + "* no other row is better in both error and run time\n";
@@ -138,6 +141,7 @@ std::string to_json(const StudyResult& result)
         json.member("best", static_cast<bool>(best[number++]));
         json.end();
     });
+    json.member("held_fixed", result.held_fixed());
     json.list("lines", result.lines(), [&](const StudyLine& line) {
         json.object("line", line.name, "order", line.order, "fitted", line.fitted, "at_rounding", line.at_rounding);
     });

@@ -1,4 +1,4 @@
-// The summary of a run: six lines, the last of which says whether all is fine.
+// The summary of a run: six lines, the last of which says what to look at.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "runtime/base/setting_names.h"
+#include "runtime/report/error_budget.h"
 #include "runtime/report/number_text.h"
 #include "runtime/report/statistics.h"
 #include "runtime/solver/estimate/stiffness.h"
@@ -87,31 +88,70 @@ std::string slowest_text(const RunTotals& totals)
     return line("slowest", fmt::format("{}, {:.0f} % of the work", slowest->first, 100 * slowest->second / sum));
 }
 
-std::string within(const ErrorQuantiles& error)
+// Returns the errors of the frames in which they are largest, by source. Nothing if none is estimated.
+std::optional<ErrorBudget> worst_budget(const RunTotals& totals, const ErrorSources& sources)
 {
-    if (!(error.max > 0)) return "none found: twice the substeps give the same positions";
-    if (!(error.p95 > 0)) return fmt::format("all positions within {}", length_text(error.max));
-    return fmt::format("95 % of the positions within {}, all within {}", length_text(error.p95),
-                       length_text(error.max));
+    FrameFigures worst;
+    worst.error.summary = totals.error.worst;
+    worst.frame_error.summary = totals.frame_error.worst;
+    worst.rounding = totals.rounding.most.value_or(0);
+    for (const auto& [what, first] : totals.left_out_of_errors.first) worst.left_out_of_errors.push_back(what);
+    return error_budget_of(worst, sources);
 }
 
-// Returns the largest estimated error, and the contributions that it does not include.
-std::string error_text(const RunTotals& totals)
+bool was_solved(const RunTotals& totals) { return totals.first_solved || totals.error.worst; }
+
+std::string within(const ErrorQuantiles& error)
 {
-    if (!totals.first_solved && !totals.error.worst) return "";
-    std::string text = "not estimated";
-    if (totals.error.worst)
-        text = within(*totals.error.worst);
-    else if (totals.frame_error.worst)
-        text = within(*totals.frame_error.worst) +
-               fmt::format(", in one frame ({} of {} estimated)", totals.frame_error.frames, totals.frames);
-    const char* separator = "; without ";
-    for (const auto& [what, first] : totals.left_out_of_errors.first) {
-        text += separator + what;
-        if (first > totals.first_solved.value_or(0)) text += fmt::format(" (from frame {} on)", first);
-        separator = "; ";
-    }
-    return line("error", text);
+    const std::string most = length_text(error.p95), all = length_text(error.max);
+    if (!(error.p95 > 0) || most == all) return fmt::format("all positions within {}", all);
+    return fmt::format("95 % of the positions within {}, all within {}", most, all);
+}
+
+// Returns the sources of error that are not estimated, in the order solver, graph, shapes.
+std::string unmeasured_text(const RunTotals& totals, const ErrorBudget& budget)
+{
+    std::string text;
+    for (const auto* list : {&budget.not_of_solver, &budget.not_of_graph, &budget.not_of_shapes})
+        for (const std::string& what : *list) {
+            text += (text.empty() ? "not estimated: " : "; ") + what;
+            const auto found = totals.left_out_of_errors.first.find(what);
+            if (found != totals.left_out_of_errors.first.end() && found->second > totals.first_solved.value_or(0))
+                text += fmt::format(" (from frame {} on)", found->second);
+        }
+    return text;
+}
+
+// Returns the error if all sources of it are estimated.
+std::string complete_error(const ErrorQuantiles& by_solver, const ErrorBudget& budget)
+{
+    if (budget.is_exact) return fmt::format("0, but for rounding within {}", length_text(budget.rounding));
+    if (!(by_solver.max > 0)) return "none found: twice the substeps give the same positions";
+    return "estimated: " + within(budget.total);
+}
+
+// Returns the part of the error that is estimated, and the sources of the rest. The part is no bound of the whole: the
+// sources may cancel one another.
+std::string incomplete_error(const RunTotals& totals, const ErrorBudget& budget)
+{
+    const std::string unmeasured = unmeasured_text(totals, budget);
+    const bool is_since_birth = totals.error.worst.has_value();
+    const std::optional<ErrorQuantiles>& by_solver = is_since_birth ? totals.error.worst : totals.frame_error.worst;
+    if (!by_solver) return unmeasured;
+    std::string of_frame;
+    if (!is_since_birth)
+        of_frame = fmt::format(", in one frame ({} of {} estimated)", totals.frame_error.frames, totals.frames);
+    if (by_solver->max > budget.rounding)
+        return fmt::format("from substeps: {}{}; {}", within(budget.total), of_frame, unmeasured);
+    return fmt::format("{}; twice the substeps give the same positions within rounding{}", unmeasured, of_frame);
+}
+
+std::string error_text(const RunTotals& totals, const std::optional<ErrorBudget>& budget)
+{
+    if (!was_solved(totals)) return "";
+    if (!budget) return line("error", "not estimated");
+    return line("error",
+                budget->is_complete ? complete_error(*totals.error.worst, *budget) : incomplete_error(totals, *budget));
 }
 
 std::string files_text(const RunTotals& totals)
@@ -138,8 +178,9 @@ std::string warning_text(const Total<T>&, std::string_view)
     return "";
 }
 
-// Returns "all fine", or a line for each thing to look at, with what to do about it.
-std::string result_text(const RunStatistics& run, const RunTotals& totals)
+// Returns a line for each thing to look at, with what to do about it. If there is none, "all fine", unless a part of
+// the error is not estimated.
+std::string result_text(const RunStatistics& run, const RunTotals& totals, const std::optional<ErrorBudget>& budget)
 {
     std::string text;
     if (totals.warnings > 0)
@@ -158,15 +199,18 @@ std::string result_text(const RunStatistics& run, const RunTotals& totals)
             text += line("look at",
                          fmt::format("{} is stiff: estimated error {}; {} substeps would give {}", one.node,
                                      length_text(better->error), better->substeps, length_text(better->error_after)));
-    return text.empty() ? line("result", "all fine") : text;
+    if (!text.empty()) return text;
+    const bool is_known = !was_solved(totals) || (budget && budget->is_complete);
+    return line("result", is_known ? "all fine" : "nothing to look at, but not all of the error is estimated");
 }
 
 }  // namespace
 
 std::string summary(const RunStatistics& run, const RunTotals& totals)
 {
-    return points_text(totals) + frame_count_text(run, totals) + slowest_text(totals) + error_text(totals) +
-           files_text(totals) + result_text(run, totals);
+    const std::optional<ErrorBudget> budget = worst_budget(totals, run.errors);
+    return points_text(totals) + frame_count_text(run, totals) + slowest_text(totals) + error_text(totals, budget) +
+           files_text(totals) + result_text(run, totals, budget);
 }
 
 std::string advice(const std::vector<Stiffness>& stiff)

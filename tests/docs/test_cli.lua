@@ -113,7 +113,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {0, -1, 0}} }
       assert.equal(0, result.status, result.stderr)
       keys_of(json.decode(folder:read "s.json"), {}, keys)
     end
-    local text = document.section(page, "### Statistics")
+    local text = document.section(page, "### Statistics") .. document.section(page, "### Sources of error")
     assert_documented(keys, text)
     for cells in document.rows(text) do
       for key in pairs(document.code(cells[1])) do

@@ -12,6 +12,7 @@ public:
     explicit RightOf(float limit) : limit_(limit) {}
     void uses(Uses& uses) const override { uses.reads.push_back("P"); }
     bool reads_indices() const override { return false; }
+    std::optional<std::vector<ObjectPtr>> objects() const override { return std::vector<ObjectPtr>(); }
     std::unique_ptr<PointTest> test_of(const PointSet& points, const Evaluation&) const override
     {
         return std::make_unique<Test>(points, limit_);

@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "runtime/report/error_budget.h"
 #include "runtime/report/number_text.h"
 #include "runtime/report/statistics.h"
 #include "tests/test.h"
@@ -137,7 +138,8 @@ TEST_CASE("estimated errors have their median, 95 % and maximum in the file, and
     CHECK(error["position_p50"] == 50 * 1e-4);
     CHECK(error["position_p95"] == 95 * 1e-4);
     CHECK(error["position_max"] == 100 * 1e-4);
-    CHECK_THAT(summary(run), Catch::Contains("\nerror    95 % of the positions within 9.5 mm, all within 1 cm\n"));
+    CHECK_THAT(summary(run),
+               Catch::Contains("\nerror    estimated: 95 % of the positions within 9.5 mm, all within 1 cm\n"));
 }
 
 TEST_CASE("the summary says why no error is estimated, unless nothing was solved", "[report]")
@@ -147,7 +149,7 @@ TEST_CASE("the summary says why no error is estimated, unless nothing was solved
     result.figures.left_out_of_errors = {"all points, as they are strange"};
     Recorded run = run_of({});
     run.frames = {statistics_of(result)};
-    CHECK_THAT(summary(run), Catch::Contains("\nerror    not estimated; without all points, as they are strange\n"));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    not estimated: all points, as they are strange\n"));
     CHECK_THAT(summary(run), !Catch::Contains("none found"));
     const ordered_json frame = ordered_json::parse(to_json(run))["frames"][0];
     CHECK_FALSE(frame.contains("error"));
@@ -171,8 +173,9 @@ TEST_CASE("the summary has the largest error of a single frame, and the number o
     }
     CHECK(ordered_json::parse(to_json(run))["frames"][1]["frame_error"]["position_p95"] == 95 * 1e-4);
     CHECK_FALSE(ordered_json::parse(to_json(run))["frames"][2].contains("frame_error"));
-    CHECK_THAT(summary(run), Catch::Contains("\nerror    95 % of the positions within 2.9 cm, all within 3 cm, in one "
-                                             "frame (2 of 5 estimated); without the rest (from frame 12 on)\n"));
+    CHECK_THAT(summary(run),
+               Catch::Contains("\nerror    from substeps: 95 % of the positions within 2.9 cm, all within 3 cm, in one "
+                               "frame (2 of 5 estimated); not estimated: the rest (from frame 12 on)\n"));
 }
 
 TEST_CASE("95 % of fewer than 20 points are all points", "[report]")
@@ -197,6 +200,65 @@ TEST_CASE("the error by rounding is in the file, apart from the estimated error"
     run.frames.push_back(statistics_of(result));
     CHECK(ordered_json::parse(to_json(run))["frames"][0]["rounding"] == 0.25);
     CHECK_THAT(summary(run), Catch::Contains("\nerror    none found: twice the substeps give the same positions\n"));
+}
+
+TEST_CASE("an error is 0 only if all motion has a closed form, and complete only if no source is left out", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.error.values = {0, 0};
+    result.figures.rounding = 0.25;
+    Recorded run = run_of({});
+    run.frames.push_back(statistics_of(result));
+    const auto total = [&] { return *error_budget_of(run.frames.front(), run.errors); };
+    CHECK(total().solver->p50 == 0.25);
+    CHECK_FALSE(total().is_exact);
+    CHECK(total().is_complete);
+
+    run.errors.is_closed_form = true;
+    CHECK(total().solver->max == 0);
+    CHECK(total().total.max == 0.25);
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    0, but for rounding within 25 cm\n"));
+
+    run.errors.unmeasured = {{UnmeasuredError::Graph, "swirl, which changes v"},
+                             {UnmeasuredError::Shapes, "ball.shape, a level set"}};
+    CHECK_FALSE(total().is_complete);
+    CHECK_THAT(summary(run),
+               Catch::Contains("\nerror    not estimated: swirl, which changes v; ball.shape, a level set; "
+                               "twice the substeps give the same positions within rounding\n"));
+}
+
+TEST_CASE("if a source of error is not estimated, the summary names it, and does not call the run fine", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.contact_limit = result.figures.trapped = 0;
+    result.figures.rounding = 0.001;
+    const auto text = [&](std::vector<double> errors) {
+        result.figures.error.values = std::move(errors);
+        Recorded run = run_of({});
+        run.frames.push_back(statistics_of(result));
+        run.errors.unmeasured = {{UnmeasuredError::Graph, "kick, which changes v"}};
+        return summary(run);
+    };
+    CHECK_THAT(text({0, 0.0005}), Catch::Contains("\nerror    not estimated: kick, which changes v; twice the substeps "
+                                                  "give the same positions within rounding\n"));
+    CHECK_THAT(text({0, 0.004}), Catch::Contains("\nerror    from substeps: all positions within 5 mm; not estimated: "
+                                                 "kick, which changes v\n"));
+    std::vector<double> errors(30, 0.004);
+    errors.front() = 0.008;
+    CHECK_THAT(text(errors), Catch::Contains("\nerror    from substeps: 95 % of the positions within 5 mm, all within "
+                                             "9 mm; not estimated: kick, which changes v\n"));
+    CHECK_THAT(text(errors), !Catch::Contains("look at ") && !Catch::Contains("all fine"));
+    CHECK_THAT(text(errors), Catch::EndsWith("\nresult   nothing to look at, but not all of the error is estimated\n"));
+}
+
+TEST_CASE("a complete error contains the rounding", "[report]")
+{
+    FrameResult result = frame_result();
+    result.figures.rounding = 0.25;
+    result.figures.error.values = {0.125, 0.5};
+    Recorded run = run_of({});
+    run.frames.push_back(statistics_of(result));
+    CHECK_THAT(summary(run), Catch::Contains("\nerror    estimated: all positions within 75 cm\n"));
 }
 
 TEST_CASE("a drift of energy has its mean and its largest magnitude in the file, if there is an energy", "[report]")
@@ -247,7 +309,7 @@ TEST_CASE("the summary of a run is six aligned lines", "[report]")
           "points   1,500 (most: 2,000 in frame 2)\n"
           "frames   3 in 0.500 s, 7,200 points per second, 3.0 MiB of memory\n"
           "slowest  emit1, 50 % of the work\n"
-          "error    95 % of the positions within 250 µm, all within 3.4 mm\n"
+          "error    estimated: 95 % of the positions within 250 µm, all within 3.4 mm\n"
           "files    none written; output NAME.####.png writes pictures\n"
           "result   all fine\n");
 

@@ -206,6 +206,7 @@ TEST_CASE("the statistics of a frame have every figure of the table, also if a c
     if (std::string(#reported) != "false") figures.insert(#name);
     RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE
+    figures.insert("error_by_source");  // computed from the plan and other figures (report/error_budget.h)
     const test::TemporaryFolder folder;
     RunOptions requested = options(folder, {1, 2});
     requested.text = test::every_figure;

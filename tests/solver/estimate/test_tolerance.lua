@@ -191,6 +191,6 @@ describe("the error of a run", function()
 
   it("is told in the summary", function()
     local _, summary = reported "substeps = 4"
-    assert.match("error    95 %% of the positions within [%d.]+ %S*m, all within [%d.]+ %S*m\n", summary)
+    assert.match("error    estimated: [^\n]*all[%a ]* within [%d.]+ %S*m\n", summary)
   end)
 end)

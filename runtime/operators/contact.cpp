@@ -7,6 +7,7 @@
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/constraints/contacts.h"
+#include "runtime/solver/constraints/pile_substeps.h"
 #include "runtime/solver/constraints/spin.h"
 #include "runtime/solver/constraints/twin.h"
 
@@ -26,6 +27,11 @@ public:
         return memory;
     }
     std::optional<PerPoint<float>> radius() const override { return options.radius; }
+    double needed_substeps(const PointSet& points, const Vec3d& acceleration, double h) const override
+    {
+        const ContactMaterial material(points, options, group);
+        return pile_substeps(points, material.radius, acceleration, h, !(options.mass_scaling > 0));
+    }
 };
 
 struct ContactNode {

@@ -6,7 +6,9 @@
 //   solve/aging            ages and deaths
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/node.h"
@@ -21,11 +23,12 @@
 namespace rapid {
 namespace {
 
-// Far above the need of any scene: a run with more would not end and would show no sign of it.
-constexpr int substep_limit = 1 << 20, max_iterations = 10000;
+// Far above the need of any scene, like substep_limit: a run with more would not end and would show no sign of it.
+constexpr int max_iterations = 10000;
 
 struct Solve {
-    int substeps, iterations, max_substeps;
+    std::optional<int> substeps;
+    int iterations, max_substeps;
     double sleep;
     std::optional<double> tolerance;
     std::string group;
@@ -41,7 +44,10 @@ struct Solve {
             .takes("life")
             .takes("airresist")
             .takes("targetv")
-            .param(&Solve::substeps, "substeps", 1.0, between(1, substep_limit), "", "number of substeps per frame")
+            .param(
+                &Solve::substeps, "substeps", Value(), between(1, substep_limit), "",
+                "number of substeps per frame; the default is 1, or with :contact the number that the points need to "
+                "hold each other, up to max_substeps")
             .param(&Solve::iterations, "iterations", 1.0, between(1, max_iterations), "",
                    "iterations of the constraints per substep")
             .param(&Solve::sleep, "sleep", 0.25, or_infinity(above(0)), "s",
@@ -50,7 +56,7 @@ struct Solve {
             .param(&Solve::tolerance, "tolerance", Value(), above(0), "m per frame",
                    "maximum error per frame; each point takes 1, 2, 4, ... substeps, as its estimated error needs")
             .param(&Solve::max_substeps, "max_substeps", 64.0, between(1, substep_limit), "",
-                   "maximum number of substeps, with a tolerance")
+                   "maximum number of substeps, with a tolerance or without substeps")
             .writes("P")
             .writes("v");
     }
@@ -88,6 +94,7 @@ struct Solve {
     {
         Step step{std::move(inputs[0]), now, tolerance, max_substeps};
         Flow& flow = step.flow;
+        if (!substeps || step.is_examined()) step.needed = step.needed_substeps(iterations);
         step.options = options_of(step);
         prepare(step, shapes_);
         if (flow.simulation->trial) {
@@ -135,13 +142,13 @@ private:
         const FrameClock clock = step.flow.simulation->clock();
         const Frame& frame = step.now.frame;
         SolveOptions options;
-        options.substeps = substeps;
+        options.substeps = substeps.value_or(std::min(step.needed, max_substeps));
         options.time = frame.time;
         options.h = frame.dt;
         options.frame = static_cast<std::int64_t>(std::ceil(frame.number));
         options.group = group;
         options.begins_frame = clock.is_whole(clock.step_at(frame) - 1);
-        options.interacts = step.interacts() && substeps > 1;
+        options.interacts = step.interacts() && options.substeps > 1;
         options.iterations = iterations;
         options.loads = &loads_;
         options.sleep = sleep;

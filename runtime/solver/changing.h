@@ -64,6 +64,10 @@ public:
         return end_->begin(points, frame_length);
     }
     std::optional<PerPoint<float>> radius() const override { return end_->radius(); }
+    double needed_substeps(const PointSet& points, const Vec3d& acceleration, double h) const override
+    {
+        return end_->needed_substeps(points, acceleration, h);
+    }
     std::shared_ptr<const Constraint> twin(const Constraint* before) const override { return end_->twin(before); }
 
     const AtPart<Constraint> at;

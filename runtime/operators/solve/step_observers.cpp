@@ -84,9 +84,8 @@ private:
     std::optional<StepLog> log_;
 };
 
-// Examines the points before the step for stiff forces and actions. Stiffness changes as points move, so it runs after
-// 1, 2, 4, 8, ... steps, at little cost. With a tolerance, substeps are chosen automatically and there is no advice to
-// give.
+// Examines the points before some steps for stiff forces and actions. With a tolerance, substeps are chosen
+// automatically and there is no advice to give.
 class Examination final : public StepObserver {
 public:
     bool observes(const Step&) const override { return true; }
@@ -94,7 +93,7 @@ public:
     void begin(Step& step, const PointSet& entered) override
     {
         const SolveOptions& options = step.options;
-        if (std::has_single_bit(static_cast<std::uint64_t>(std::llround(options.time / options.h)))) {
+        if (step.is_examined()) {
             std::vector<Stiffness> found = find_stiff(entered, step.flow.dynamics, options);
             if (step.tolerance) std::erase_if(found, [](const Stiffness& stiffness) { return !stiffness.is_exact(); });
             append(step.now.figures.stiff, found);
@@ -278,10 +277,7 @@ private:
             step.warn(
                 "some points reached the limit of 2,000 impacts in one step and were stopped for the rest of it; give "
                 "more substeps");
-        if (result.loose_constraints > 0)
-            step.warn(
-                "some constraints are violated by more than a tenth of their size; if points overlap at birth, give "
-                "fewer points or a smaller radius, otherwise more substeps or iterations");
+        warn_of_loose(step);
         if (result.ledger && result.ledger->residue && !result.ledger->residue->is_rounding())
             step.warn(
                 fmt::format("constraints changed the energy by {:.1e} and the momentum by {:.1e} of their amounts "
@@ -303,6 +299,24 @@ private:
                 fmt::format("a sample suggests that about {} points differ by more than {:g} m with other substeps, "
                             "because forces change within a substep; begin with more substeps",
                             step.beyond_tolerance, *step.tolerance));
+    }
+
+    // Warns of violated constraints, and of points that may pass through each other in a substep without one.
+    static void warn_of_loose(const Step& step)
+    {
+        constexpr int passing = 3;  // times as long as the needed substep
+        const bool loose = step.done.loose_constraints > 0;
+        const int taken = step.options.substeps;
+        const int needed = loose && step.needed == 0 ? step.needed_substeps(step.options.iterations) : step.needed;
+        const std::string more = needed > taken ? fmt::format("{} substeps", needed) : "more substeps or iterations";
+        if (loose)
+            step.warn(
+                "some constraints are violated by more than a tenth of their size; if points overlap at birth, give "
+                "fewer points or a smaller radius, otherwise " +
+                more);
+        else if (needed > passing * taken)
+            step.warn(fmt::format("points in contact may pass through each other in {} substep{}; give {}", taken,
+                                  taken == 1 ? "" : "s", more));
     }
 
     // Returns true if any collider's shape knows its distance only within a band.
@@ -386,6 +400,24 @@ private:
 };
 
 }  // namespace
+
+int Step::needed_substeps(int iterations) const
+{
+    Vec3d acceleration = Vec3d::Zero();
+    for (const auto& force : flow.dynamics.forces())
+        if (const std::optional<Uniform> uniform = force->uniform()) acceleration += uniform->a;
+    double of_one = 1;  // iteration
+    for (const auto& constraint : flow.dynamics.constraints())
+        at_node(*constraint, [&] {
+            of_one = std::max(of_one, constraint->needed_substeps(flow.points, acceleration, now.frame.dt));
+        });
+    return static_cast<int>(std::min(std::ceil(of_one / std::sqrt(iterations)), double(substep_limit)));
+}
+
+bool Step::is_examined() const
+{
+    return std::has_single_bit(static_cast<std::uint64_t>(std::llround(now.frame.time / now.frame.dt)));
+}
 
 double Step::allowed_error() const { return *tolerance / flow.simulation->subframes; }
 

@@ -18,11 +18,15 @@
 
 namespace rapid {
 
+// The largest number of substeps of a step.
+constexpr int substep_limit = 1 << 20;
+
 struct Step {
     Flow flow;
     const Evaluation& now;
     const std::optional<double> tolerance;  // m per frame
-    const int max_substeps;                 // with a tolerance
+    const int max_substeps;                 // with a tolerance or without substeps
+    int needed = 0;                         // needed_substeps() before the step; 0 if unknown
     SolveOptions options = {};
     Dynamics run = {}, finer = {};  // for the points; for shadows, with twice the substeps
     FrameFigures done = {};         // after the advance
@@ -38,6 +42,11 @@ struct Step {
     bool interacts() const { return !tolerance && !flow.dynamics.interactions().empty(); }
     // Returns true if no point's motion within the frame depends on another's.
     bool moves_alone() const { return !is_coupled() && !interacts(); }
+
+    // Returns the number of substeps that the constraints need for the points as they are now.
+    int needed_substeps(int iterations) const;
+    // Returns true in steps 1, 2, 4, 8, ... Points change as they move, and to examine these steps alone costs little.
+    bool is_examined() const;
 
     // The sample is always checked if there is a tolerance.
     bool estimates_errors() const { return flow.simulation->estimates_errors || tolerance; }

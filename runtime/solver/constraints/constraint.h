@@ -158,6 +158,10 @@ public:
     // that distance, too (collision_radii.h).
     virtual std::optional<PerPoint<float>> radius() const { return std::nullopt; }
 
+    // Returns the number of substeps, with one iteration each, that its points need to hold each other through a frame
+    // of h seconds. acceleration: m/s², common to all points. 1 by default.
+    virtual double needed_substeps(const PointSet&, const Vec3d& /*acceleration*/, double /*h*/) const { return 1; }
+
     // Returns an equivalent constraint with its own memory, which solves the same frames a second time. Its memory
     // continues that of `before`, the twin of the previous frame, or copies that of this constraint if `before` is
     // null. Returns null if no twin exists; the error of its points is then not estimated.

@@ -32,6 +32,7 @@ public:
         const ContactMaterial material(points, options, group);
         return pile_substeps(points, material.radius, acceleration, h, !(options.mass_scaling > 0));
     }
+    bool births_overlap() const override { return memory->births_overlap(); }
 };
 
 struct ContactNode {

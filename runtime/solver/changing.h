@@ -68,6 +68,7 @@ public:
     {
         return end_->needed_substeps(points, acceleration, h);
     }
+    bool births_overlap() const override { return end_->births_overlap(); }
     std::shared_ptr<const Constraint> twin(const Constraint* before) const override { return end_->twin(before); }
 
     const AtPart<Constraint> at;

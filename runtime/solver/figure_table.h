@@ -25,7 +25,7 @@
     F(std::uint64_t, died, sum, sum, true, "",                                                                         \
       "points that died in the frame", "", "")                                                                         \
     F(int, substeps, most, most, true, "",                                                                             \
-      "the largest number of substeps of a point", "substeps", "")                                                    \
+      "the largest number of substeps of a point", "substeps", "")                                                     \
     F(StageSeconds, seconds, sum, sum, true, "s",                                                                      \
       "`total`, `graph`, `script`, `solve`, `write`", "time of a frame", "")                                           \
     F(Sampled<ErrorQuantiles>, error, sum, last, frame.error.summary.has_value(), "m",                                 \
@@ -48,7 +48,8 @@
       "active rows at the end of the frame; absent if there are none", "", "")                                         \
     F(std::uint64_t, loose_constraints, sum, last, frame.constraint_rows > 0, "",                                      \
       "rows with an error of more than a tenth of their size", "",                                                     \
-      "constraints had an error of more than a tenth of their size {}: give :solve more substeps")                                   \
+      "constraints had an error of more than a tenth of their size {}: separate points that overlap at birth, "        \
+      "or give :solve more substeps")                                                                                  \
     F(std::uint64_t, broken, sum, sum, frame.broken > 0, "",                                                           \
       "pairs of `:distance` that broke in the frame; absent if none did", "", "")                                      \
     F(std::uint64_t, asleep, sum, last, true, "",                                                                      \
@@ -70,7 +71,7 @@
       "points reached the limit of contacts in a step {}: give :solve more substeps")                                  \
     F(std::uint64_t, trapped, sum, most, true, "",                                                                     \
       "points deep in a shape that could not be moved out", "",                                                        \
-      "points could not be moved out of a shape {}: emit them outside, or move the shapes apart")                                \
+      "points could not be moved out of a shape {}: emit them outside, or move the shapes apart")                      \
     F(std::uint64_t, beyond_tolerance, sum, most, true, "",                                                            \
       "points that would need more than `max_substeps`, or whose position a sample with other substeps does not "      \
       "confirm", "", "points were beyond the tolerance {}: raise it, or max_substeps")                                 \

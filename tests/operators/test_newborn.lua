@@ -40,3 +40,37 @@ describe("numbered keys that do not begin with 1", function()
     end
   end)
 end)
+
+describe("points created inside each other", function()
+  local function warnings(text)
+    return table.concat(scene.run(text, { frames = {1, 4} }).warnings, "\n")
+  end
+
+  it("are reported with the node :contact, if it cannot separate them within the frame", function()
+    for _, text in ipairs {
+      "return rapid.create {} :emit { source = rapid.shape.sphere { radius = 0.02 }, count = 400 }\n"
+        .. ":contact { radius = 0.02 }\n:solve {}",
+      "local P = {} for k = 1, 400 do P[k] = {k % 20 * 1e-3, k * 5e-5, 0} end "
+        .. "return rapid.create { points = rapid.points.from { P = P } }\n:contact { radius = 0.02 }\n:solve {}",
+    } do
+      local reported = warnings(text)
+      assert.truthy(reported:find('scene.lua:2: node "contact1": points are created inside each other; give it a '
+        .. "smaller radius, or create fewer points, farther apart", 1, true), reported)
+    end
+  end)
+
+  it("are not reported if they are created apart, or if they are pressed together later", function()
+    assert.equal("", warnings [[
+local P = {}
+for k = 1, 100 do P[k] = {k * 0.05, 0, 0} end
+return rapid.create { points = rapid.points.from { P = P } } :contact { radius = 0.02 } :solve {}]])
+    local pressed = warnings [[
+local P, pairs = {}, {}
+for k = 1, 20 do P[k] = {0.1 * k, 0, 0} end
+for k = 1, 19 do pairs[k] = {k, k + 1} end
+return rapid.create { points = rapid.points.from { P = P } } :contact { radius = 0.049 }
+  :distance { pairs = pairs, rest = 0.05, collide = true } :solve {}]]
+    assert.truthy(pressed:find('node "solve1": some constraints are violated', 1, true), pressed)
+    assert.falsy(pressed:find("created inside", 1, true), pressed)
+  end)
+end)

@@ -10,6 +10,7 @@
 
 #include "runtime/points/id_index.h"
 #include "runtime/shapes/shape.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/estimate/coupled_errors.h"
 #include "runtime/solver/estimate/energy_drift.h"
@@ -254,13 +255,30 @@ private:
     static void warn_of_deaths_at_birth(const Step& step)
     {
         for (const auto& collider : step.flow.dynamics.colliders())
-            if (collider->response == Response::Die) {
-                step.now.warnings.push_back(
-                    fmt::format("{}:{}: node \"{}\": kills all points at birth: with response = \"die\" a point dies "
-                                "within its radius (pscale) of the shape; give radius = 0, or emit points farther away",
-                                collider->location.file, collider->location.line, collider->node));
-                return;
-            }
+            if (collider->response == Response::Die)
+                return warn_of(step, *collider,
+                               "kills all points at birth: with response = \"die\" a point dies within its radius "
+                               "(pscale) of the shape; give radius = 0, or emit points farther away");
+    }
+
+    // Returns true if it has warned.
+    static bool warn_of_overlapping_births(const Step& step)
+    {
+        bool warned = false;
+        for (const auto& constraint : step.flow.dynamics.constraints()) {
+            if (!constraint->births_overlap()) continue;
+            warn_of(step, *constraint,
+                    "points are created inside each other; give it a smaller radius, or create fewer points, farther "
+                    "apart");
+            warned = true;
+        }
+        return warned;
+    }
+
+    static void warn_of(const Step& step, const Dynamic& dynamic, const std::string& text)
+    {
+        step.now.warnings.push_back(
+            fmt::format("{}:{}: node \"{}\": {}", dynamic.location.file, dynamic.location.line, dynamic.node, text));
     }
 
     static void count(const Step& step)
@@ -309,12 +327,12 @@ private:
         const int taken = step.options.substeps;
         const int needed = loose && step.needed == 0 ? step.needed_substeps(step.options.iterations) : step.needed;
         const std::string more = needed > taken ? fmt::format("{} substeps", needed) : "more substeps or iterations";
-        if (loose)
+        if (loose && !warn_of_overlapping_births(step))
             step.warn(
                 "some constraints are violated by more than a tenth of their size; if points overlap at birth, give "
                 "fewer points or a smaller radius, otherwise " +
                 more);
-        else if (needed > passing * taken)
+        if (!loose && needed > passing * taken)
             step.warn(fmt::format("points in contact may pass through each other in {} substep{}; give {}", taken,
                                   taken == 1 ? "" : "s", more));
     }

@@ -162,6 +162,9 @@ public:
     // of h seconds. acceleration: m/s², common to all points. 1 by default.
     virtual double needed_substeps(const PointSet&, const Vec3d& /*acceleration*/, double /*h*/) const { return 1; }
 
+    // Returns true if points were created so deep inside each other in the last frame that they still overlap.
+    virtual bool births_overlap() const { return false; }
+
     // Returns an equivalent constraint with its own memory, which solves the same frames a second time. Its memory
     // continues that of `before`, the twin of the previous frame, or copies that of this constraint if `before` is
     // null. Returns null if no twin exists; the error of its points is then not estimated.

@@ -36,6 +36,12 @@ constexpr int deep_sweeps = 2;  // even: forces are recorded in the order of the
 // may sleep, because piles would take longer to come to rest.
 constexpr double over_relaxation = 1.2;
 
+// Returns the overlap above which a contact is violated, m.
+double violating_overlap(const ContactMaterial& material, std::uint32_t i, std::uint32_t j)
+{
+    return 0.1 * std::min(material.radius[i], material.radius[j]);
+}
+
 // The largest distance by which carried impulses may separate points of one island of rods, relative to their
 // distance.
 constexpr double max_separation = 0.25;
@@ -100,6 +106,14 @@ void Contacts::follow(const PointSet& points, const ContactOptions& options, con
             disturbed_.push_back(i);
     }
     list_is_stale_ |= !same_points || !same_radii;
+    births_overlap_ = false;
+    births_.assign(points.size(), Birth::Apart);
+    for (const std::uint32_t i : index)
+        if (i != IdIndex::none) births_[i] = Birth::Before;
+    const Strided<Vec3f> P = points.P().read();
+    birthplaces_.resize(points.size());
+    for (std::size_t i = 0; i < births_.size(); ++i)
+        if (births_[i] == Birth::Apart) birthplaces_[i] = P[i];
     if (!same_points) renumber(points.id(), index);
 }
 
@@ -208,12 +222,28 @@ void Contacts::detect(Substep& step)
 {
     if (per_dt_ > 0 && per_dt_ * step.dt != 1) impulses_.scale(static_cast<float>(step.dt * per_dt_));
     per_dt_ = 1 / step.dt;
-    if (begins_frame_) heavy_.begin(step);
-    begins_frame_ = false;
+    const bool begins_frame = std::exchange(begins_frame_, false);
+    if (begins_frame) heavy_.begin(step);
     scaling_.begin(step);
     hit_.assign(material_.bounces ? impulses_.pairs.size() : 0, 0);
     hit_before_.clear();
     update_contacts(step);
+    if (begins_frame) find_overlapping_births(step);
+}
+
+// At the first substep other constraints may have moved the points already.
+void Contacts::find_overlapping_births(const Substep& step)
+{
+    const auto position = [&](std::uint32_t i) {
+        return births_[i] == Birth::Before ? step.start[i] : Vec3d(birthplaces_[i].cast<double>());
+    };
+    packs_.for_each([&](const PairContact& contact) {
+        const std::uint32_t i = contact.i, j = contact.j;
+        if (births_[i] == Birth::Before && births_[j] == Birth::Before) return;
+        if (!(contact.reach - (position(i) - position(j)).norm() > violating_overlap(material_, i, j))) return;
+        for (const std::uint32_t k : {i, j})
+            if (births_[k] == Birth::Apart) births_[k] = Birth::Inside;
+    });
 }
 
 void Contacts::update_contacts(Substep& step)
@@ -515,7 +545,9 @@ void Contacts::close(Substep& step, FrameFigures& figures)
         if (!(overlap > 0) && !(impulses_.normal[pair] > 0)) return;
         ++figures.constraint_rows;
         figures.constraint_residual_max = std::max(figures.constraint_residual_max, overlap);
-        figures.loose_constraints += overlap > 0.1 * std::min(material_.radius[i], material_.radius[j]);
+        if (!(overlap > violating_overlap(material_, i, j))) return;
+        ++figures.loose_constraints;
+        births_overlap_ |= births_[i] == Birth::Inside || births_[j] == Birth::Inside;
     };
     packs_.for_each([&](const PairContact& contact) {
         if (!sleep_.both_asleep(contact.i, contact.j)) count(contact.i, contact.j, contact.reach, contact.pair);

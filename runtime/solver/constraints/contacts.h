@@ -93,6 +93,8 @@ public:
     bool keeps_momentum() const override { return !scaling_.is_set(); }
     std::span<const float> recorded() const override;
     std::span<const float> radii() const override { return material_.radius; }
+    // Returns true if points were created inside each other in the last frame and still violate a contact.
+    bool births_overlap() const { return births_overlap_; }
     void link(EnergyIslands& islands) const override;
     void detect(Substep& step) override;
     bool solve_impacts(Substep& step, std::uint32_t sweep) override;
@@ -117,6 +119,9 @@ public:
     }
 
 private:
+    // When a point was created: before the frame, or in it, apart from others or deep inside one.
+    enum class Birth : std::uint8_t { Before, Apart, Inside };
+
     // Returns true if all indices of a loaded snapshot are in range.
     bool is_consistent() const;
     void renumber(const Column<std::int64_t>& ids, std::span<const std::uint32_t> index);
@@ -125,6 +130,7 @@ private:
     void note_hits(std::size_t from);
     void measure_reaches(std::size_t from);
     void update_contacts(Substep& step);
+    void find_overlapping_births(const Substep& step);
     void find_contacts(const Substep& step);
     bool sweep_impacts(Substep& step, std::uint32_t number, std::uint32_t since);
     std::size_t find_near(std::size_t block, const Substep& step, std::vector<std::uint32_t>& near) const;
@@ -167,7 +173,10 @@ private:
     std::vector<Vec3d> before_;              // positions before the warm start
     std::span<const std::uint32_t> rods_;    // by point: its island of rods; empty if there are no rods
     std::span<const ContactPair> excluded_;  // sorted, joined by rods
-    std::vector<std::uint32_t> disturbed_;   // points that changed, or that lost a neighbour pressing on them
+    std::vector<Birth> births_;              // by point
+    std::vector<Vec3f> birthplaces_;         // of points created in the frame
+    bool births_overlap_ = false;
+    std::vector<std::uint32_t> disturbed_;  // points that changed, or that lost a neighbour pressing on them
 };
 
 }  // namespace rapid

@@ -904,7 +904,7 @@ function Node:drag(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: on the line between them), or a ramp of keys [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points instead of inherited ones, {heat = 1}: a value, a ramp, or a range {min, max}, of vectors on a line; for a box, birth = function(p) [attributes]
 ---@field name? string  name of the node in messages [string]
 
 ---Emits points from a surface, a volume, a curve or points.
@@ -1225,7 +1225,7 @@ function Node:solve(params) end
 ---@field spread? number|fun(frame: rapid.Frame): number  half angle of the cone in which velocity and speed are turned together, uniformly [number, deg, from 0 to 180, default 0]
 ---@field life? number|number[]|fun(frame: rapid.Frame): number|number[]  age at which points die: a number or {min, max}; without it points live for ever [number or {min, max}, s, at least 0]
 ---@field group? string  group that newborn points join [string, constant]
----@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: on the line between them), or a ramp of keys [attributes]
+---@field attributes? table<string, number|rapid.Vec3|string|any[]>|fun(frame: rapid.Frame): table<string, number|rapid.Vec3|string|any[]>  values of newborn points instead of inherited ones, {heat = 1}: a value, a ramp, or a range {min, max}, of vectors on a line; for a box, birth = function(p) [attributes]
 ---@field inherit? string|string[]|fun(frame: rapid.Frame): string|string[]  names of attributes that newborn points copy from their parent [names]
 ---@field inherit_velocity? number|fun(frame: rapid.Frame): number  fraction of the parent's velocity that is added [number, default 1]
 ---@field split? boolean|fun(frame: rapid.Frame): boolean  divides the parent's mass and volume among points that are born together [boolean, default false]

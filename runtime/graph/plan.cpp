@@ -174,6 +174,34 @@ void warn_of_units(const Plan& plan, std::vector<std::string>& warnings)
     }
 }
 
+// Returns true for a range of two opposite vectors with several components, such as {{-5, -5, -5}, {5, 5, 5}}.
+bool is_opposite_range(const Value& value)
+{
+    const Table* table = value.table();
+    if (!table || table->list.size() != 2) return false;
+    const std::vector<double> low = numbers_in(table->list[0]), high = numbers_in(table->list[1]);
+    if (low.size() != 3 || high.size() != 3) return false;
+    int components = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (low[k] != -high[k]) return false;
+        components += low[k] != 0;
+    }
+    return components > 1;
+}
+
+// Warns of ranges of angular velocities that look like a box of vectors but are a line.
+void warn_of_common_axes(const Plan& plan, std::vector<std::string>& warnings)
+{
+    for (const PlannedNode& planned : plan.nodes)
+        if (const Value* w = given_attribute(*planned.node, "w"); w && is_opposite_range(*w))
+            warnings.push_back(
+                warning_of(*planned.node,
+                           fmt::format("w = {} turns all points about one axis, because values are drawn on the "
+                                       "line between the two vectors; leave w out and use :tumble {{ speed = 360 }}, "
+                                       "or set p.w in birth = function(p) ... end",
+                                       describe(*w))));
+}
+
 // Warns of attributes under names that other programs use, which nothing reads.
 void warn_of_other_names(const Plan& plan, std::vector<std::string>& warnings)
 {
@@ -329,6 +357,7 @@ std::vector<std::string> warnings_about(const Graph& graph, const Plan& plan)
     warn_of_dropped_nodes(graph, plan, warnings);
     warn_of_missing_lives(plan, warnings);
     warn_of_idle_spins(plan, warnings);
+    warn_of_common_axes(plan, warnings);
     warn_of_still_tumbles(plan, warnings);
     warn_of_held_points(plan, warnings);
     warn_of_other_names(plan, warnings);

@@ -245,6 +245,18 @@ describe("a warning", function()
     assert.equal("", warnings(chain:format "life = {1, 20}, attributes = { Cd = {12, 1, 0}, pscale = 0.5 }"))
   end)
 
+  it("names a range of w that turns all points about one axis", function()
+    local chain = "return rapid.create {} :emit { source = POINTS, rate = 9, %s } :tumble {} :solve {}"
+    expect('node "emit1": w = {{-5, -5, -5}, {5, 5, 5}} turns all points about one axis, because values are drawn on '
+      .. "the line between the two vectors; leave w out and use :tumble { speed = 360 }, or set p.w in "
+      .. "birth = function(p) ... end", warnings(chain:format "attributes = { w = {{-5, -5, -5}, {5, 5, 5}} }"))
+    for _, given in ipairs {
+      "attributes = { w = {{0, -5, 0}, {0, 5, 0}} }", "attributes = { w = {{1, 2, 3}, {2, 3, 4}} }",
+      "attributes = { w = {1, 2, 3} }", "attributes = { w = {1, 2, 3}, Cd = {{-1, -1, -1}, {1, 1, 1}} }",
+      "birth = function(p) p.w = vec3(10 * p:rand(1) - 5, 10 * p:rand(2) - 5, 10 * p:rand(3) - 5) end",
+    } do assert.equal("", warnings(chain:format(given))) end
+  end)
+
   it("names a kernel that moves points whose v stays 0", function()
     local chain = "return rapid.create {%s} :emit { source = rapid.mesh.sphere {}, rate = 99, %s } "
       .. ":points('k', function(p, frame) %s end) %s :solve {}"

@@ -105,9 +105,9 @@ void Newborn::declare_newborn(Declaration<T>& type, const std::string& speed_alo
         .param(&T::joins, "group", Value(), any_number(), "", "group that newborn points join")
         .constant()
         .param(&T::attributes, "attributes", Value(), any_number(), "",
-               "values of newborn points, which replace inherited values: {heat = 1}, a range {min, max} (of vectors: "
-               "on the "
-               "line between them), or a ramp of keys");
+               "values of newborn points instead of inherited ones, {heat = 1}: a value, a ramp, or a range {min, "
+               "max}, of "
+               "vectors on a line; for a box, birth = function(p)");
 }
 
 }  // namespace rapid

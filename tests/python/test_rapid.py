@@ -278,7 +278,7 @@ local seed, memory = rapid.param("seed", 1), rapid.param("memory", 2)
 return rapid.create { points = rapid.points.from { P = {{seed, memory, 0}} } } :solve {}""", **options)
         for options in {"seed": 5}, {"memory": 2**30}, {"seed": 5, "set": {"memory": 3}}:
             with self.assertRaisesRegex(TypeError, 'option of rapid.Scene, and the scene has a parameter "(seed|memory)"; '
-                                                   'give set={"'):
+                                                   'set the parameter by set={"'):
                 opened(**options)
         self.assertEqual(opened(set={"seed": 5}).parameters["seed"]["value"], 5)
         self.assertEqual(opened(seed=7, set={"seed": 5}).parameters["seed"]["value"], 5)

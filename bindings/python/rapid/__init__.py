@@ -1,4 +1,4 @@
-"""Rapid in Python: scenes in Lua are opened, advanced, and read as NumPy arrays that share memory with the run.
+"""Rapid in Python. It opens and runs scenes in Lua, and gives their points as NumPy arrays without copies.
 
     import rapid
 
@@ -6,7 +6,7 @@
     for frame in scene.run(1, 96):
         print(frame.number, frame["P"][:, 1].mean())
 
-docs/host.md is the guide. Errors are rapid.Error, with file, line and node of the scene.
+docs/host.md is the guide. Errors are raised as rapid.Error, with the file, line and node of the scene.
 """
 import ctypes
 import json
@@ -85,8 +85,8 @@ def _camera(position, target, fov):
 
 
 class Frame:
-    """A computed frame. frame["P"] is an array that shares memory with the run; it does not change while it is
-    referenced."""
+    """A computed frame. frame["P"] is an array that shares memory with the run. It does not change while you hold
+    it."""
 
     def __init__(self, handle, scene):
         self._handle, self._scene = _Handle(handle, "frame_release"), scene
@@ -159,13 +159,13 @@ class Frame:
         return self._array("frame_group", name).view(numpy.bool_)
 
     def detail(self, name):
-        """Returns a value of the whole point set: a number, or three."""
+        """Returns a detail, which is a value of the whole point set: a number or a tuple of three."""
         value = Value()
         call("frame_detail", self._handle.value, name.encode(), byref(value))
         return from_value(value)
 
     def output(self, name):
-        """Returns another output of the same frame."""
+        """Returns another output of the same frame, as a Frame."""
         handle = c_void_p()
         call("frame_output", self._handle.value, name.encode(), byref(handle))
         return Frame(handle, self._scene)
@@ -192,7 +192,7 @@ class Frame:
 
     @staticmethod
     def read(path):
-        """Reads the points of a file, as a Frame with number 0. The extension selects the format."""
+        """Reads the points of a file. Returns a Frame with the number 0. The extension selects the format."""
         handle = c_void_p()
         call("frame_read", str(path).encode(), byref(handle))
         return Frame(handle, None)
@@ -219,7 +219,7 @@ class Frame:
                         width, height)
 
     def show(self, width=640, height=360):
-        """Returns a Picture with the shapes of the scene."""
+        """Returns a Picture of the points and of the scene's shapes."""
         if self._scene is None:
             raise Error("wrong call", "the frame was read from a file, and has no scene to be shown with")
         return self._scene.picture(self, width, height)
@@ -253,8 +253,8 @@ class _Memory:
 
 
 class Shapes:
-    """The shapes of a scene in a frame: meshes [{"role", "positions", "triangles"}], whose arrays share memory with
-    this object, and planes [{"normal", "offset"}]. The role is "collider" or "emitter"."""
+    """The shapes of a scene in a frame. meshes is a list of {"role", "positions", "triangles"}, whose arrays share
+    memory with this object. planes is a list of {"normal", "offset"}. The role is "collider" or "emitter"."""
 
     def __init__(self, handle):
         self._handle = _Handle(handle, "shapes_release")
@@ -294,7 +294,7 @@ class Shapes:
 
 
 class Snapshot:
-    """The state that determines all following frames."""
+    """The state of a scene after a frame. It determines all following frames."""
 
     def __init__(self, handle):
         self._handle = _Handle(handle, "snapshot_release")
@@ -305,7 +305,7 @@ class Snapshot:
 
     @property
     def size(self):
-        """Size in bytes."""
+        """The size in bytes."""
         return value_of("snapshot_size", self._handle.value)
 
     def release(self):
@@ -330,7 +330,7 @@ def _each_once(values, parameters):
 
 
 class _Program:
-    """The common base of Scene and Run: their options, and the callbacks, which live as long as the object."""
+    """The common base of Scene and Run. It holds their options and callbacks."""
 
     def __init__(self):
         self._raised = None  # an exception of a callback, raised when the call ends
@@ -410,19 +410,25 @@ class _Program:
 
 
 class Scene(_Program):
-    """A scene from a file, or from the string text=, in which case `file` is its name in messages.
+    """A scene from a file. If text= is given, that string is the scene, and `file` is its name in messages.
 
-    Scene parameters are keyword arguments (rate=5000). Parameters of nodes, parameters with the name of an option, and
-    names that are not Python identifiers go into set={"solve.substeps": 4}. seed replaces the seed of every create, but
-    does not set a rapid.param "seed". paths: folders in which modules are searched. threads: 0 for all. script_seconds,
-    script_memory, memory: limits. estimate_errors=False switches the error estimates off. log(text) receives the output
-    of scripts and the warnings. progress(frame, last) is called after each frame of advance_to(), which ends if it
-    returns False. find_module(name) returns the source of a module or None; find_file(path) returns the path of a file
-    that the scene names, or None.
+    Parameters of the scene are keyword arguments, such as rate=5000. Use set={"solve.substeps": 4} for parameters of
+    nodes, for parameters with the name of an option, and for names that are not Python identifiers.
 
-    objects={"floor": rapid.Shape(...)}: objects that the scene uses as rapid.host "floor", or that
-    set={"collide2.shape": "host:floor"} gives to a parameter of a node. nodes: more node types, each a rapid.Force,
-    rapid.Edit or rapid.Constraint.
+    seed            replaces the seed of every create; it does not set a rapid.param "seed"
+    paths           folders that are searched for modules
+    threads         0 uses all processors
+    script_seconds, script_memory, memory
+                    limits in seconds and bytes
+    estimate_errors False switches the error estimates off
+    keep_all        True keeps attributes that nothing reads
+    log             log(text) receives the output of scripts and the warnings
+    progress        progress(frame, last) is called after each frame of advance_to(), which ends if it returns False
+    find_module     find_module(name) returns the source of a module, or None
+    find_file       find_file(path) returns the path of a file that the scene names, or None
+    objects         {"floor": rapid.Shape(...)}: objects that the scene uses as rapid.host "floor". With
+                    set={"collide2.shape": "host:floor"} one replaces a parameter of a node.
+    nodes           more node types, each a rapid.Force, rapid.Edit or rapid.Constraint
     """
 
     def __init__(self, file, *, text=None, set=None, seed=None, paths=(), threads=0, script_seconds=600,
@@ -447,22 +453,22 @@ class Scene(_Program):
 
     @staticmethod
     def load_plugin(path):
-        """Loads node types from a library that was built against the runtime's headers. Scenes opened later can use
-        them."""
+        """Loads the node types of a plugin, a library that was built with the runtime's headers. Scenes that are opened
+        later can use them."""
         call("scene_load_plugin", str(path).encode())
 
     def _refuse_ambiguous(self, options, settings):
-        """Raises TypeError if a given option is also the name of a parameter, which the option would not set."""
+        """Raises TypeError if an option has the name of a parameter: the option does not set the parameter."""
         defaults = Scene.__init__.__kwdefaults__
         parameters = self.parameters
         for name, value in options.items():
             if value != defaults[name] and name in parameters and name not in settings:
                 raise TypeError(f'{name} = {value!r} is an option of rapid.Scene, and the scene has a parameter '
-                                f'"{name}"; give set={{"{name}": {value!r}}} for the parameter, and both for both')
+                                f'"{name}"; set the parameter by set={{"{name}": {value!r}}}')
 
     @property
     def parameters(self):
-        """The parameters by name: {"value", "default", "doc"}."""
+        """The scene's parameters: a dict from names to {"value", "default", "doc"}."""
         result = {}
         for index in range(value_of("scene_parameter_count", self._handle.value)):
             one = sized(Parameter)
@@ -473,7 +479,7 @@ class Scene(_Program):
 
     @property
     def nodes(self):
-        """The nodes, [{"name", "type", "file", "line"}], in the order in which the scene creates them."""
+        """The nodes as a list of {"name", "type", "file", "line"}, in the order in which the scene creates them."""
         result = []
         for index in range(value_of("scene_node_count", self._handle.value)):
             one = sized(Node)
@@ -494,13 +500,13 @@ class Scene(_Program):
     next_frame = property(lambda self: value_of("scene_next_frame", self._handle.value))
 
     def set(self, values=None, /, **parameters):
-        """Sets parameters as Scene() does, and restarts the scene."""
+        """Sets parameters, as the arguments of Scene() do, and restarts the scene."""
         settings = to_settings(_each_once(values or {}, parameters))
         self._call("scene_set", self._handle.value, settings, len(settings))
 
     def offer(self, name, thing):
-        """Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on,
-        all other uses when the scene is set()."""
+        """Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on.
+        All other uses get it at the next set()."""
         offers = make_offers({name: thing}, (), self._guard)
         try:
             self._call("scene_offer", self._handle.value, offers)
@@ -594,15 +600,26 @@ class Scene(_Program):
 
 
 class Run(_Program):
-    """A run that writes files, as `rapid run` does. Call prepare(), then run(), once each.
+    """A run that writes files, as `rapid run` does. Call prepare() once, then run() once.
 
-    outputs: file patterns such as "first.####.vdb". frames: (first, last) or (first, last, step); by default 48 from
-    the scene's first frame. width, height, and the camera's position, target and fov are for pictures; a camera value
-    of None is chosen to fit. statistics, profile, events: file names. cache: a folder from which the run resumes where
-    an earlier run ended, with a snapshot after every cache_every frames; cache_again recomputes all frames,
-    cache_replace takes over the folder of another run. part: (number, count), one of several disjoint subsets of the
-    points. sample: the fraction of points to simulate. frame(number, points, seconds, is_known) is called after each
-    frame, line(text) with messages about files, warning(text) with warnings. All other arguments are those of Scene.
+    outputs         file patterns, such as ["first.####.vdb"]
+    frames          (first, last) or (first, last, step); the default is 48 frames from the scene's first one
+    width, height   of pictures, in pixels
+    position, target, fov
+                    the camera of pictures; a value of None is chosen so that everything is visible
+    statistics, profile, events
+                    names of files to write
+    cache           a folder; a later run with the same folder resumes where this one ended
+    cache_every     the number of frames between snapshots in the cache
+    cache_again     True computes all frames again
+    cache_replace   True takes over the folder of another run
+    part            (number, count): simulates one of several disjoint subsets of the points
+    sample          the fraction of the points to simulate
+    frame           frame(number, points, seconds, is_known) is called after each frame
+    line            line(text) receives messages about files
+    warning         warning(text) receives warnings
+
+    All other arguments are those of Scene.
     """
 
     def __init__(self, file, outputs=(), frames=None, *, text=None, width=1280, height=720, position=None, target=None,
@@ -644,13 +661,13 @@ class Run(_Program):
 
     @property
     def frames(self):
-        """The frames that are written, as (first, last, step)."""
+        """The frames to write, as (first, last, step)."""
         frames = get("run_frames", self._handle.value, Frames())
         return frames.first, frames.last, frames.step
 
     def run(self):
-        """Computes and writes the frames. Returns {"ending", "last_frame", "unwritten", "summary"}, where the ending is
-        "complete", or "ended" after end_after_frame(). Raises Error if a frame fails."""
+        """Computes and writes the frames. Returns {"ending", "last_frame", "unwritten", "summary"}. The ending is
+        "complete", or "ended" if end_after_frame() was called. Raises Error if a frame fails."""
         outcome = sized(Outcome)
         self._call("run_run", self._handle.value, byref(outcome))
         return {"ending": ["complete", "ended", "failed"][outcome.ending], "last_frame": outcome.last_frame,
@@ -667,9 +684,9 @@ class Run(_Program):
 
 
 def merge_files(parts, output, progress=None):
-    """Merges the files of the parts of a run into those that the whole run would have written. parts: patterns, in
-    which {part} stands for every part. progress(frame, points) is called for each frame, and ends the merge if it
-    returns False. Returns {"parts", "frames", "points"}. No scene may run at the same time."""
+    """Merges the files of the parts of a run into the files that the whole run would have written. parts is a list of
+    file patterns, in which {part} stands for every part. progress(frame, points) is called for each frame. The merge
+    ends if it returns False. Returns {"parts", "frames", "points"}. No scene may run at the same time."""
     merged, raised = sized(Merged), []
 
     def report(_, frame, points):

@@ -16,7 +16,7 @@ def encoded(text):
     if not isinstance(text, str):
         raise TypeError(f"{text!r} is a {type(text).__name__}; it must be a str")
     if "\0" in text:
-        raise ValueError(f"{text!r} holds a character 0")
+        raise ValueError(f"{text!r} contains a NUL character")
     return text.encode()
 
 
@@ -26,7 +26,7 @@ class _Text(c_char_p):
     @classmethod
     def from_param(cls, value):
         if isinstance(value, bytes) and 0 in value:
-            raise ValueError(f"{value!r} holds a character 0")
+            raise ValueError(f"{value!r} contains a NUL character")
         return c_char_p.from_param(value)
 
 
@@ -197,7 +197,7 @@ def _load():
     if checkout:
         raise ImportError(f"{name} is not built; type\n    {checkout}/rapid --version && "
                           f"cmake --build {checkout}/build/release --target rapid_host_library")
-    raise ImportError(f"{name} is neither beside the module nor known to the system; set RAPID_LIBRARY to its path")
+    raise ImportError(f"{name} is neither next to the module nor in the search path of the system; set RAPID_LIBRARY to its path")
 
 
 library = _load()
@@ -294,8 +294,9 @@ for _name, _types in {
 
 
 class Error(RuntimeError):
-    """An error of the library. text and str() are FILE:LINE: node "NAME": MESSAGE; the parts are message, file, line,
-    node and kind. script_stack is the call stack of the script that raised it, innermost call first."""
+    """An error of the library. text and str() read FILE:LINE: node "NAME": MESSAGE. The attributes message, file, line
+    and node hold the parts, and kind the kind of error. script_stack is the call stack of the script that raised it,
+    innermost call first."""
 
     def __init__(self, kind, message, file="", line=0, node="", text=None, script_stack=""):
         super().__init__(text or message)
@@ -342,7 +343,7 @@ def value_of(name, handle):
 
 
 def lines(name, handle):
-    """Returns a list that the library gives as lines."""
+    """Returns a list of strings, which the library returns as lines of one string."""
     text = get(name, handle, c_char_p()).value
     return text.decode().split("\n") if text else []
 
@@ -378,7 +379,7 @@ def to_value(value, name):
                 numbers = []
             result.type = NUMBER
         if len(numbers) != (3 if result.type == VEC3 else 1):
-            raise TypeError(f"{name} = {value!r}; it must be a number, a boolean, a text or three numbers")
+            raise TypeError(f"{name} = {value!r}; it must be a number, a boolean, a string or three numbers")
         result.number[:len(numbers)] = numbers
     return result
 

@@ -1,5 +1,5 @@
-"""Objects that Python offers to scenes: arrays as meshes and points, functions of arrays as shapes, forces and
-edits."""
+"""Objects that Python offers to scenes: meshes and points from arrays; shapes, forces, edits and constraints from
+functions."""
 import ctypes
 import itertools
 from ctypes import byref, c_void_p
@@ -65,7 +65,7 @@ def _indices_of(array, name):
 
 
 class Points:
-    """Points from arrays: see from_numpy()."""
+    """Points from arrays, as from_numpy() returns them."""
 
     def __init__(self, P, columns):
         arrays = {"P": _numbers_of(P, "P"), **columns}
@@ -94,13 +94,15 @@ class Points:
 
 
 def from_numpy(P, **columns):
-    """Returns points for a scene: P of shape (points, 3), and further columns of shape (points,), (points, 3), (points,
-    4) for quaternions, or (points,) of str. They are copied when they are offered."""
+    """Returns points for a scene. P has the shape (points, 3). Other columns have the shape (points,) for numbers and
+    strings, (points, 3) for vectors, or (points, 4) for quaternions. The arrays are copied when the points are
+    offered."""
     return Points(P, columns)
 
 
 class Mesh:
-    """A triangle mesh: positions of shape (n, 3), triangles of shape (m, 3), counter-clockwise seen from outside."""
+    """A triangle mesh. positions has the shape (n, 3). triangles has the shape (m, 3) and holds indices, in
+    counter-clockwise order as seen from outside."""
 
     def __init__(self, positions, triangles):
         self._positions = _numbers_of(positions, "positions")
@@ -115,9 +117,10 @@ class Mesh:
 
 
 class Shape:
-    """A shape defined by its signed distance. distance(P, gradient) returns the distances at the positions P: shape
-    (n,) for P of shape (n, 3), negative inside. Unless gradient is None, it also writes the distance's gradient there,
-    of shape (n, 3)."""
+    """A shape defined by its signed distance, which is negative inside. distance(P, gradient) returns the distances at
+    the positions P: an array of shape (n,) for P of shape (n, 3). Unless gradient is None, the function also writes the
+    gradient of the distance into it, of shape (n, 3). lower and upper are the corners of a box around the shape.
+    slope_bound is the largest length of the gradient, and smallest_feature the size of the finest detail in metres."""
 
     def __init__(self, distance, lower=(-numpy.inf,) * 3, upper=(numpy.inf,) * 3, slope_bound=1, smallest_feature=0):
         self._distance, self._lower, self._upper = distance, lower, upper
@@ -151,8 +154,8 @@ class _Node:
 
     @staticmethod
     def _columns(names):
-        """Returns (name, width) pairs of names, or of {name: 1 or 3}. In a list, P, v, N and Cd are vectors, others
-        numbers."""
+        """Returns (name, width) pairs for a list of names, or for {name: 1 or 3}. In a list, P, v, N and Cd are
+        vectors, and all others are numbers."""
         widths = names if isinstance(names, dict) else {n: 3 if n in ("P", "v", "N", "Cd") else 1 for n in names}
         return list(widths.items())
 
@@ -187,9 +190,9 @@ class _Node:
 
 
 class Now:
-    """The points that a node's function works on: count, frame, time, dt. now["heat"] is a column that the node reads
-    or writes. A force also has P and v, an edit kill, a constraint P and id. After the call the arrays are read-only
-    copies."""
+    """The argument of a node's function: count is the number of points, frame, time and dt describe the step.
+    now["heat"] is a column that the node reads or writes. A force also gets P and v, an edit gets kill, a constraint
+    gets P and id. After the call the arrays are read-only copies."""
 
     def __init__(self, now, node, arrays):
         self.count, self.frame, self.time, self.dt = now.count, now.frame, now.time, now.dt
@@ -211,8 +214,8 @@ class Now:
 
 
 class Force(_Node):
-    """A force: function(now, **parameters) returns accelerations, shape (count, 3), m/s². It is called for chunks of
-    points in each substep."""
+    """A force. function(now, **parameters) returns accelerations in m/s², of shape (count, 3). It is called for chunks
+    of points in each substep."""
     _kind = 0
 
     def _call(self, now, numbers):
@@ -220,8 +223,8 @@ class Force(_Node):
 
 
 class Edit(_Node):
-    """An edit: function(now, **parameters) changes the columns that it writes and sets now.kill. It is called once a
-    frame."""
+    """An edit of the points. function(now, **parameters) changes the columns that it writes, and may set now.kill to
+    remove points. It is called once per frame."""
     _kind = 1
 
     def _call(self, now, numbers):
@@ -229,8 +232,8 @@ class Edit(_Node):
 
 
 class Constraint(_Node):
-    """A constraint: function(now, **parameters) returns rods [(id, id, length in m, compliance in m/N), ...] between
-    the points now.id at now.P. It is called once a frame."""
+    """A constraint. function(now, **parameters) returns rods between the points now.id at now.P, as a list of (id, id,
+    length in m, compliance in m/N). It is called once per frame."""
     _kind = 2
 
     def _call(self, now, numbers):

@@ -33,7 +33,7 @@ export class Figures {
     if (this.charts?.length) return;
     this.known = null;
     this.charts = chartsOf(listed).map(([name, unitName, lines]) => {
-      const canvas = element("canvas", { title: `${name || "seconds by stage"}: a click goes to the frame` }), value = element("span", { class: "number" });
+      const canvas = element("canvas", { title: `${name || "seconds by stage"}: click to go to a frame` }), value = element("span", { class: "number" });
       const names = lines.map(([line, tint]) => element("span", { class: line ? `line ${tint}` : "" }, line || name));
       const chart = { name, unitName, lines, curves: [], names, canvas, value, box: element("figure", { hidden: true }, element("figcaption", {}, ...names, element("span", { class: "gap" }), value), canvas) };
       canvas.addEventListener("click", (event) => {

@@ -15,7 +15,7 @@ export class Graph {
     this.scale = 1;
     this.found = element("span", { class: "quiet number" });
     this.search = element("input", { type: "search", id: "search", placeholder: "find a node", "aria-label": "find a node",
-      title: "nodes by name or type (/); Enter goes to the next one", oninput: () => this.find(0),
+      title: "find nodes by name or type (/); Enter goes to the next one", oninput: () => this.find(0),
       onkeydown: (event) => {
         if (event.key === "Enter") this.find(event.shiftKey ? -1 : 1);
         if (event.key !== "Escape") return;

@@ -14,27 +14,27 @@ export function bindKeys(does) {
     [null, "", ["End"], does.last],
     ["F", "show everything", ["f"], does.fit],
     [".", "show the chosen point", ["."], does.centre],
-    ["M", "the picture alone, and with all panels", ["m"], does.alone],
+    ["M", "the picture alone, or with all panels", ["m"], does.alone],
     ["1 3 7", "look from the front, the right, above", ["1"], () => does.look(...turnFront)],
     [null, "", ["3"], () => does.look(...turnRight)],
     [null, "", ["7"], () => does.look(...turnTop)],
     ["0", "look through the scene's camera", ["0"], does.sceneCamera],
     ["C", "colour by the next attribute", ["c"], () => does.next("colour")],
-    ["D", "spheres, dots, streaks, as in pictures", ["d"], () => does.next("style")],
-    ["S", "colliders and emitters", ["s"], () => does.press("shapes")],
-    ["G", "grid and axes", ["g"], () => does.press("ground")],
+    ["D", "draw points as spheres, dots, streaks, or as in pictures", ["d"], () => does.next("style")],
+    ["S", "show colliders and emitters", ["s"], () => does.press("shapes")],
+    ["G", "show grid and axes", ["g"], () => does.press("ground")],
     ["T", "longer trails", ["t"], () => does.next("trails")],
-    ["B", "the life of the chosen point", ["b"], does.trace],
-    ["K", "the camera, to copy or to set", ["k"], () => does.press("camera")],
-    ["P", "this frame as .png", ["p"], does.save],
+    ["B", "show the life of the chosen point", ["b"], does.trace],
+    ["K", "copy or set the camera", ["k"], () => does.press("camera")],
+    ["P", "save this frame as .png", ["p"], does.save],
     ["O", "export pictures and films", ["o"], () => does.press("save")],
     ["/", "find a node", ["/"], does.find],
-    ["L", "dark, light", ["l"], () => does.press("theme")],
-    ["Alt G, F, S", "graph, figures, spreadsheet", ["Alt+g"], () => !by("graph-tab").hidden && does.openTab("graph")],
+    ["L", "dark or light", ["l"], () => does.press("theme")],
+    ["Alt G, F, S", "open graph, figures, spreadsheet", ["Alt+g"], () => !by("graph-tab").hidden && does.openTab("graph")],
     [null, "", ["Alt+f"], () => !by("figures-tab").hidden && does.openTab("figures")],
     [null, "", ["Alt+s"], () => does.openTab("sheet")],
     ["↑ ↓", "in the spreadsheet: the point above, below", []],
-    ["Esc", "clear the selection of node, point and region", ["Escape"], does.escape],
+    ["Esc", "clear the selection", ["Escape"], does.escape],
     ["?", "this list", ["?"], () => showKeys()],
   ];
   const actions = new Map(keys.flatMap(([, , names, action]) => names.map((name) => [name, action])));
@@ -52,7 +52,7 @@ export function bindKeys(does) {
     action();
   });
   const mouse = [["drag", "orbit"], ["middle, Ctrl drag", "pan"], ["wheel, right drag", "zoom"], ["click", "choose a point"],
-    ["Shift drag", "counts and ranges in a region"], ["Ctrl wheel", "zoom the graph"]];
+    ["Shift drag", "count the points in a region, with their ranges"], ["Ctrl wheel", "zoom the graph"]];
   const row = ([name, what]) => element("tr", {}, element("td", {}, element("kbd", {}, name)), element("td", {}, what));
   by("keys").append(element("h2", {}, "Keys"), element("table", {}, ...keys.filter(([name]) => name).map(row), ...mouse.map(row)),
     element("form", { method: "dialog" }, element("button", {}, "close")));

@@ -1,7 +1,7 @@
 // Exports: this frame as a picture, or a range as a film, at any size, with the camera of the view.
 import { element, bytes } from "./dom.js";
 
-const sizes = [["1280x720", "1280 × 720"], ["1920x1080", "1920 × 1080"], ["3840x2160", "3840 × 2160"], ["1080x1080", "1080 × 1080"], ["view", "as here"]];
+const sizes = [["1280x720", "1280 × 720"], ["1920x1080", "1920 × 1080"], ["3840x2160", "3840 × 2160"], ["1080x1080", "1080 × 1080"], ["view", "as in the view"]];
 
 export class Out {
   // ask; shown(): the view with its camera; size(): of the picture here, pixels; tell(text); title(): for names.
@@ -17,13 +17,13 @@ export class Out {
     this.first = number("out-first", "the film's first frame");
     this.last = number("out-last", "the film's last frame");
     this.kind = element("select", { id: "out-kind", title: "the film's format" }, ...[".mp4", ".webm", ".gif"].map((kind) => element("option", { value: kind }, kind)));
-    this.make = element("button", { id: "out-film", title: "renders the frames, and saves the film", onclick: () => this.film() }, "make film");
-    this.still = element("button", { id: "out-picture", title: "this frame, by the renderer of rapid run (P)", onclick: () => this.picture() }, "save .png");
-    this.bar = element("progress", { id: "out-progress", max: 1, value: 0, "aria-label": "how far the film is" });
+    this.make = element("button", { id: "out-film", title: "renders the frames and saves the film", onclick: () => this.film() }, "make film");
+    this.still = element("button", { id: "out-picture", title: "saves this frame as rapid run draws it (P)", onclick: () => this.picture() }, "save .png");
+    this.bar = element("progress", { id: "out-progress", max: 1, value: 0, "aria-label": "progress of the film" });
     this.text = element("span", { class: "quiet number", id: "out-text" });
     this.stop = element("button", { id: "out-cancel", class: "small", title: "cancels the film", onclick: () => this.cancel() }, "cancel");
     this.running = element("div", { class: "fields", hidden: true }, this.bar, this.text, this.stop);
-    this.why = element("div", { class: "quiet", hidden: true }, "Films need the program ffmpeg, which --untrusted does not allow.");
+    this.why = element("div", { class: "quiet", hidden: true }, "Films are encoded by the program ffmpeg, which --untrusted does not allow.");
     this.films = element("div", { class: "fields" }, element("label", {}, "frames"), this.first, element("span", { class: "quiet" }, "to"), this.last, this.kind, this.make);
     this.root = element("section", { id: "out", hidden: true },
       element("h2", {}, "Export", element("span", { class: "gap" }), element("button", { title: "close (O)", onclick: close }, "×")),

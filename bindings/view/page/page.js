@@ -23,7 +23,7 @@ const cache = new Map(); // messages of frames, by the request that they answer
 let cached = 0;
 
 const connection = new Connection({
-  lost() { note("The server does not answer; waiting for it. A new server has a new address, which rapid view prints."); },
+  lost() { note("The server does not answer; waiting for it. If you have started it again, use the new address that rapid view printed."); },
   found() { note(""); },
 });
 history.replaceState(null, "", "/"); // the connection has the token
@@ -35,8 +35,8 @@ function openPicture() {
   try {
     return new Picture(by("canvas"));
   } catch (error) {
-    showProblem("This browser has no WebGL, which the picture needs.", error.message,
-      "Try another browser, or install the driver of the graphics card. Over ssh, run the browser on your own machine.");
+    showProblem("The picture needs WebGL, which this browser does not have.", error.message,
+      "Try another browser, or install the driver of the graphics card. If you are connected by ssh, run the browser on your own machine.");
     throw error;
   }
 }
@@ -112,10 +112,10 @@ const choices = (list) => list.map(([value, text]) => element("option", { value 
 const bar = {
   title: element("h1", {}, ""),
   state: element("span", { id: "state" }, "starting"),
-  output: element("select", { id: "output", title: "the output of the graph", onchange: () => { state.output = bar.output.value; change(); } }),
+  output: element("select", { id: "output", title: "the output to show", onchange: () => { state.output = bar.output.value; change(); } }),
   colour: element("select", { id: "colour", title: "colour by an attribute (C)", onchange: () => { state.colour = bar.colour.value; change(); } }),
-  group: element("select", { id: "group", title: "only the points of a group", onchange: () => { state.group = bar.group.value; change(); } }),
-  style: element("select", { id: "style", title: "how points look (D)", onchange: () => { state.style = bar.style.value; change(); } },
+  group: element("select", { id: "group", title: "show only the points of a group", onchange: () => { state.group = bar.group.value; change(); } }),
+  style: element("select", { id: "style", title: "how points are drawn (D)", onchange: () => { state.style = bar.style.value; change(); } },
     ...choices([["discs", "spheres"], ["dots", "dots"], ["streaks", "streaks"], ["picture", "in pictures"]])),
   shapes: element("button", { id: "shapes", title: "colliders and emitters (S)", "aria-pressed": true, onclick: () => toggle("shapes") }, "shapes"),
   ground: element("button", { id: "ground", title: "grid and axes (G)", "aria-pressed": true, onclick: () => toggle("ground") }, "grid"),
@@ -126,7 +126,7 @@ by("bar").append(bar.title, bar.state, element("span", { class: "gap" }), bar.ou
   element("label", { for: "colour" }, "colour"), bar.colour, element("label", { for: "group" }, "group"), bar.group,
   element("label", { for: "style" }, "as"), bar.style, bar.shapes, bar.ground, bar.trails,
   element("button", { id: "fit", title: "show everything (F)", onclick: () => picture.fit() }, "fit"),
-  element("button", { id: "camera", title: "the camera in the form of --camera, to copy or to paste (K)", onclick: () => openCamera() }, "camera"),
+  element("button", { id: "camera", title: "copy the camera for --camera, or paste one (K)", onclick: () => openCamera() }, "camera"),
   element("button", { id: "save", title: "pictures and films (O)", "aria-pressed": false, onclick: () => openOut(!out.root.hidden ? false : true) }, "export"),
   element("button", { id: "theme", title: "dark or light (L)", onclick: () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light") }, "◐"),
   element("button", { id: "help", title: "all keys (?)", onclick: () => showKeys() }, "?"));
@@ -150,7 +150,7 @@ function theme(name) {
 
 // advice: says what to do with the text.
 function copy(text, advice) {
-  if (!text) return flash("nothing to copy: no value is changed");
+  if (!text) return flash("nothing to copy: no parameter was changed");
   const message = `${text}; ${advice}`;
   navigator.clipboard?.writeText(text).then(() => flash(`copied: ${message}`), () => flash(message));
   if (!navigator.clipboard) flash(message);
@@ -373,7 +373,7 @@ async function trace(id) {
   try {
     const { lives } = await ask("trace", { id, frame: state.frame, output: state.output || undefined, last: Math.max(newest() || 1, state.frame) });
     if (id !== state.point) return;
-    state.life = lives[0] ?? "No point of a simulation has this id.";
+    state.life = lives[0] ?? "No point has this id.";
   } catch (error) {
     state.life = error.message;
   }
@@ -440,7 +440,7 @@ function openCamera() {
     dialog.close();
   };
   field.addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); use(); } });
-  dialog.replaceChildren(element("h2", {}, "Camera"), field, element("p", { class: "quiet" }, "Position x,y,z, target x,y,z and the vertical angle, as --camera of pictures takes them."),
+  dialog.replaceChildren(element("h2", {}, "Camera"), field, element("p", { class: "quiet" }, "Position x,y,z, target x,y,z and the vertical angle, in the form of the option --camera."),
     element("div", { class: "fields" }, element("button", { id: "camera-use", title: "look from there (Enter)", onclick: use }, "look from there"),
       element("button", { id: "camera-scene", title: "look through the scene's camera (0)", disabled: !picture.sceneCamera, onclick: () => { picture.followScene(); dialog.close(); } }, "the scene's"),
       element("button", { id: "camera-copy", title: "for rapid run", onclick: () => { copy(`--camera=${field.value}`, "paste it after rapid run SCENE in a terminal"); dialog.close(); } }, "copy --camera"),
@@ -459,7 +459,7 @@ function showLegend(message) {
   for (let x = 0; x < 128; ++x) { context.fillStyle = `rgb(${ramp(x / 127)})`; context.fillRect(x, 0, 1, 1); }
   const [low, high] = message.ranges.value;
   legend.replaceChildren(bar_, element("div", {}, element("span", {}, brief(low)), element("span", {}, message.colour), element("span", {}, brief(high))),
-    message.unknown?.value > 0 ? element("div", {}, `known of ${brief(message.shown - message.unknown.value)} of ${brief(message.shown)} points`) : "");
+    message.unknown?.value > 0 ? element("div", {}, `${brief(message.shown - message.unknown.value)} of ${brief(message.shown)} points have a value`) : "");
 }
 
 const words = { starting: "starting", computing: "computing", done: "done", full: "memory is full", failed: "error" };
@@ -492,7 +492,7 @@ function showError(error) {
   by("error").hidden = !error;
   if (error)
     showProblem(error.message, `${error.file ? `${error.file}:${error.line}` : ""}${error.node ? `  node ${error.node}` : ""}`,
-      "The last good frames stay. Save the scene, or change a parameter, to run it again.");
+      "The last good frames stay visible. Save the scene or change a parameter to run it again.");
 }
 
 let figuresDue = 0;
@@ -538,7 +538,7 @@ async function follow() {
       await take(status, hasGraph).catch(tell); // an error here must not stop the rest
       await new Promise((resolve) => setTimeout(resolve, 30));
     } catch {
-      version = graphNumber = 0; // it may be another server
+      version = graphNumber = 0; // the server may be a new one
       await new Promise((resolve) => setTimeout(resolve, 500));
     }
   }

@@ -34,8 +34,8 @@ function border(work, panel, { name, axis, title }) {
 export class Panels {
   constructor(work, side, dock) {
     this.work = work;
-    border(work, side, { name: "side", axis: "x", title: "the width of the column: drag, or arrows; double click: as it was" });
-    border(work, dock, { name: "dock", axis: "y", title: "the height of the dock: drag, or arrows; double click: as it was" });
+    border(work, side, { name: "side", axis: "x", title: "the width of the column: drag it or use the arrow keys; double-click for the default" });
+    border(work, dock, { name: "dock", axis: "y", title: "the height of the dock: drag it or use the arrow keys; double-click for the default" });
   }
 
   // Shows the picture alone, or with all panels.

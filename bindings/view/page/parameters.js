@@ -17,10 +17,10 @@ export class Parameters {
     this.root = root;
     this.change = change;
     this.list = element("div");
-    this.reset = element("button", { title: "all parameters as the scene has them", onclick: () => this.send({}) }, "reset");
+    this.reset = element("button", { title: "resets all parameters to the scene's values", onclick: () => this.send({}) }, "reset");
     root.append(
       element("h2", {}, "Parameters", element("span", { class: "gap" }), this.reset,
-        element("button", { title: "copies the changed values as options of rapid run", id: "copy-set", onclick: () => copy(this.options(),
+        element("button", { title: "copies the changed values as options for rapid run", id: "copy-set", onclick: () => copy(this.options(),
           "paste it after rapid run SCENE in a terminal, or write the values into the scene as the defaults of rapid.param") }, "copy --set")),
       this.list);
     this.values = {};
@@ -55,7 +55,7 @@ export class Parameters {
       this.shape = shape;
       this.fields.clear();
       this.list.replaceChildren(...(this.known.length ? this.known.map((p) => this.row(p))
-        : [element("div", { class: "quiet" }, "The scene declares none: rapid.param(name, default, doc).")]));
+        : [element("div", { class: "quiet" }, "This scene has none. Add one with rapid.param(name, default, doc).")]));
     }
     for (const parameter of this.known) {
       const field = this.fields.get(parameter.name);

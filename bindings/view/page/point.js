@@ -2,7 +2,7 @@
 import { element, exact, brief, bytes, seconds, prepare, colour } from "./dom.js";
 
 export class Inspector {
-  // go(frame); trace(id): requests a life; close(what).
+  // actions: go(frame); trace(id), which requests a life; close(what).
   constructor(root, actions) {
     this.root = root;
     this.actions = actions;
@@ -11,7 +11,7 @@ export class Inspector {
       root.append(part);
       return [name, part];
     }));
-    this.hint = element("section", { id: "hint", class: "quiet" }, "Click a point for its values and its life, or a node for the points after it. Drag with Shift for the ranges in a region. ? lists all keys.");
+    this.hint = element("section", { id: "hint", class: "quiet" }, "Click a point to see its values and its life, or a node to see the points after it. Drag with Shift to see the ranges in a region. ? lists all keys.");
     root.append(this.hint);
   }
 
@@ -32,20 +32,20 @@ export class Inspector {
   // Shows the hint only if nothing is chosen.
   hinted() { this.hint.hidden = ["node", "point", "region"].some((name) => !this.parts[name].hidden); }
 
-  // path: [frame, x, y, z, speed, error, sub-steps] for each frame that has the point.
+  // path: [frame, x, y, z, speed, error, substeps] for each frame that has the point.
   point(id, row, life, path = [], frame = NaN) {
     if (!row) return this.hide("point");
     const rows = Object.entries(row.values).map(([name, value]) =>
       element("tr", { "data-attribute": name }, element("th", {}, name), element("td", { class: "number" }, exact(value))));
     if (row.groups.length) rows.push(element("tr", {}, element("th", {}, "groups"), element("td", { class: "number" }, row.groups.join(", "))));
     const table = element("table", { id: "attributes" }, ...rows);
-    const curves = [[4, "speed", "m/s"], [5, "estimated error", "m"], [6, "sub-steps", ""]]
+    const curves = [[4, "speed", "m/s"], [5, "estimated error", "m"], [6, "substeps", ""]]
       .map(([k, name, of]) => this.curve(name, of, path.filter((place) => typeof place[k] === "number").map((place) => [place[0], place[k]]), frame));
     if (life === "") this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box)); // files: no life
     else this.put("point", `Point ${id}`, table, ...curves.map((curve) => curve?.box),
       element("h2", { class: "life-head" }, "Life", element("span", { class: "gap" }),
-        life ? null : element("button", { id: "trace", title: "computes the life of the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "tell")),
-      life ? this.life(life) : element("div", { class: "quiet" }, "Birth, edits by nodes, contacts and death, computed on request."));
+        life ? null : element("button", { id: "trace", title: "computes the life of the point: births, edits, forces, contacts (B)", onclick: () => this.actions.trace(id) }, "show life")),
+      life ? this.life(life) : element("div", { class: "quiet" }, "Its birth, edits by nodes, contacts and death are computed on request."));
     for (const curve of curves) curve?.draw();
   }
 
@@ -54,7 +54,7 @@ export class Inspector {
     if (values.length < 2 || values.every(([, v]) => v === 0)) return null;
     const most = Math.max(...values.map(([, v]) => v)), first = values[0][0], last = values[values.length - 1][0];
     const here = values.find(([f]) => f === frame);
-    const canvas = element("canvas", { title: `${name} of the point over its frames: a click goes to the frame`, onclick: (event) => {
+    const canvas = element("canvas", { title: `${name} of the point over its frames: click to go to a frame`, onclick: (event) => {
       const box = canvas.getBoundingClientRect();
       this.actions.go(Math.round(first + ((event.clientX - box.left) / box.width) * (last - first)));
     } });
@@ -72,7 +72,7 @@ export class Inspector {
     } };
   }
 
-  // life: as in rapid trace --json, or a text.
+  // life: as in rapid trace --json, or a message.
   life(life) {
     if (typeof life === "string") return element("div", { class: "quiet" }, life);
     const list = element("ul", { class: "life", id: "life" });
@@ -110,7 +110,7 @@ export class Inspector {
     const rows = Object.entries(found.ranges).map(([name, [low, mean, high]]) =>
       element("tr", {}, element("th", {}, name), element("td", { class: "number" }, brief(low)), element("td", { class: "number" }, brief(mean)), element("td", { class: "number" }, brief(high))));
     this.put("region", `Region: ${brief(found.count)} points`, element("table", {},
-      element("tr", {}, element("th", {}), ...["least", "mean", "most"].map((t) => element("td", { class: "number quiet" }, t))), ...rows),
+      element("tr", {}, element("th", {}), ...["smallest", "mean", "largest"].map((t) => element("td", { class: "number quiet" }, t))), ...rows),
       ...Object.entries(found.groups).map(([name, count]) => element("div", {}, `${brief(count)} in ${name}`)));
   }
 

@@ -20,7 +20,7 @@ export class Sheet {
     this.table = root.querySelector("table");
     this.table.append(this.body);
     root.tabIndex = 0;
-    root.title = "the points of the frame: click a row, or go up and down by the arrows";
+    root.title = "the points of the frame: click a row, or use the arrow keys";
     root.addEventListener("keydown", (event) => {
       const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
       if (!step || !this.rows?.length) return;

@@ -5,7 +5,7 @@ export class Timeline {
   // go(frame): the user chose a frame; play(on).
   constructor(root, { go, play, step }) {
     this.go = go;
-    this.canvas = element("canvas", { title: "click or drag: go to a frame. Green: computed; ochre: from the previous run; blue: being computed; marks: warnings", "aria-label": "frames" });
+    this.canvas = element("canvas", { title: "Click or drag to go to a frame. Green frames are computed, ochre ones are from the previous run, the blue one is being computed. Marks show warnings.", "aria-label": "frames" });
     this.playing = element("button", { id: "play", title: "play, pause (Space)", onclick: () => play() }, "▶");
     this.field = element("input", { type: "number", id: "frame", title: "the frame shown", onchange: () => go(Number(this.field.value)) });
     this.text = element("span", { class: "number quiet", id: "rate" });

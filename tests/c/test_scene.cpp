@@ -129,7 +129,7 @@ TEST_CASE("the header is of the library's version", "[c]")
                                                   std::to_string(RAPID_VERSION_MINOR) + "."));
 }
 
-TEST_CASE("what is offered in C is taken", "[c]")
+TEST_CASE("objects offered in C are used by the scene", "[c]")
 {
     rapid_offers* offers = nullptr;
     REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
@@ -183,7 +183,7 @@ TEST_CASE("what is offered in C is taken", "[c]")
     rapid_scene_release(scene, nullptr);
 }
 
-TEST_CASE("a column of texts is of tokens in C, in both directions", "[c]")
+TEST_CASE("a column of strings contains tokens in C, in both directions", "[c]")
 {
     const float P[] = {0, 0, 0, 1, 0, 0};
     std::uint32_t tokens[] = {0, 0};

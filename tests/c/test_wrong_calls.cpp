@@ -461,7 +461,7 @@ TEST_CASE("the table has all functions of the header", "[c]")
     CHECK(declared == known);
 }
 
-TEST_CASE("each function does what it is for", "[c]")
+TEST_CASE("each function fulfils its purpose", "[c]")
 {
     for (const Function& function : functions()) {
         CAPTURE(function.name);
@@ -566,7 +566,8 @@ TEST_CASE("within a call of its scene each function of it is refused, and those 
     }
 }
 
-TEST_CASE("behind a frame that failed a scene takes any call, and has no next frame until it goes back", "[c]")
+TEST_CASE("after a failed frame a scene accepts any call, but has no next frame until it is restarted or restored",
+          "[c]")
 {
     const std::set<std::string> refused = {"rapid_scene_advance", "rapid_scene_advance_to", "rapid_scene_save"};
     const Opened opened;
@@ -727,7 +728,7 @@ TEST_CASE("names, types and numbers that there are not are refused", "[c]")
 }
 
 // Misbehaving callbacks of a program, as C sees them.
-TEST_CASE("what a callback does wrong is an error of the scene, which goes on behind it", "[c]")
+TEST_CASE("a mistake in a callback is an error of the scene, which stays usable", "[c]")
 {
     struct Program {
         int (*wrong)(const rapid_call*) = nullptr;

@@ -59,7 +59,7 @@ local function range(first, last)
 end
 
 describe("rapid run --cache", function()
-  it("goes on behind the last snapshot, to the files and statistics of a run that was not interrupted", function()
+  it("continues after the last snapshot, to the files and statistics of an uninterrupted run", function()
     local folder = new_folder()
     folder:done "-f 1-30 -o whole/a.####.bgeo --stats whole.json --events whole.csv"
     local arguments = "--cache cache -o a/a.####.bgeo --stats a.json --events a.csv"
@@ -76,7 +76,7 @@ describe("rapid run --cache", function()
     folder:shell "cmp whole.csv a.csv"
   end)
 
-  it("takes events up again, whatever ended the run, and leaves out a snapshot whose events are damaged", function()
+  it("continues events, whatever ended the run, and skips a snapshot whose events are damaged", function()
     local folder = new_folder()
     folder:done "-f 1-40 --set rate=4000 --events whole.csv --quiet"
     local said = folder:shell [[
@@ -117,7 +117,7 @@ run --quiet 2>&1 && cmp whole.csv a.csv
     assert.is_nil(folder:read "none/snapshot.0006.rapid")
   end)
 
-  it("starts near the first frame that is asked for", function()
+  it("starts near the first requested frame", function()
     local folder = new_folder()
     folder:done "-f 1-30 --cache cache --stats whole.json"
     folder:done "-f 26-28 -o whole.####.bgeo"
@@ -127,7 +127,7 @@ run --quiet 2>&1 && cmp whole.csv a.csv
     assert.equal(28, #statistics.of(folder:read "a.json").frames)
   end)
 
-  it("neither computes nor writes again what is there, and does so with --again", function()
+  it("neither computes nor writes existing frames again, except with --again", function()
     local folder = new_folder()
     local arguments = "-f 1-12 -o a/a.####.bgeo -o a/p.####.png --size 64x36 --cache cache --stats a.json"
     folder:done(arguments)
@@ -393,7 +393,7 @@ return rapid.create {} :emit { source = rapid.mesh.grid {}, rate = next_rate } :
     return result.stderr, computed(result.stdout)[1]
   end
 
-  it("leaves out damaged and foreign snapshots, with a warning, and goes on behind an earlier one", function()
+  it("skips damaged and foreign snapshots with a warning, and continues after an earlier one", function()
     local snapshot = "cache/snapshot.0009.rapid"
     local function left_out(why)
       return ("warning: %s: %s; it is skipped\n"):format(snapshot, why)
@@ -558,7 +558,7 @@ diff -r whole b
 end)
 
 describe("rapid info", function()
-  it("tells what a snapshot is of, and what each node keeps", function()
+  it("describes a snapshot, and the state of each node", function()
     local folder = new_folder()
     folder:done "-f 1-4 --cache cache"
     local result = command.rapid("info cache/snapshot.0004.rapid", { cwd = folder.path })

@@ -104,7 +104,7 @@ return rapid.create {} :%s }
     end
   end)
 
-  it("warns of what is doubtful, and goes on", function()
+  it("warns of doubtful values, and continues", function()
     local result = check [[
 local rapid = require "rapid"
 local points = rapid.create {} :solve {}

@@ -80,7 +80,7 @@ std::string snapshot_with(const std::string& header)
 
 }  // namespace
 
-TEST_CASE("a snapshot with any header is told, or is an error that names it", "[crafted]")
+TEST_CASE("a snapshot with any header is described, or is an error that names it", "[crafted]")
 {
     const test::TemporaryFolder folder;
     const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "rapid";

@@ -38,7 +38,7 @@ return rapid.create {} :emit { ]] .. source .. [[, life = 2 }
 ]])
 
 describe("rapid explain --json", function()
-  it("tells of each node whether it is kept, how often it is evaluated, and why", function()
+  it("lists for each node whether it is kept, how often it is evaluated, and why", function()
     local nodes = plan_of("falls.lua").nodes
     assert.same({ name = "emit1", type = "emit", kept = true, evaluated = "every frame",
                   why = "leads to the output", changes = "its points continue from frame to frame" },
@@ -115,7 +115,7 @@ return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 0
     assert.equal("write1, -o b.####.csv", bounces.stages.writing.why)
   end)
 
-  it("tells how often functions of the frame are called, and what holds between", function()
+  it("lists how often functions of the frame are called, and the values in between", function()
     write("changes.lua", [[
 return rapid.create { subframes = 2, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.5 } }
   :gravity { g = function(frame) return {0, -frame.time, 0} end }

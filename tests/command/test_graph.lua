@@ -38,7 +38,7 @@ describe("graph", function()
     assert.truthy(json:find('"kept":false,"evaluated":"never","why":"leads to no output"', 1, true), json)
   end)
 
-  it("says what is missing where there is no dot", function()
+  it("names the missing program if there is no dot", function()
     scene.write(text)
     local options = { cwd = scene.folder.path, environment = { PATH = "/none" } }
     local result = command.rapid("graph scene.lua -o g.svg", options)

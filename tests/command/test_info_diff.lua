@@ -23,7 +23,7 @@ local function rapid(arguments)
 end
 
 describe("rapid info", function()
-  it("tells points, attributes with their types, and bounds", function()
+  it("prints points, attributes with their types, and bounds", function()
     local result = rapid "info a.csv"
     assert.equal(0, result.status, result.stderr)
     assert.truthy(result.stdout:find("points +3\n"), result.stdout)
@@ -32,14 +32,14 @@ describe("rapid info", function()
     assert.truthy(result.stdout:find("\n  P +vec3 "), result.stdout)
   end)
 
-  it("tells the same as JSON", function()
+  it("prints the same as JSON", function()
     local info = json.decode(rapid("info --json a.csv").stdout)
     assert.equal("a.csv", info.file)
     assert.equal(3, info.points)
     assert.same({ 3, 4, 12 }, info.bounds.max)
   end)
 
-  it("tells of each file of a sequence, in order", function()
+  it("describes each file of a sequence, in order", function()
     local infos = json.decode(rapid("info one.####.csv --json").stdout)
     assert.equal(3, #infos)
     for frame, info in ipairs(infos) do
@@ -88,7 +88,7 @@ describe("rapid diff", function()
     assert.equal(0, rapid("diff a.csv near.csv").status)
   end)
 
-  it("can't tell points apart that have one id, and ends with 2", function()
+  it("refuses points with the same id, and ends with 2", function()
     csv("twice.csv", { "0,0,0,0,0,0,0,1", "1,3,4,0,0,1,0,2", "1,0,0,12,0,0,0,3" })
     for _, files in ipairs { "a.csv twice.csv", "twice.csv a.csv", "twice.csv twice.csv" } do
       local result = rapid("diff " .. files)

@@ -45,7 +45,7 @@ describe("--memory", function()
     end
   end)
 
-  it("ends what takes more than anybody has estimated, and tells where", function()
+  it("ends a run that takes more memory than estimated, and names the node", function()
     for text, expected in pairs {
       [ [[return rapid.create { points = two } :detail("d", function(points, frame)
   for i = 1, 1e6 do points.detail[("x"):rep(100) .. i .. "_" .. frame.number] = i end
@@ -118,7 +118,7 @@ describe("a file that is larger than the memory that a run may take", function()
     assert.match("small%.ply: not a PLY", read "small.ply".stderr)
   end)
 
-  it("is refused before what is compressed, or text, is unpacked", function()
+  it("is refused before compressed data or text is unpacked", function()
     local points = "return rapid.create { points = rapid.points.grid { size = {1, 1, 1}, spacing = 1 / 106 } }"
     assert.equal(0, scene.command("run", points, "-f 1 --quiet -o big.prt -o big.csv").status)
     assert.match("big%.prt: %d+ points, decompressed, would need about 7%d MiB", read "big.prt".stderr)

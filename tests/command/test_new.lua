@@ -39,7 +39,7 @@ describe("rapid new", function()
     assert.equal("mine", folder:read ".luacheckrc")
   end)
 
-  it("refuses what is no name, and the name of a node", function()
+  it("refuses an illegal name, and the name of a node", function()
     local folder = command.folder()
     for name, expected in pairs {
       ["../rain"] = 'rapid new: "../rain" can\'t be the name of a scene; it must consist of letters, digits, _ and ' ..

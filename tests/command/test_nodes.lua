@@ -37,7 +37,7 @@ describe("rapid nodes", function()
     end
   end)
 
-  it("tells of every parameter: type, default, range, unit and documentation", function()
+  it("describes every parameter: type, default, range, unit and documentation", function()
     for _, node in ipairs(all) do
       assert.truthy(#node.doc > 0, node.name)
       local page = command.rapid("nodes " .. node.name)

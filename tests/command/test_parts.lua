@@ -111,7 +111,7 @@ describe("rapid run --part", function()
     assert.equal(#whole + 1, #parts) -- one header each
   end)
 
-  it("refuses a part that is none", function()
+  it("refuses an illegal part", function()
     for _, part in ipairs { "0/4", "5/4", "1", "a/b", "1/0", "1/4x" } do
       local result = rapid("run drops.lua --part " .. part)
       assert.equal(2, result.status)
@@ -150,7 +150,7 @@ describe("parts with a cache", function()
 end)
 
 describe("rapid run --sample", function()
-  it("has the points of the whole run at its ids, to the bit", function()
+  it("has the points of the whole run with its ids, bit-identical", function()
     done "run drops.lua -f 1-12 -o 'w.####.csv' --quiet"
     done "run drops.lua -f 1-12 -o 's.####.csv' --sample 0.05 --quiet"
     local found = 0
@@ -169,7 +169,7 @@ describe("rapid run --sample", function()
 end)
 
 describe("a :detail that reads no points", function()
-  it("is no obstacle to parts: what it makes of the frame is the same in each", function()
+  it("works with parts: its result is the same in each", function()
     folder:write("gusts.lua", [[
 local rapid = require "rapid"
 local strength = 3

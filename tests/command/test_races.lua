@@ -80,7 +80,7 @@ describe("rapid check --races", function()
       1, true), result.stdout)
   end)
 
-  it("tells what goes wrong in a frame with 1, as a run does", function()
+  it("reports an error in a frame with status 1, as a run does", function()
     local result = check(":points('k', function() error 'too hot' end) :solve {}")
     assert.equal('scene.lua:3: node "k": too hot (point id 0, frame 2)\n', result.stderr)
     assert.equal(1, result.status)

@@ -66,7 +66,7 @@ describe("rapid run", function()
     assert.truthy(result.stdout:match "points   3\r?\n")
   end)
 
-  it("warns once of what is doubtful in many frames, and adds it up in the summary", function()
+  it("warns once of a doubt that many frames share, and adds it up in the summary", function()
     -- A ball without radius bounces in a slit of a micrometre, 4 million times a frame, until it rests; then it is
     -- kicked again.
     local folder = new_folder [[
@@ -89,7 +89,7 @@ return rapid.create { points = rapid.points.from { P = {{5e-7, 0, 0}}, v = {{100
     assert.same({ 0, 1, 1, 1 }, counts)
   end)
 
-  it("tells ten warnings of a kind as they come, and of the rest the number and the last", function()
+  it("prints ten warnings of a kind as they occur, then the number of the rest and the last one", function()
     local folder = new_folder [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
@@ -108,7 +108,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
       lines[11])
   end)
 
-  it("tells what makers warn of within frames", function()
+  it("prints the warnings of shapes and other values within frames", function()
     local folder = new_folder [[
 local rapid = require "rapid"
 return rapid.create { points = rapid.points.from { P = {{0, 9, 0}} } }
@@ -314,7 +314,7 @@ local pieces = rapid.create {} :spawn { from = drops, on = "hittotal >= 1", coun
 return rapid.create {} :spawn { from = pieces, on = "death", count = 3 } :solve {}
 ]]
 
-  it("reaches the chains whose points bear others, and their parents in turn", function()
+  it("reaches the chains whose points emit others, and their parents in turn", function()
     for _, g in ipairs { 1, 3, 9 } do
       local lands = math.sqrt(2 / g) + 0.2
       local result = scene.run(bursts, { frames = {1, 40}, set = { ["gravity1.g"] = {0, -g, 0} } })

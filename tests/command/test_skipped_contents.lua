@@ -14,7 +14,7 @@ local function big(n, size)
 end
 
 describe("what a reader leaves out", function()
-  it("is told of .bgeo: primitives", function()
+  it("is reported for .bgeo: primitives", function()
     -- A point at 0 with a string attribute, and spheres (7), of which only the number can be reported.
     scene.folder:write("one.bgeo", "BgeoV" .. big(5, 4) .. big(1, 4) .. big(3, 4) .. big(0, 4):rep(2) .. big(1, 4) ..
       big(0, 4):rep(3) .. big(4, 2) .. "kind" .. big(1, 2) .. big(4, 4) .. big(1, 4) .. big(4, 2) .. "rock" ..
@@ -24,13 +24,13 @@ describe("what a reader leaves out", function()
     assert.equal("rock", points[1].kind)
   end)
 
-  it("is told of .ply: other elements", function()
+  it("is reported for .ply: other elements", function()
     scene.folder:write("one.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" ..
       "property float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0\n1 0\n")
     assert.matches('not read: its 2 elements "face"', warnings "one.ply", 1, true)
   end)
 
-  it("is told of .usda: arrays of other types, and of other numbers of values", function()
+  it("is reported for .usda: arrays of other types, and of other numbers of values", function()
     scene.folder:write("one.usda", [[
 #usda 1.0
 def Points "a"
@@ -45,7 +45,7 @@ def Points "a"
     assert.matches("not read: primvars:three of 3 values, but there are 1 points", text, 1, true)
   end)
 
-  it("is told of .vtp: arrays of text, and polygons", function()
+  it("is reported for .vtp: arrays of text, and polygons", function()
     scene.folder:write("one.vtp", [[
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian"><PolyData>
 <Piece NumberOfPoints="1" NumberOfPolys="2"><PointData><DataArray type="String" Name="kind" format="ascii">114 0
@@ -67,7 +67,7 @@ def Points "a"
     end
   end)
 
-  it("is told by rapid info", function()
+  it("is reported by rapid info", function()
     scene.folder:write("one.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n" ..
       "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0\n")
     local command = require "testing.command"

@@ -88,7 +88,7 @@ describe("rapid study", function()
     assert.truthy(result.stdout:find "\n%* +3 +4 ", result.stdout) -- the smallest error is always among them
   end)
 
-  it("takes the norm that is asked for: max, p95, the last frame, or the study's own", function()
+  it("uses the requested norm: max, p95, the last frame, or the study's own", function()
     study("late.lua", 'error = "max"')
     assert.near(off(24, 2, 2), row_of(result_of "late.lua", { power = 2, substeps = 2 }).error, 2e-6)
     study("late.lua", 'error = "p95"')
@@ -244,7 +244,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity 
     assert.near(2 * 0.5 ^ 2 / 2, found.rows[2].error, 1e-6) -- the difference of g, times t²/2
   end)
 
-  it("tells a setting that fails from one that the scene refuses", function()
+  it("distinguishes a setting that fails from one that the scene refuses", function()
     folder:write("warm.lua", header .. [[
 return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
   :points("warm", function(_, frame) if frame.number == 4 then error "hot" end end) :solve {}]])
@@ -256,7 +256,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
     assert.truthy(early.stdout:find("frames: -4 is before the scene's first frame, 1", 1, true), early.stdout)
   end)
 
-  it("says that there is no residual where there is no constraint", function()
+  it("reports that there is no residual without a constraint", function()
     local result = rapid "orbit.lua --sweep solve.substeps=1,2 --error residual -f 1-3 -o out"
     assert.equal(1, result.status)
     assert.truthy(result.stdout:find("no constraint acts in the compared frames", 1, true), result.stdout)
@@ -268,7 +268,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } }
     return result.stderr
   end
 
-  it("says what is wrong before anything runs", function()
+  it("reports mistakes before anything runs", function()
     assert.truthy(message("orbit.lua --sweep solev.substeps=1 --reference 2")
       :find('solev.substeps: the graph has no node "solev"; did you mean "solve"?', 1, true))
     assert.truthy(message("orbit.lua --sweep solve.substep=1 --reference 2")

@@ -198,7 +198,7 @@ it("four", function() io.write "no newline" end)]]
     assert.truthy(at_once.stdout:find(pattern), at_once.stdout)
   end)
 
-  it("refuses a number of jobs that is none", function()
+  it("refuses an illegal number of jobs", function()
     local result = new_folder({ ["a.lua"] = passing }):test "a.lua --jobs 0"
     assert.equal(2, result.status)
     assert.truthy(result.stderr:find('--jobs = "0"; it must be a whole number, at least 1', 1, true), result.stderr)
@@ -305,7 +305,7 @@ describe("a test", function()
       assert.has_error(function() result:output "smoke" end, 'the scene has no output "smoke"; it has main, other')]]
   end)
 
-  it("gets the text of a scene's error", function()
+  it("receives the message of a scene's error", function()
     holds [[
       assert.has_error(function() rapid.run("no.lua", { frames = {1, 2} }) end)
       local ok, message = pcall(rapid.run, "scene.lua", { frames = {1, 2}, set = { upp = 1 } })
@@ -313,7 +313,7 @@ describe("a test", function()
       assert.truthy(message:find('did you mean "up"?', 1, true))]]
   end)
 
-  it("is told of wrong options", function()
+  it("reports wrong options", function()
     fails('rapid.run("scene.lua", { frame = {1, 2} })', 'rapid.run: unknown option "frame"')
     fails('rapid.run("scene.lua", {})', "rapid.run: frames is missing")
     fails('rapid.run("scene.lua", { frames = {2, 1} })', "ends before it begins")

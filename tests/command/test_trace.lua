@@ -26,7 +26,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}, {5,
   :gravity {} :collide { name = "floor", shape = rapid.shape.plane {}, bounce = 0.5 } :solve {}]]
 
 describe("trace", function()
-  it("tells birth, contacts and the end of a ball's life at their moments", function()
+  it("lists birth, contacts and the end of a ball's life at their times", function()
     local text = reported(ball, "--id 0 -f 1-60")
     assert.truthy(text:find("born in create1 at (0, 1, 0), v = (2, 0, 0)", 1, true), text)
     local fall, contacts = math.sqrt(2 / g), {}
@@ -43,7 +43,7 @@ describe("trace", function()
     assert.falsy(text:find("point 1 ", 1, true))
   end)
 
-  it("tells each force by its node, in metres per second squared", function()
+  it("lists each force with its node, in metres per second squared", function()
     local text = reported([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{2, 0, 0}}, v = {{0, 3, 0}} } }
   :gravity {} :spring { stiffness = 2 } :drag { linear = 4 } :solve {}]], "--id 0 -f 1-2")
@@ -55,7 +55,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{2, 0, 0}}, v 
     assert.near(-4, spring[1], 1e-6)
   end)
 
-  it("tells what each node changed, and which one removed the point", function()
+  it("lists the changes of each node, and the one that removed the point", function()
     local text = reported([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{0, 1, 0}} } }
   :attribute { heat = 0 }

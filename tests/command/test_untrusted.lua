@@ -24,7 +24,7 @@ end
 local plain = "return rapid.create { points = two } :gravity {} :solve {}"
 
 describe("rapid run --untrusted", function()
-  it("computes what a run without it does, to the bit", function()
+  it("is bit-identical to a run without it", function()
     local folder = new_folder(plain)
     assert.equal(0, folder:run("-o out/a.####.csv").status)
     local open = command.rapid("run inside/scene.lua -f 1-3 --quiet -o out/b.####.csv", { cwd = folder.path })
@@ -152,7 +152,7 @@ kill -9 $pid]], { cwd = folder.path }).stdout
   end)
 
   -- OpenVDB reads in the reader process.
-  it("reads .vdb and meshes as a run without it does, to the bit", function()
+  it("reads .vdb and meshes bit-identical to a run without it", function()
     local folder = new_folder([[
 rapid.levelset.sphere { voxel = 0.1 } :write "out/ball.vdb"
 return rapid.create { points = two } :solve {}]])
@@ -168,14 +168,14 @@ return rapid.create { points = rapid.points.read "two.vdb" } :emit { source = ra
     assert.match("\n10,", folder:read "out/a.0003.csv")
   end)
 
-  it("takes its arguments behind -- as well", function()
+  it("also accepts arguments after --", function()
     local folder = new_folder(plain)
     local result = command.rapid("run --untrusted --quiet -f 1-3 -- inside/scene.lua", { cwd = folder.path })
     assert.equal("", result.stderr)
     assert.equal(0, result.status)
   end)
 
-  it("is refused where it would promise what it can't keep", function()
+  it("refuses options that the sandbox can't guarantee", function()
     local folder = new_folder(plain)
     local watched = folder:run("--watch")
     assert.equal(2, watched.status)

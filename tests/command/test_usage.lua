@@ -9,7 +9,7 @@ return rapid.create { points = rapid.points.grid { size = {count, 1, 1}, spacing
 ]]
 
 describe("rapid", function()
-  it("alone prints what it can do, and is done", function()
+  it("alone prints its commands", function()
     local result = rapid ""
     assert.equal(0, result.status)
     for _, name in ipairs { "run", "check", "nodes", "info", "diff", "test" } do
@@ -18,7 +18,7 @@ describe("rapid", function()
     assert.equal("", result.stderr)
   end)
 
-  it("tells its version and its help, of each command too", function()
+  it("prints its version, and the help of each command", function()
     local version = rapid "--version"
     assert.equal(0, version.status)
     assert.truthy(version.stdout:match "^rapid %d+%.%d+%.%d+\n$")

@@ -87,7 +87,7 @@ describe("rapid run --watch", function()
     assert.truthy(log:find("status 130\n", 1, true), log)
   end)
 
-  it("ends with 143 when it is asked to terminate", function()
+  it("ends with 143 after SIGTERM", function()
     assert.truthy(watch({ { "^watching", 1, "" } }, { signal = "TERM" }):find("status 143\n", 1, true))
   end)
 end)

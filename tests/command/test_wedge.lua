@@ -50,7 +50,7 @@ describe("rapid wedge", function()
     end
   end)
 
-  it("tells points, contacts, error and time of each row, in order, as a table and as wedge.json", function()
+  it("lists points, contacts, error and time of each row, in order, as a table and as wedge.json", function()
     local result = wedge "--vary rate=240,480 --vary solve.substeps=1,4 -f 1-12 --jobs 2"
     assert.equal(0, result.status)
     local found = report()

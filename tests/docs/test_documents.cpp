@@ -52,7 +52,7 @@ std::vector<std::string> promises_of(const std::string& text)
 
 }  // namespace
 
-TEST_CASE("a file or folder that a document names is there", "[docs]")
+TEST_CASE("each file and folder that a document names exists", "[docs]")
 {
     for (const std::string& document : documents) {
         const std::string text = read_text(project / document);
@@ -119,7 +119,7 @@ TEST_CASE("a name that a document gives with its file is in that file", "[docs]"
     }
 }
 
-TEST_CASE("a link of a document leads somewhere", "[docs]")
+TEST_CASE("each link of a document has a target", "[docs]")
 {
     const std::regex link(R"re(\]\(([^)#:]*)(?:#([^)]*))?\))re");
     for (const std::string& document : documents) {
@@ -137,7 +137,7 @@ TEST_CASE("a link of a document leads somewhere", "[docs]")
     }
 }
 
-TEST_CASE("the folders of the architecture are those that there are", "[docs]")
+TEST_CASE("architecture.md lists exactly the existing folders", "[docs]")
 {
     std::set<std::string> described, found;
     const std::string layers = section(read_text(project / "docs/architecture.md"), "Layers");
@@ -164,7 +164,7 @@ TEST_CASE("the figures of a frame are documented as they are declared", "[docs]"
 #undef RAPID_FIGURE
 }
 
-TEST_CASE("the presets that contributing tells of are those that there are", "[docs]")
+TEST_CASE("CONTRIBUTING.md lists exactly the existing presets", "[docs]")
 {
     std::set<std::string> described, found;
     const std::string building = section(read_text(project / "CONTRIBUTING.md"), "Building");
@@ -174,7 +174,7 @@ TEST_CASE("the presets that contributing tells of are those that there are", "[d
     CHECK(described == found);
 }
 
-TEST_CASE("a name of the glossary is in the file that it is said to be in", "[docs]")
+TEST_CASE("each name of the glossary is in the file that the glossary gives", "[docs]")
 {
     const std::string glossary = section(read_text(project / "docs/architecture.md"), "Glossary");
     const auto entries = matches(glossary, std::regex(R"re(\n\| `(\w+)` \|[^\n]*\| `([\w/.]+)` \|)re"));
@@ -187,7 +187,7 @@ TEST_CASE("a name of the glossary is in the file that it is said to be in", "[do
     }
 }
 
-TEST_CASE("a section of numerics that a comment cites is there", "[docs]")
+TEST_CASE("each section of numerics that a comment cites exists", "[docs]")
 {
     std::set<std::string> titles;
     for (const Section& each : sections(read_text(project / "docs/numerics.md"))) titles.insert(each.title);

@@ -73,7 +73,7 @@ TEST_CASE("the example of a force is exact, at any number of sub-steps", "[docs]
     CHECK_THAT(points.P()[0], test::close_to(Vec3f(static_cast<float>(u * t - v / k), 2, 0), 1e-5));
 }
 
-TEST_CASE("the example of a constraint holds what hangs from it, and leaves alone what is within its reach", "[docs]")
+TEST_CASE("the example of a constraint holds points at its length, and leaves nearer points free", "[docs]")
 {
     const PointSet points = run(
         "rapid.create { points = rapid.points.from { P = {{0, -1, 0}, {0.5, 0, 0}}, v = {{0, 0, 0}, {-0.5, 0, 0}} } }"

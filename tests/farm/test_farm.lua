@@ -91,7 +91,7 @@ describe("rapid run --farm slurm", function()
     assert.equal("nothing has failed\n", done "farm retry out/FARM.json")
   end)
 
-  it("leaves the others where a task fails, and runs again what is missing", function()
+  it("keeps the other tasks if one fails, and runs missing ones again", function()
     shell "mkdir -p fail/a_part2of3.0003.bgeo" -- a folder with the name of an output file
     done "run drops.lua -f 1-8 -o 'fail/a.####.bgeo' --farm slurm --parts 3"
     assert.equal("done failed done waiting", states(settled "fail/FARM.json"))
@@ -124,7 +124,7 @@ describe("rapid run --farm slurm", function()
     assert.truthy(folder:read "whole/a.0008.bgeo" == folder:read "kill/a.0008.bgeo")
   end)
 
-  it("goes on behind the last snapshot of a task that was put back into the queue, or killed", function()
+  it("continues after the last snapshot of a task that was requeued or killed", function()
     folder:write("slow.lua", [[
 local rapid = require "rapid"
 local function rate(frame)
@@ -169,7 +169,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
     assert.equal(folder:read "direct/a.0004.csv", folder:read "one/a.0004.csv")
   end)
 
-  it("keeps to the memory of the job, whether that is told by the node or by the processor", function()
+  it("obeys the memory of the job, whether it is given per node or per processor", function()
     for k, options in ipairs { "--mem=60", "--mem-per-cpu=30 -c 2" } do
       local name = ("memory%d/"):format(k)
       done(("run drops.lua -f 1-4 --set rate=50000000 -o '%sa.####.csv' --farm slurm --farm-options '%s'")
@@ -191,7 +191,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
     assert.equal(0, shell("bash -n printed.sh").status)
   end)
 
-  it("finds what is wrong before it submits", function()
+  it("reports mistakes before it submits", function()
     for arguments, text in pairs {
       ["coupled.lua -o 'c/a.####.csv' --farm slurm --parts 2"] = 'node "contact1"',
       ["drops.lua -o 'c/a.####.png' --farm slurm --parts 2"] = "files of parts can't be merged",
@@ -213,7 +213,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
     assert.is_nil(folder:read "c/FARM.json")
   end)
 
-  it("says what is missing where there is no Slurm", function()
+  it("names the missing program if there is no Slurm", function()
     local result = command.rapid("run drops.lua -o 'd/a.####.csv' --farm slurm",
                                  { cwd = folder.path, environment = { PATH = "/nowhere" } })
     assert.equal(2, result.status)
@@ -223,7 +223,7 @@ return rapid.create { seed = 5 } :emit { source = rapid.shape.sphere {}, rate = 
 end)
 
 describe("rapid farm", function()
-  it("cancels what is queued, tells that it is lost, and retries it", function()
+  it("cancels queued tasks, reports them as lost, and retries them", function()
     done "run drops.lua -f 1-4 -o 'held/a.####.csv' --farm slurm --parts 3 --farm-options --hold"
     assert.equal("waiting waiting waiting waiting", states(json.decode(done "farm status --json held/FARM.json").tasks))
     local again = rapid "run drops.lua -f 1-4 -o 'held/b.####.csv' --farm slurm"
@@ -254,7 +254,7 @@ describe("rapid farm", function()
 end)
 
 describe("rapid wedge --farm slurm", function()
-  it("runs each row as a task, and tells of all in the end", function()
+  it("runs each row as a task, and summarises all at the end", function()
     done "wedge drops.lua --vary rate=500,1000,2000 -f 1-6 -o 'w/{rate}.####.csv' --farm slurm"
     assert.equal("done done done done", states(settled "w/FARM.json"))
     local report = json.decode((folder:read "w/wedge.json"))

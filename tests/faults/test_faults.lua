@@ -130,7 +130,7 @@ local function requests_of_a_state(text)
 end
 
 describe("a fault of the system", function()
-  it("is an error, or harmless: files are whole, and the status tells", function()
+  it("is an error with its status, or harmless: files are whole", function()
     local list = {}
     for i = 1, faults do
       local kind = kinds[1 + i % #kinds]

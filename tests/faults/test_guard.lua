@@ -18,7 +18,7 @@ local function run(text)
 end
 
 describe("guarded memory", function()
-  it("holds what is written to it, and moves", function()
+  it("keeps its contents, also when it is reallocated", function()
     local result = run [[
 for bytes = 0, 5000, 7 do
   local p = block(bytes)

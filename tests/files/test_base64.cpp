@@ -29,7 +29,7 @@ TEST_CASE("the vectors of RFC 4648 are read", "[base64]")
     CHECK(length == 8);
 }
 
-TEST_CASE("what is not valid base64 is an error", "[base64]")
+TEST_CASE("invalid base64 is an error", "[base64]")
 {
     std::size_t length = 0;
     CHECK(test::error_of([&] { from_base64("Zm9v", 4, length); }) == "the array ends early");

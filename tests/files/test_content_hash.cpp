@@ -16,13 +16,13 @@ TEST_CASE("a file has the hash of its bytes", "[hash]")
     CHECK(file_hash(folder / "file") != content_hash(bytes));
 }
 
-TEST_CASE("the hash of a text is XXH3's, with 16 digits", "[hash]")
+TEST_CASE("the hash of a string is XXH3's, with 16 digits", "[hash]")
 {
     CHECK(hash_text(content_hash("")) == "2d06800538d394c2");  // from the reference implementation
     CHECK(hash_text(7) == "0000000000000007");
 }
 
-TEST_CASE("what is no file has no hash", "[hash]")
+TEST_CASE("a path that is not a file has no hash", "[hash]")
 {
     const test::TemporaryFolder folder;
     CHECK_THROWS_AS(file_hash(folder / "nothing"), Error);

@@ -92,7 +92,7 @@ TEST_CASE("a record that can't be written leaves those before and after it", "[a
     CHECK(records.damaged == 0);
 }
 
-TEST_CASE("a log goes on at the place of an earlier record, and keeps what is after it until then", "[archive]")
+TEST_CASE("a log continues after an earlier record, and keeps later records until then", "[archive]")
 {
     const test::TemporaryFolder folder;
     {

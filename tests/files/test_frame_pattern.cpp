@@ -73,7 +73,7 @@ TEST_CASE("the existing files of a sequence are those that the pattern would wri
     CHECK(FramePattern((folder / "b.0003.vdb").string()).existing().size() == 1);
 }
 
-TEST_CASE("the attributes behind an output's file name are told from colons in the name", "[files][pattern]")
+TEST_CASE("the attributes after an output's file name are distinguished from colons in the name", "[files][pattern]")
 {
     const OutputTarget plain = parse_output_target("out/a.####.vdb");
     CHECK(plain.pattern == "out/a.####.vdb");
@@ -87,7 +87,7 @@ TEST_CASE("the attributes behind an output's file name are told from colons in t
     CHECK(parse_output_target("a.vdb:").attributes->empty());
 }
 
-TEST_CASE("a part has its name in place of {part}, or before the frame's number", "[files][pattern]")
+TEST_CASE("the number of a part replaces {part}, or stands before the frame's number", "[files][pattern]")
 {
     const auto part = [](const char* pattern) { return with_part(pattern, "03of16"); };
     CHECK(part("out/a.####.vdb") == "out/a_part03of16.####.vdb");
@@ -100,7 +100,7 @@ TEST_CASE("a part has its name in place of {part}, or before the frame's number"
     CHECK(part("{part}/{output}.{part}.####.vdb") == "03of16/{output}.03of16.####.vdb");
 }
 
-TEST_CASE("a sequence has a name of its own, without the number and what parts it off", "[files][pattern]")
+TEST_CASE("a sequence has a name without the number and its separator", "[files][pattern]")
 {
     CHECK(FramePattern("out/a.####.vdb").without_frame() == "out/a.vdb");
     CHECK(FramePattern("out/{output}_$F.vdb").without_frame("left") == "out/left.vdb");

@@ -55,7 +55,7 @@ TEST_CASE("a file that gzip compressed is read as it was before", "[files]")
     CHECK(without_gz("x.gz/a.bgeo") == "x.gz/a.bgeo");
 }
 
-TEST_CASE("a folder, a device and a pipe that nobody writes to are no files", "[files]")
+TEST_CASE("a folder, a device and a pipe without a writer are refused as files", "[files]")
 {
     const TemporaryFolder folder;
     REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);

@@ -103,7 +103,7 @@ TEST_CASE("a file has its name only when it is complete, and replaces the old on
     CHECK(file_names(folder.path()) == std::vector<std::string>{"a.ply", "new"});
 }
 
-TEST_CASE("a link of the file's name is replaced, and what it names stays as it is", "[files]")
+TEST_CASE("a link with the file's name is replaced, and its target stays unchanged", "[files]")
 {
     const Unfinished unfinished = GENERATE(Unfinished::Unnamed, Unfinished::Hidden);
     const TemporaryFolder folder;
@@ -233,7 +233,7 @@ TEST_CASE("a full disk and a limit of a file's size are errors, and nothing stay
     CHECK(file_names(folder.path()).empty());
 }
 
-TEST_CASE("what a file can't be made of is an error: a folder, a device, a folder that vanished", "[files]")
+TEST_CASE("an impossible path is an error: a folder, a device, a vanished folder", "[files]")
 {
     const Unfinished unfinished = GENERATE(Unfinished::Unnamed, Unfinished::Hidden);
     const TemporaryFolder folder;
@@ -246,8 +246,7 @@ TEST_CASE("what a file can't be made of is an error: a folder, a device, a folde
 }
 
 // A process reads its own files without a sandbox (read_sandboxed.h).
-TEST_CASE("a file that another has changed in place is not its writer's, with all the times that can be set as before",
-          "[files]")
+TEST_CASE("a file that another program changed in place is detected, even with unchanged times", "[files]")
 {
     const TemporaryFolder folder;
     const std::filesystem::path path = folder / "a.vdb";

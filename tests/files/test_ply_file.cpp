@@ -64,7 +64,7 @@ TEST_CASE("a PLY that ends with a number is known to be maybe cut, and its heade
     CHECK(error_in(old).empty());
 }
 
-TEST_CASE("what a PLY promises is checked before memory is taken", "[files][ply]")
+TEST_CASE("the sizes in a PLY header are checked before memory is allocated", "[files][ply]")
 {
     const auto promising = [](const std::string& format, const std::string& count) {
         return "ply\nformat " + format + " 1.0\nelement vertex " + count + "\n" + three_numbers + "end_header\n";

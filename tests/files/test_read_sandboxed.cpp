@@ -50,7 +50,7 @@ std::string error_in(const std::function<Numbers()>& reader)
 
 }  // namespace
 
-TEST_CASE("what is read in another process comes back, and nothing else of it does", "[files]")
+TEST_CASE("only the contents that another process has read are returned", "[files]")
 {
     const TemporaryFolder folder;
     std::ofstream(folder / "file") << "bytes";
@@ -90,7 +90,7 @@ TEST_CASE("the end of a reader is an error of its file", "[files]")
           "can't be read: it needs more than 1024 MB of memory, so it must be damaged");
 }
 
-TEST_CASE("a reader takes no more than half of what the budget leaves, and may take 64 MiB", "[files]")
+TEST_CASE("a reader takes at most half of the remaining budget, but may always take 64 MiB", "[files]")
 {
     constexpr std::size_t mebibyte = std::size_t{1} << 20;
     const auto refusal_of = [](std::size_t bytes) {
@@ -110,7 +110,7 @@ TEST_CASE("a reader takes no more than half of what the budget leaves, and may t
                Catch::StartsWith("can't be read: the reader needs more than the available 2"));
 }
 
-TEST_CASE("a reader that takes too long is told from others that end by a signal", "[files]")
+TEST_CASE("a reader that takes too long is distinguished from others that end by a signal", "[files]")
 {
     const TemporaryFolder folder;
     std::ofstream(folder / "file") << "bytes";

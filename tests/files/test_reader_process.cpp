@@ -71,7 +71,7 @@ TEST_CASE("a reader process forks the copies that read, and outlives them", "[fi
     });
 }
 
-TEST_CASE("a reader process keeps to the budget of the process that it serves", "[files]")
+TEST_CASE("a reader process obeys the memory budget of its parent process", "[files]")
 {
     in_process([](const std::filesystem::path& file) {
         start_reader_process([] {});
@@ -84,7 +84,7 @@ TEST_CASE("a reader process keeps to the budget of the process that it serves", 
     });
 }
 
-TEST_CASE("the end of a reader process is an error of what is read next", "[files]")
+TEST_CASE("the end of a reader process is an error of the next read", "[files]")
 {
     in_process([](const std::filesystem::path& file) {
         std::signal(SIGPIPE, SIG_IGN);

@@ -20,7 +20,7 @@ int status_of(const std::string& script, const std::vector<std::pair<int, int>>&
 
 }  // namespace
 
-TEST_CASE("a program that is started has the descriptors that it is given, and its status is told", "[files]")
+TEST_CASE("a started program has the given descriptors, and its status is returned", "[files]")
 {
     const Descriptor file(memfd_create("told", MFD_CLOEXEC));
     REQUIRE(file);

@@ -61,7 +61,7 @@ describe("an attribute that a node gives behind a merge", function()
     end
   end)
 
-  it("does not replace what a node of their own chain has asked for", function()
+  it("does not replace the value that a node of their own chain sets", function()
     local points = scene.run("return " .. create .. ":merge(rapid.create { points = two } " ..
       ':points("read", function(p) p.v = vec3(p.mass, 0, 0) end)) :attribute { mass = 7 } :gravity {} :solve {}')[2]
     assert.equal(7, points[1].mass)

@@ -34,7 +34,7 @@ TEST_CASE("what solve posts is what create yields in the next frame", "[evaluate
     CHECK(starts == std::map<std::string, int>{{"post1", 1}});
 }
 
-TEST_CASE("with sub-frames the nodes of the loop are evaluated so many times a frame, those behind solve once",
+TEST_CASE("with subframes the nodes of the loop are evaluated once per subframe, those after solve once per frame",
           "[evaluate]")
 {
     GraphUnderTest scene;
@@ -53,7 +53,7 @@ TEST_CASE("with sub-frames the nodes of the loop are evaluated so many times a f
     CHECK(evaluations == std::map<std::string, int>{{"source1", 9}, {"inside", 8}, {"post1", 8}, {"after", 3}});
 }
 
-TEST_CASE("a frame's steps are told by their place in it, the last by the frame's own number and time", "[evaluate]")
+TEST_CASE("a frame's steps are identified by their index, the last by the frame's own number and time", "[evaluate]")
 {
     const FrameClock clock{25, 5, 3};
     CHECK(clock.at_step(5).number == 5);
@@ -112,7 +112,7 @@ TEST_CASE("a node with two readers is evaluated once a frame, and neither sees w
     CHECK(evaluations["shared"] == 1);
 }
 
-TEST_CASE("functions are asked at each frame, with its number, time and length", "[evaluate]")
+TEST_CASE("functions are called in each frame with its number, time and length", "[evaluate]")
 {
     std::vector<Frame> requested;
     GraphUnderTest scene;
@@ -133,7 +133,7 @@ TEST_CASE("functions are asked at each frame, with its number, time and length",
     CHECK(requested.size() == 3);
 }
 
-TEST_CASE("an error of a node, or of its function, comes with node, place and frame", "[evaluate]")
+TEST_CASE("an error of a node or its function names the node, the line and the frame", "[evaluate]")
 {
     GraphUnderTest scene;
     const NodePtr source = scene.node("source");
@@ -202,7 +202,7 @@ TEST_CASE("a simulation that starts later waits at its first frame", "[evaluate]
     }
 }
 
-TEST_CASE("what a node writes goes to the hook, at its simulation's frame", "[evaluate]")
+TEST_CASE("files of a node go to the hook, with the frame of its simulation", "[evaluate]")
 {
     GraphUnderTest scene;
     const NodePtr source = scene.node("source", {}, {{"fps", Value(5.0)}});

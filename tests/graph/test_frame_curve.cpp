@@ -117,7 +117,7 @@ TEST_CASE("a function is called at whole frames alone, one ahead, and at each on
     CHECK(function.calls.rbegin()->first == 21);
 }
 
-TEST_CASE("what a function does not give ahead, or as numbers, is not needed", "[frame_curve]")
+TEST_CASE("a function that fails for later frames, or returns no numbers, is still evaluated", "[frame_curve]")
 {
     const Param param = number();
     const auto value = [&](const std::function<Value(double)>& f, std::int64_t frame, double part) {

@@ -77,7 +77,7 @@ TEST_CASE("a number is taken when it is in range, its ends included unless they 
     CHECK(refusal<double>(0.0, param<double>(above(0))) == "x = 0 is out of range; it must be above 0");
 }
 
-TEST_CASE("a number in range is kept to the bit", "[param]")
+TEST_CASE("a number in range is stored unchanged", "[param]")
 {
     using Limits = std::numeric_limits<double>;
     const double number = GENERATE(0.0, 1.0 / 3, -1e-300, Limits::denorm_min(), Limits::max(), Limits::lowest());
@@ -123,7 +123,7 @@ TEST_CASE("a value of another type is refused, and shown", "[param]")
     CHECK(refusal<PerPoint<float>>("b") == "x = \"b\" has the wrong type; it must be a number, or rapid.attr \"name\"");
 }
 
-TEST_CASE("one of several words is asked for by the nearest, or by all", "[param]")
+TEST_CASE("a wrong choice gets the nearest word as a suggestion, or all words", "[param]")
 {
     const Param p = param<std::string>(any_number(), {"begin", "end", "even"});
     CHECK(read<std::string>("even", p) == "even");
@@ -163,7 +163,7 @@ TEST_CASE("an object is of the wanted type, or refused by its kind", "[param]")
     CHECK(refusal<ObjectPtr>(1.0) == "x = 1 has the wrong type; it must be an object");
 }
 
-TEST_CASE("what may be left out is there only when it is given", "[param]")
+TEST_CASE("an optional parameter has a value only if it is given", "[param]")
 {
     CHECK_FALSE(read<std::optional<double>>(Value()).has_value());
     CHECK(read<std::optional<double>>(0.0) == 0.0);

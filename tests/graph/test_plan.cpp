@@ -68,7 +68,7 @@ std::string error_of_plan(const Graph& graph)
 
 }  // namespace
 
-TEST_CASE("nodes that no output comes from are left out of the plan", "[plan]")
+TEST_CASE("nodes that lead to no output are pruned", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr source = scene.node("source");
@@ -87,7 +87,7 @@ TEST_CASE("nodes that no output comes from are left out of the plan", "[plan]")
     CHECK_THAT(plan.warnings[1], Catch::Contains("node \"behind\": leads to no output"));
 }
 
-TEST_CASE("wrong arguments of a node that is left out are no error", "[plan]")
+TEST_CASE("wrong arguments of a pruned node are no error", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr source = scene.node("source");
@@ -95,7 +95,7 @@ TEST_CASE("wrong arguments of a node that is left out are no error", "[plan]")
     CHECK_NOTHROW(Plan(scene.returning(source), {}));
 }
 
-TEST_CASE("a write that is left out is warned of", "[plan]")
+TEST_CASE("a pruned write causes a warning", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr source = scene.node("source");
@@ -123,7 +123,7 @@ TEST_CASE("each node comes once, after its inputs, and knows how many take its r
     CHECK(plan.outputs == std::map<std::string, std::size_t>{{"early", 1}, {"main", 3}});
 }
 
-TEST_CASE("what changes from frame to frame, or comes from what does, is not evaluated once", "[plan]")
+TEST_CASE("nodes that change from frame to frame, and nodes after them, are evaluated in each frame", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr still = scene.node("source", {}, {}, "still");
@@ -192,7 +192,7 @@ TEST_CASE("a second solve after one create is an error that names both", "[plan]
           "create can have only one");
 }
 
-TEST_CASE("two simulations have a solve each, and a solve behind both is one too many", "[plan]")
+TEST_CASE("each of two simulations has a solve, and a solve after both is an error", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr one = scene.node("post", {scene.node("source")});
@@ -220,7 +220,7 @@ TEST_CASE("columns that a node of the loop makes exist from the first frame on, 
     CHECK(plan.groups_of(0) == std::vector<std::string>{"hot"});
 }
 
-TEST_CASE("what a node can't be planned with names the node and its place", "[plan]")
+TEST_CASE("an error of planning names the node and its line", "[plan]")
 {
     struct Case {
         std::string type;
@@ -279,7 +279,7 @@ TEST_CASE("a scene that needs nothing has P, v and id", "[plan]")
     CHECK(plan.columns_of(0).empty());
 }
 
-TEST_CASE("an attribute that nobody reads is kept exactly where an output requests it", "[plan]")
+TEST_CASE("an attribute that nothing reads is kept exactly if an output requests it", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
@@ -318,7 +318,7 @@ TEST_CASE("a reader that no output comes from keeps nothing alive", "[plan]")
     CHECK(kept(Plan(scene.returning(made), requesting({}))) == NameSet{"P", "id", "v"});
 }
 
-TEST_CASE("what points are assigned one by one keeps its place", "[plan]")
+TEST_CASE("an attribute that is assigned point by point is kept", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"heat", Value(2.0)}});
@@ -357,7 +357,7 @@ TEST_CASE("life and age are there exactly where a life may end, and birth times 
     CHECK(planned_with(forever, true, {"birthtime"}) == NameSet{"P", "birthtime", "id", "v"});
 }
 
-TEST_CASE("a group that nobody asks for is left out, unless points join it one by one", "[plan]")
+TEST_CASE("a group that nothing reads is pruned, unless points join it one by one", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr made = scene.node("make", {scene.node("source")}, {{"member", Value("hot")}});
@@ -377,7 +377,7 @@ TEST_CASE("a group that nobody asks for is left out, unless points join it one b
     CHECK(attribute(without, "group:old").bytes_per_point() == 1);
 }
 
-TEST_CASE("a reader behind a merge keeps the attribute in both simulations, and no other one does", "[plan]")
+TEST_CASE("a reader after a merge keeps the attribute in both simulations, and in no others", "[plan]")
 {
     GraphUnderTest scene;
     const NodePtr here = scene.node("source", {}, {}, "here"), there = scene.node("source", {}, {}, "there");

@@ -139,7 +139,7 @@ TEST_CASE("a point that an edit removes is gone for those that follow, and in th
     CHECK(scene.figures.died == 20500 - 6833);
 }
 
-TEST_CASE("an edit is told whether others come before it, and whether they remove points", "[point_edit]")
+TEST_CASE("an edit knows whether others come before it, and whether they remove points", "[point_edit]")
 {
     Together scene;
     const Visit nothing = [](PointSet&, std::size_t) { return false; };

@@ -66,7 +66,7 @@ TEST_CASE("a node with a group has the parameter, and reads the group that it is
     CHECK(uses.reads_groups == std::vector<std::string>{"hot"});
 }
 
-TEST_CASE("a type that a file adds is found, and keeps its place while others are added", "[registry]")
+TEST_CASE("a type that a file adds is found, and keeps its address while others are added", "[registry]")
 {
     Registry registry;
     NodeType mine;

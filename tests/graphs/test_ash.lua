@@ -18,7 +18,7 @@ local v_before, v_after = file(rapid.grid.read, 49, "v"), file(rapid.grid.read, 
 return rapid.create { fps = 24, seed = 3, start = 49 } %s]]):format(folder, chain), { frames = {frame, frame} })[frame]
   end
 
-  it("bears flakes where there is smoke at the moment, in one file or the other", function()
+  it("emits flakes from the current smoke of either file", function()
     -- In frame 53, a quarter of the way, the density is 3/4 of the first file's plus 1/4 of the second's. The flakes
     -- are divided in proportion to the totals, and parts without common smoke share no flakes.
     local function drawn(source, number)

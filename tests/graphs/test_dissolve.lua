@@ -37,7 +37,7 @@ describe("graphs/dissolve.lua", function()
     assert.is_true(least < 0.15 and most > 0.85)
   end)
 
-  it("loses what has been loose for two seconds", function()
+  it("removes points that have been loose for two seconds", function()
     assert.is_true(#result[60] < #start)
     for i = 1, #result[60] do
       local p = result[60][i]

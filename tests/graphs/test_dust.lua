@@ -9,7 +9,7 @@ return { main = born, pieces = pieces }]])
   local result = rapid.run(scene.folder:write("dust.lua", text), { frames = {1, 30} })
   local pieces = result:output "pieces"
 
-  it("bears dust on the paths of the pieces, between their places in two frames", function()
+  it("emits dust on the paths of the pieces, between their positions in two frames", function()
     local points, checked = result[30], 0
     for i = 1, #points, 7 do
       local p = points[i]

@@ -22,7 +22,7 @@ describe("graphs/first.lua", function()
     end
   end)
 
-  it("bears floor(rate time) beads, and turns them by its wind", function()
+  it("emits floor(rate time) beads, and turns them by its wind", function()
     for _, frame in ipairs { 2, 13, 48 } do
       assert.equal(math.floor(2000 * (frame - 1) / 24), #result[frame])
     end
@@ -32,7 +32,7 @@ describe("graphs/first.lua", function()
     assert.is_true(spin / #points > 0.05)
   end)
 
-  it("is the same to the bit on one thread and on seven", function()
+  it("is bit-identical on one thread and on seven", function()
     for _, threads in ipairs { 1, 7 } do
       local again = rapid.run("graphs/first.lua", { frames = {30, 30}, set = { rate = 200000 }, threads = threads })
       local other = rapid.run("graphs/first.lua", { frames = {30, 30}, set = { rate = 200000 }, threads = 2 })

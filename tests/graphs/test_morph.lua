@@ -16,7 +16,7 @@ describe("graphs/morph.lua", function()
     for i = 1, #points do assert.near(0.7, (points[i].P - vec3(0, 1.08, 0)):length(), 1e-6) end
   end)
 
-  it("has each point at rest, at a place of its own on the knot, at 3.5 s", function()
+  it("has each point at rest at its own position on the knot at 3.5 s", function()
     local points, taken = result[85], {}
     assert.equal(3000, #points)
     for i = 1, #points do

@@ -2,7 +2,7 @@
 describe("graphs/ribbons.lua", function()
   local result = rapid.run("graphs/ribbons.lua", { frames = {1, 48} })
 
-  it("has the places of the frames before in its trails, in their order", function()
+  it("stores the positions of earlier frames in its trails, in order", function()
     for i = 1, #result[48] do
       local p = result[48][i]
       assert.equal(36, p.trailnum)

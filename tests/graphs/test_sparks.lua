@@ -17,7 +17,7 @@ describe("graphs/sparks.lua", function()
     end
   end)
 
-  it("bears them evenly: ages are a comb of 1 / rate", function()
+  it("emits them evenly: ages are multiples of 1 / rate", function()
     local points = result[8] -- before the first one dies
     assert.equal(math.floor(1200 * 7 / 24), #points)
     for i = 2, #points do assert.near(1 / 1200, points[i - 1].age - points[i].age, 1e-6) end

@@ -34,7 +34,7 @@ return born]])
     for _, sum in pairs(volume) do assert.near(0.022 ^ 3, sum, 1e-10) end
   end)
 
-  it("bears within the frame: births are at all moments between frames", function()
+  it("emits within the frame: births occur at all moments between frames", function()
     local parts, count = {}, 0
     for i = 1, #points, 24 do
       local part = math.floor(points[i].birthtime * 24 % 1 * 8) + 1

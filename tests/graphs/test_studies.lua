@@ -113,7 +113,7 @@ describe("the study", function()
     assert.near(1, lines["of v"].order, 0.1)
   end)
 
-  it("impacts is of second order under forces of the place, of first under forces of the velocity", function()
+  it("impacts is of second order under forces of the position, of first under forces of the velocity", function()
     local lines = lines_of "impacts"
     assert.near(2, lines.turbulence.order, 0.1)
     assert.near(1, lines.drag.order, 0.1)

@@ -191,7 +191,7 @@ end) :solve {}]], { frames = {1, 2} })
     end
   end)
 
-  it("that can be known before is told before the first frame", function()
+  it("that can be found early is reported before the first frame", function()
     assert.match('scene.lua:%d: node "push": .*no attribute "heat"', message "p.heat = 1")
     assert.match('scene.lua:2: node "push": the kernel assigns p.id, which is read%-only', message "p.id = 3")
     assert.match('scene.lua:2: node "push": the kernel assigns the global "n"; kernels run in parallel',

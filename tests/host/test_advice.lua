@@ -21,7 +21,7 @@ local function warnings(text)
 end
 
 describe("a message", function()
-  it("makes an attribute with the type by which others know it", function()
+  it("suggests known attributes with their known types", function()
     expect('no attribute "Cd"; add :attribute{ Cd = {1, 1, 1} } before it', kernel_fault "p.Cd = vec3(1, 0, 0)")
     expect("add :attribute{ orient = {0, 0, 0, 1} } before it", kernel_fault "p.orient = quat(0, 0, 0, 1)")
     expect("add :attribute{ Alpha = 1 } before it", kernel_fault "p.Alpha = 1")
@@ -29,7 +29,7 @@ describe("a message", function()
     expect("add :attribute{ Cd = {1, 1, 1} } before it", kernel_fault 'local name = "C" .. "d" p[name] = vec3(1, 0, 0)')
   end)
 
-  it("makes an attribute with the type of what is assigned, or asked for", function()
+  it("suggests an attribute of the type that is assigned or needed", function()
     expect('no attribute "flow"; add :attribute{ flow = {0, 0, 0} } before it', kernel_fault "p.flow = vec3(1, 0, 0)")
     expect("add :attribute{ turn = {0, 0, 0, 1} } before it",
       kernel_fault "local q = quat(0, 0, 0, 1) if p.id > 3 then q = quat(1, 0, 0, 0) end p.turn = quat(0, 1, 0, 0)")
@@ -50,14 +50,14 @@ describe("a message", function()
     end
   end)
 
-  it("knows what points have by another name", function()
+  it("suggests the attribute that has another name elsewhere", function()
     expect('no attribute "colour"; the colour of points is Cd: add :attribute{ Cd = {1, 1, 1} } before it',
       kernel_fault "p.colour = vec3(1, 0, 0)")
     expect('no attribute "position"; the position of points is P', kernel_fault "p.v = p.position")
     expect('no attribute "radius"; the radius of points is pscale', kernel_fault "p.v = p.v * p.radius")
   end)
 
-  it("says who sees the neighbours of a point", function()
+  it("names the function that sees the neighbours of a point", function()
     expect('p has no method "neighbours", because a kernel sees only one point; use '
       .. "points:neighbours(i, radius)", kernel_fault "for _, k in ipairs(p:neighbours(1)) do p.v = p.v * k end")
   end)
@@ -84,7 +84,7 @@ describe("a message", function()
       "return rapid.create { points = POINTS } :collide { shape = rapid.mesh.box { size = {10, 1, 1} } } :solve {}"))
   end)
 
-  it("names frame.time where the frame stands for a number", function()
+  it("suggests frame.time if the frame is used as a number", function()
     local number = "the frame is not a number; use one of its fields, such as frame.time"
     local emit = "return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = function(frame) %s end } "
       .. ":solve {}"
@@ -109,7 +109,7 @@ describe("a message", function()
       :action("k", function(p, step) p.v = vec3(0, step, 0) end) :solve {}]])
   end)
 
-  it("says what there is in place of chance, files and clocks", function()
+  it("suggests replacements for random numbers, files and clocks", function()
     expect("use p:rand(k), which is the same in every run", fault "math.random() return rapid.create {} :solve {}")
     expect("p:rand(k)", kernel_fault "p.v = vec3(math.random(), 0, 0)")
     expect("a script can't open files; rapid.points.read", fault "io.open 'a' return rapid.create {} :solve {}")
@@ -303,7 +303,7 @@ describe("a warning", function()
     for _, text in ipairs { reads, bears } do assert.equal("", warnings(text:format ", record = true")) end
   end)
 
-  it("tells where all points die as they are born", function()
+  it("names the collider or emitter if all points die at birth", function()
     local scene_text = [[return rapid.create {}
   :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 2000, attributes = { pscale = 0.1 } }
   :collide { shape = rapid.shape.sphere { radius = %s }, response = "die" } :solve {}]]
@@ -317,7 +317,7 @@ describe("a warning", function()
     assert.equal("", warnings(short:format(0.03)))
   end)
 
-  it("tells of a voxel that is as large as half of the mesh", function()
+  it("reports a voxel that is as large as half of the mesh", function()
     local text = "rapid.levelset.from_mesh(rapid.mesh.box { size = {0.2, 0.2, 0.2} }, { voxel = %g }) "
       .. "return rapid.create { points = POINTS } :solve {}"
     local function reported(voxel)

@@ -78,7 +78,7 @@ describe("rapid.mesh", function()
     end
   end)
 
-  it(".read reads a file beside the graph", function()
+  it(".read reads a file next to the graph", function()
     scene.folder:write("roof.obj", "v 0 1 0\nv 2 1 0\nv 2 1 2\nv 0 1 2\nf 1 4 3 2\n")
     local points = born "rapid.mesh.read 'roof.obj'"
     each(points, function(P) assert.equal(1, P.y) end)
@@ -111,13 +111,13 @@ describe("rapid.levelset", function()
     assert.truthy(height("rapid.levelset.torus { radius = 2, tube = 0.5, voxel = 0.05 }", 0, 0) < -5)
   end)
 
-  it("bears points on its surface", function()
+  it("emits points on its surface", function()
     each(born "rapid.levelset.sphere { radius = 1, voxel = 0.05 }", function(P)
       assert.near(1, P:length(), 0.01)
     end)
   end)
 
-  it("bears points in its volume", function()
+  it("emits points in its volume", function()
     local points = born("rapid.levelset.box { size = {2, 2, 2}, voxel = 0.05 }", "from = 'volume'")
     assert.near({0, 0, 0}, points:mean "P", 5 * math.sqrt(3 * 4 / 12 / 2000))
     assert.near({1, 1, 1}, points:max "P", 0.05)
@@ -150,7 +150,7 @@ describe("rapid.shape", function()
     end
   end)
 
-  it("bears points on it, evenly by area, and in it, evenly by volume", function()
+  it("emits points on it, evenly by area, and in it, evenly by volume", function()
     -- Checks that the mean of f is within five standard errors of its exact mean; sigma is the standard deviation of f.
     local function mean_is(expected, sigma, points, f)
       local sum = 0
@@ -216,7 +216,7 @@ return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, vec3(4, 5, 6)
     assert.near({10.375, 0.125, 0}, points:max "P", 1e-6)
   end)
 
-  it(".read reads what a run has written", function()
+  it(".read reads the files of a run", function()
     local text = [[
 return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, {4, 5, 6}}, heat = {0.5, 7} } } :solve {}]]
     for _, format in ipairs { "vdb", "bgeo", "ply", "csv", "npz", "prt", "usda", "vtp" } do
@@ -229,7 +229,7 @@ return rapid.create { points = rapid.points.from { P = {{1, 2, 3}, {4, 5, 6}}, h
     end
   end)
 
-  it("bears points where the source's points are", function()
+  it("emits points at the source's points", function()
     local points = born("two", "from = 'points'")
     each(points, function(P) assert.truthy((P.x == 0 or P.x == 1) and P.y == 1 and P.z == 0) end)
   end)

@@ -74,7 +74,7 @@ void continue_after(const SavedState& state, const fs::path& scene)
 }  // namespace
 
 // Runs in a separate process: see below. RAPID_TEST_SNAPSHOT: the folder.
-TEST_CASE("goes on behind crafted snapshots", "[.]")
+TEST_CASE("continues after crafted snapshots", "[.]")
 {
     const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");
     const int file = ::open((folder / "report").c_str(), O_RDWR);
@@ -119,7 +119,7 @@ TEST_CASE("a snapshot that is made to do harm is refused, or the run goes on", "
         ::setenv("RAPID_TEST_END", std::to_string(amount("RAPID_CRAFTED", 100)).c_str(), 1);
         ::setenv("RAPID_TEST_STEP", std::to_string(step).c_str(), 1);
         const std::string program = fs::read_symlink("/proc/self/exe").string();
-        const int status = std::system(("'" + program + "' 'goes on behind crafted snapshots' >/dev/null").c_str());
+        const int status = std::system(("'" + program + "' 'continues after crafted snapshots' >/dev/null").c_str());
         std::ifstream(folder / "report", std::ios::binary).read(reinterpret_cast<char*>(&report), sizeof report);
         CAPTURE(name, report.next, report.gone_on, report.refused);
         CHECK(status == 0);

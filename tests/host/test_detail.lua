@@ -18,7 +18,7 @@ local function values(points, name)
 end
 
 describe("a detail function", function()
-  it("reads and writes the points by place", function()
+  it("reads and writes the points by index", function()
     local points = run([[
 for i = 1, #points do local p = points[i] p.heat = p.heat * 10 + p.index p.v = vec3(0, i, 0) end]])[2]
     assert.same({ 11, 22, 33, 44 }, values(points, "heat"))
@@ -300,7 +300,7 @@ return rapid.create { fps = 24, points = rapid.points.from {
     if d.births > 0 then p.b = vec3(d.born, d.new, 0) end
   end)]]
 
-  it("behind Solve are those of the frame: contacts, deaths and births, with their times", function()
+  it("after Solve are those of the frame: contacts, deaths and births, with their times", function()
     local result = scene.run(text("", keep), { frames = {2, 14} })
     local meets = math.sqrt(2 / 9.81)
     for frame, points in result:frames() do

@@ -120,7 +120,7 @@ return rapid.create { points = two } :points("k", function(p) p.v = vec3(#("x"):
 end
 
 describe("a way out", function()
-  it("by a name that does not exist is an error in every place, with file and line", function()
+  it("by a name that does not exist is an error everywhere, with file and line", function()
     local count = 0
     each(absent, function(name, code, expected)
       count = count + 1
@@ -135,7 +135,7 @@ describe("a way out", function()
     nothing_is_left()
   end)
 
-  it("by a name that exists is an error in every place, with file and line", function()
+  it("by a name that exists is an error everywhere, with file and line", function()
     local count = 0
     each(firm, function(name, code, expected)
       count = count + 1
@@ -171,7 +171,7 @@ describe("a way out", function()
     nothing_is_left()
   end)
 
-  it("fails in a module or a node beside the graph, too", function()
+  it("fails in a module or a node next to the graph, too", function()
     for _, attempts in ipairs { absent, firm } do
       each(attempts, function(name, code, expected)
         scene.folder:write("helper.lua", files.module:format(code:gsub("rapid", "require('rapid')"):gsub("two",

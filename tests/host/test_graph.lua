@@ -44,7 +44,7 @@ return { a = start, b = start:points("more", function(p) p.P = p.P + vec3(0, 10,
     assert.near({0, 12, 0}, result:output "b"[1][1].P, 0)
   end)
 
-  it("reads what a syntax error says, with its line", function()
+  it("reports a syntax error with its line", function()
     assert.equal("scene.lua:2: unexpected symbol near '}'", scene.error "local x = 1\nreturn rapid.create { fps = }")
     assert.equal("scene.lua:3: 'end' expected (to close 'function' at line 1) near '<eof>'",
       scene.error "local f = function()\n  return 1\n")
@@ -193,7 +193,7 @@ return rapid.create { points = two } :collide { shape = shape, bounce = rapid.at
 end)
 
 describe("a parameter that is a function of the frame", function()
-  it("is asked at each frame, at its time, and joined between them", function()
+  it("is called in each frame, at its time, and interpolated between frames", function()
     local result = scene.run([[
 return rapid.create { points = two, fps = 10 }
   :gravity { g = function(frame) return vec3(frame.number, frame.time, frame.dt) end } :solve {}]], { frames = {1, 4} })
@@ -210,7 +210,7 @@ return rapid.create {} :emit { source = two, count = function(frame) return fram
     assert.equal(9, #result[4])
   end)
 
-  it("is told from a constant by node, file, line and frame when it fails", function()
+  it("is reported with node, file, line and frame when it fails", function()
     for body, expected in pairs {
       ["return nil"] = 'scene.lua:1: node "emit1": count is nil; it must be an integer',
       ["return 'many'"] =
@@ -232,7 +232,7 @@ return rapid.create {} :emit(source) :solve {}]]):format(body))
     end
   end)
 
-  it("is asked before the first frame, as rapid check does", function()
+  it("is called before the first frame, as by rapid check", function()
     local result = scene.command("check",
       "return rapid.create {} :emit { source = two, count = function() return -1 end }")
     assert.equal('scene.lua:1: node "emit1": count = -1 is out of range; it must be at least 0 (frame 1)\n',
@@ -242,7 +242,7 @@ return rapid.create {} :emit(source) :solve {}]]):format(body))
 end)
 
 describe("at the frame start", function()
-  it("Create alone yields points; what stands behind Solve runs", function()
+  it("Create alone yields points, and nodes after Solve run", function()
     local result = scene.run [[
 return rapid.create { points = two } :points("before", function(p) p.v = vec3(0, 24, 0) end) :solve {}
   :points("after", function(p) p.P = p.P + vec3(100, 0, 0) end)]]
@@ -289,7 +289,7 @@ return rapid.create { start = 11 } :attribute { at = -1 }
 end)
 
 describe("Solve", function()
-  it("feeds its points back to Create; what stands behind it is not fed back", function()
+  it("feeds its points back to Create, without the changes of later nodes", function()
     local result = scene.run [[
 return rapid.create { points = two } :attribute { heat = 0 }
   :points("in", function(p) p.heat = p.heat + 1 end) :solve {}
@@ -305,7 +305,7 @@ return rapid.create { points = two } :points("k", function(p, frame) p.P = p.P +
     assert.near({3, 1, 0}, result[3][1].P, 0)
   end)
 
-  it("stands in a chain once", function()
+  it("may be used once per chain", function()
     assert.equal('scene.lua:2: node "solve2": a second solve after "create1": "solve1" at line 1 is already its ' ..
       "solve; a create can have only one",
       scene.error "local once = rapid.create { points = two } :solve {}\nreturn once:solve {}")

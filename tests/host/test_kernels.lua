@@ -60,7 +60,7 @@ local q = p q.heat = q.heat + 1
     assert.same({ 1111, 1112 }, values(points, "heat"))
   end)
 
-  it("works through closures of its own", function()
+  it("may call its own closures", function()
     local points = scene.kernel([[
 local sum = 0
   local function add(x) sum = sum + x end
@@ -92,7 +92,7 @@ return rapid.create { points = two } :attribute { heat = 0 }
     assert.same({ 0, 2 }, values(result[3], "heat"))
   end)
 
-  it("runs on nobody where nobody is in its group, and on everybody where all are", function()
+  it("runs on no point if its group is empty, and on all if all points are in it", function()
     for where, expected in pairs { ["p.id > 9"] = { 0, 0 }, ["p.id >= 0"] = { 1, 1 } } do
       local result = scene.run(([[
 return rapid.create { points = two } :attribute { heat = 0 } :group { name = "g", where = function(p) return %s end }
@@ -130,7 +130,7 @@ return rapid.create { fps = 10 } :emit { source = rapid.points.from { P = {{0, 0
 end)
 
 describe("p:join, p:leave and p:within", function()
-  it("change and tell the groups of a point, which stay with it", function()
+  it("change and return the groups of a point, which stay with it", function()
     local result = scene.run([[
 return rapid.create { points = two } :attribute { seen = 0 }
   :points("k", function(p, frame)
@@ -157,7 +157,7 @@ return rapid.create { points = two } :attribute { seen = 0 }
     assert.same({ 1 }, values(points:group "hot", "id"))
   end)
 
-  it("ask of a group that nothing has made: nobody is in it", function()
+  it("return false for a group that nothing has made", function()
     local points = scene.kernel("if p:within 'nowhere' then p.v = vec3(1, 0, 0) end")
     assert.near({0, 0, 0}, points[1].v, 0)
   end)

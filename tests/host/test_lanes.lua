@@ -224,7 +224,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     assert.equal(2, frames[4][1].heat)
   end)
 
-  it("is none that writes a text, or another type", function()
+  it("is rejected if it writes a string or another type", function()
     for body, message in pairs { ["p.name = 3"] = "takes a string, not 3", ["p.name = \"b\""] = false } do
       local text = head:gsub("heat = 0.5", "heat = 0.5, attributes = { name = \"a\" }")
         .. ("  :points(\"k\", function(p)\n%s\nend) :solve {}"):format(body)
@@ -237,7 +237,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     end
   end)
 
-  it("is none where its calls would be followed without end", function()
+  it("is rejected if its calls never end", function()
     local chain = { "local function f0(x) return x end" }
     for k = 1, 25 do chain[k + 1] = ("local function f%d(x) return f%d(f%d(x)) end"):format(k, k - 1, k - 1) end
     local text = table.concat(chain, "\n") .. "\n" .. head
@@ -288,7 +288,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
     end)
   end
 
-  it("tells why it is none", function()
+  it("reports the reason if it is rejected", function()
     for body, reason in pairs {
       ["for k = 1, frame.number do p.heat = p.heat + k end"] = "it has a loop whose steps are not known",
       ["local t = { p.heat } p.heat = t[1]"] = "it makes a table",
@@ -303,7 +303,7 @@ return rapid.node { name = "grow", doc = "larger, or smaller",
 end)
 
 describe("math.sin", function()
-  it("takes a text that is a number, as Lua's own does, and refuses what is none", function()
+  it("takes a string that is a number, as Lua's own does, and refuses others", function()
     local result = scene.run([[return rapid.create { points = two } :points("k", function(p)
       p.v = vec3(math.sin "0.5", math.cos(0.5), math.exp(0.5)) end) :solve {}]])
     assert.near(math.sin(0.5), result[2][1].v.x, 1e-7)

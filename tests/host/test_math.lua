@@ -36,7 +36,7 @@ describe("rapid.math", function()
     end
   end)
 
-  it("has the noises of the runtime, to the bit", function()
+  it("has the noises of the runtime, bit-identical", function()
     -- The same values as in tests/points/test_noise.cpp.
     assert.equal(-0.4088346060220297, value "rapid.math.noise(vec3(0.25, 1.5, -2.75))")
     assert.equal(-0.13869028957850577, value "rapid.math.noise(vec3(100.1, -200.2, 300.3), 0.7, 3, 42)")
@@ -86,7 +86,7 @@ return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing 
 end)
 
 describe("a run of a test", function()
-  it("tells what LuaJIT gave up to compile", function()
+  it("reports the traces that LuaJIT gave up", function()
     local result = scene.run([[
 return rapid.create { points = rapid.points.grid { size = {10, 10, 10}, spacing = 0.5 } }
   :points("k", function(p) local f = function() return 1 end p.P = p.P * f() end) :solve {}]],

@@ -40,7 +40,7 @@ describe("a motion", function()
     end
   end)
 
-  it("may be a function of the frame, which is asked between frames and for the frames around", function()
+  it("may be a function of the frame, which is called between frames and for the frames around", function()
     local result = births_of(speck .. [[:transform(function(frame)
       return rapid.translate(frame.time * 24, 0, 0) * rapid.rotate({0, 0, 1}, 30 * frame.number)
         * rapid.translate(0, 2, 0)

@@ -104,7 +104,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {3, 3, 3}, s
     for _, threads in ipairs { 2, 7 } do assert.same_points(one, points(threads)) end
   end)
 
-  it("is told where it can't be asked", function()
+  it("is an error if it can't be evaluated", function()
     assert.matches("shape:distance(P) of a moving shape or a mesh can only be called in a kernel", scene.error [[
 local ball = rapid.shape.sphere {}:transform { [1] = rapid.translate(0, 0, 0), [2] = rapid.translate(1, 0, 0) }
 local _ = ball:distance(vec3(0, 0, 0)) return rapid.create {} :solve {}]], 1, true)

@@ -61,7 +61,7 @@ describe("rapid.param", function()
     assert.equal(2, result.status)
   end)
 
-  it("is the same value wherever it is asked for", function()
+  it("is the same value wherever it is used", function()
     assert.equal("7", value("5", 7, "local first = rapid.param('x', 5) assert(first == 7)"))
     assert.equal('rapid.param("x"): its default was 4 before and is 5 here; give each parameter one default, or ' ..
       "another name", value("5", nil, "rapid.param('x', 4)"))

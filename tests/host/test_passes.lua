@@ -67,7 +67,7 @@ describe("neighbouring edits of points", function()
     assert.is_true(#last > 1000 and #last < 5200, #last)
   end)
 
-  it("are asked about no point that one before has removed", function()
+  it("skip points that an earlier one has removed", function()
     check_same {
       ":points('a', function(p) if p.id % 3 == 0 then p:kill() end end)",
       ":group { name = 'g', where = function(p) assert(p.id % 3 > 0) return p.id % 2 == 0 end }",
@@ -117,7 +117,7 @@ describe("neighbouring edits of points", function()
     end
   end)
 
-  it("see places in the whole set, also where they are limited to a group", function()
+  it("see indices of the whole set, even if they are limited to a group", function()
     local last = check_same({
       ":group { name = 'even', where = function(p) return p.id % 2 == 0 end }",
       ":group { name = 'first', group = 'even', where = function(p) return p.index <= 10 end }",
@@ -127,7 +127,7 @@ describe("neighbouring edits of points", function()
     assert.equal(5, #last:group "first")
   end)
 
-  it("may be native alone, or behind Solve", function()
+  it("may all be native, or after Solve", function()
     local edits = { ":group { name = 'g' }", ":group { name = 'h', group = 'g' }", ":delete { group = 'h' }" }
     assert.same({ "attribute1", "group1", "group2", "delete1" }, passes(together(edits))[1])
     assert.equal(0, #check_same(edits)[2])
@@ -166,7 +166,7 @@ describe("neighbouring edits of points", function()
     assert.is_true(shared > 12 * 6, shared) -- nodes of the first passes
   end)
 
-  it("do not see an attribute that one behind them makes", function()
+  it("do not see an attribute that a later one makes", function()
     check_error({ ":solve {}", ":points('a', function(p) p.heat = p.made end)", ":attribute { made = 2 }" },
       'scene.lua:1: node "a": no attribute "made" here')
   end)

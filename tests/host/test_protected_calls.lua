@@ -13,7 +13,7 @@ local function run_alone(text, arguments)
 end
 
 describe("a protected call", function()
-  it("gives what a function returns, or what it raised", function()
+  it("returns the values or the error of a function", function()
     assert.equal("true 1 nil 3", text_of("local ok, a, b, c = pcall(function(...) return ... end, 1, nil, 3)",
       "('%s %s %s %s'):format(ok, a, b, c)"))
     assert.equal("false hot", text_of("local ok, message = pcall(error, 'hot', 0)", "('%s %s'):format(ok, message)"))

@@ -33,7 +33,7 @@ describe("graph code", function()
     end
   end)
 
-  it("can't load a module from elsewhere than beside the graph", function()
+  it("can only load modules next to the graph", function()
     for _, name in ipairs {
       "ffi", "io", "os", "debug", "jit", "jit.util", "jit.vmdef", "package", "string", "bytecode", "kernel", "sandbox",
       "host", "socket", "posix", "lfs", "testing.command", "nodes.lift",
@@ -198,7 +198,7 @@ for key in pairs(t) do words[#words + 1] = key t[key] = nil t.b = nil end]]))
 end)
 
 describe("require", function()
-  it("runs a module beside the graph once, with its own file in messages", function()
+  it("runs a module next to the graph once, with its own file in messages", function()
     scene.folder:write("wind.lua", [[
 local wind = { calls = 0 }
 function wind.push(p, strength)
@@ -233,7 +233,7 @@ return rapid.create { points = two } :points("k", function(p) wind.fail(p) end) 
     assert.equal(2, missing.status)
   end)
 
-  it("tells a module that is wrong by its own file", function()
+  it("reports an error in a module with the module's file", function()
     scene.folder:write("broken.lua", "local x = 1\nlocal = 2")
     assert.equal("broken.lua:2: '<name>' expected near '='", scene.error "require 'broken'")
     scene.folder:write("raises.lua", "\n\nerror 'no wind today'")

@@ -4,7 +4,7 @@ local scene = require "testing.scene"
 local at = " (point id 0, frame 2)"
 
 describe("an error in a kernel", function()
-  it("is told with its own line, in whatever form it was raised", function()
+  it("is reported with its own line, however it was raised", function()
     for body, expected in pairs {
       ["error 'too hot'"] = "too hot",
       ["error('too hot', 0)"] = "too hot",
@@ -44,7 +44,7 @@ return rapid.create { points = two } :points("wind", function(p)
 end) :solve {}]])
   end)
 
-  it("behind pcall is the script's own business", function()
+  it("inside pcall is handled by the script", function()
     local points = scene.kernel("if not pcall(function() error {} end) then p.v = vec3(0, 24, 0) end")
     assert.near({0, 2, 0}, points[1].P, 1e-6)
   end)

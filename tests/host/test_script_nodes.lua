@@ -159,7 +159,7 @@ return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing 
 end)
 
 describe("the file of a Lua node", function()
-  it("is found beside the graph before RAPID_PATH, and there before Rapid's own", function()
+  it("is found next to the graph before RAPID_PATH, and there before Rapid's own", function()
     os.execute("mkdir -p " .. scene.folder:file "shared")
     local rises = [[
 local rapid = require "rapid"

@@ -101,7 +101,7 @@ describe("a parameter of a node in Lua", function()
 end)
 
 describe("a node in Lua that makes attributes", function()
-  it("brings them into being, with their value, before and behind Solve", function()
+  it("makes them with their value, before and after Solve", function()
     define("", "p.Cd = p.Cd * 0.5", "makes = { Cd = {1, 1, 0.5}, turn = {0, 0, 0, 1} },")
     local result = run("", nil, 3)
     assert.near({1, 1, 0.5}, result[1][1].Cd, 0)

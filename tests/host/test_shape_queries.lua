@@ -9,7 +9,7 @@ local block = rapid.levelset.box { size = {1, 1, 1}, voxel = 0.05 }]]
 local function kernel(body, columns) return scene.kernel(body, columns, (shapes:gsub("\n", " "))) end
 
 describe("a shape", function()
-  it("tells a kernel the distance and the gradient", function()
+  it("gives a kernel the distance and the gradient", function()
     local points = kernel("p.d = ball:distance(p.P) p.P = ball:gradient(p.P + vec3(0, 1, 0))", "d = {0, 0}")
     assert.near(-0.5, points[1].d, 1e-6)
     assert.near(0.5, points[2].d, 1e-6)
@@ -30,7 +30,7 @@ describe("a shape", function()
     assert.near(2.5, scene.run(text, { frames = {1, 1} })[1][1].P.x, 1e-6)
   end)
 
-  it("is asked in compiled traces, the same on any number of threads", function()
+  it("is evaluated in compiled traces, bit-identical on any number of threads", function()
     local text = shapes .. [[
 return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.1 } } :attribute { d = 0 }
   :points("k", function(p)
@@ -44,7 +44,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
     end
   end)
 
-  it("refuses an argument that is no place, and points, which have no distance", function()
+  it("refuses arguments that are no positions, and points, which have no distance", function()
     local function fault(body)
       return (scene.kernel_error(body, nil, (shapes .. " local set = rapid.points.grid {}"):gsub("\n", " "))
         :gsub('^scene%.lua:2: node "kernel": ', ""):gsub(" %(point id 0, frame 2%)$", ""))

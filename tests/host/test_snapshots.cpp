@@ -135,7 +135,7 @@ std::string scene_of_defaults(const std::string& node)
 
 }  // namespace
 
-TEST_CASE("a run behind a snapshot is the run that was not interrupted, for nodes of every type", "[snapshot]")
+TEST_CASE("a run after a snapshot equals the uninterrupted run, for nodes of every type", "[snapshot]")
 {
     std::set<std::string> types;
     for (const auto& [name, text] : test::scenes_with_state) {
@@ -161,7 +161,7 @@ TEST_CASE("a run behind a snapshot is the run that was not interrupted, for node
 }
 
 // Loads the state of a file, runs some frames, and writes the state to another. Runs in a separate process: see below.
-TEST_CASE("goes on behind the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
+TEST_CASE("continues after the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
 {
     const fs::path folder = std::getenv("RAPID_TEST_SNAPSHOT");
     Snapshot snapshot;
@@ -172,7 +172,7 @@ TEST_CASE("goes on behind the snapshot that RAPID_TEST_SNAPSHOT names", "[.]")
     write_state(folder / "after", {{"frame", run.evaluator().next_frame() - 1}}, state_of(run.evaluator().save()));
 }
 
-TEST_CASE("a run behind a snapshot in another process is the run that was not interrupted", "[snapshot]")
+TEST_CASE("a run after a snapshot in another process equals the uninterrupted run", "[snapshot]")
 {
     for (const auto& [name, text] : test::scenes_with_state) {
         CAPTURE(name);
@@ -184,7 +184,7 @@ TEST_CASE("a run behind a snapshot in another process is the run that was not in
 
         const std::string program = fs::read_symlink("/proc/self/exe").string();
         const std::string command = "RAPID_TEST_SNAPSHOT='" + folder.path().string() + "' '" + program +
-                                    "' 'goes on behind the snapshot that RAPID_TEST_SNAPSHOT names' >/dev/null";
+                                    "' 'continues after the snapshot that RAPID_TEST_SNAPSHOT names' >/dev/null";
         REQUIRE(std::system(command.c_str()) == 0);
         Snapshot after;
         restore(after, StateFile(folder / "after").state());

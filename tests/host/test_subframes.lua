@@ -5,7 +5,7 @@ local json = require "dkjson"
 local one = "points = rapid.points.from { P = {{0, 0, 0}}, v = {{1, 0, 0}} }"
 
 describe("with sub-frames", function()
-  it("a script is run so many times a frame, each for its part of it", function()
+  it("a script runs once per subframe, each time for its part of the frame", function()
     for _, n in ipairs { 1, 3, 8 } do
       local points = scene.run(([[
 return rapid.create { fps = 24, subframes = %d, %s } :attribute { runs = 0 }
@@ -72,7 +72,7 @@ return rapid.create { subframes = 4 }
     assert.equal(3 + 14 + 5, #points[3])
   end)
 
-  it("count and impulse bear at the times that they would in a whole frame", function()
+  it("count and impulse emit at the same times as in a whole frame", function()
     local text = [[
 return rapid.create { fps = 10, seed = 3, subframes = %d }
   :emit { source = rapid.points.from { P = {{0, 0, 0}} }, %s, birth = "%s" } :solve {}
@@ -95,7 +95,7 @@ return rapid.create { fps = 10, seed = 3, subframes = %d }
     assert.same({100, 100, 100, 100}, of_part)
   end)
 
-  it("a deforming mesh bears on the same ways as in whole frames", function()
+  it("a deforming mesh emits along the same paths as in whole frames", function()
     local files = scene.folder
     for f = 1, 6 do -- a triangle that rises with growing speed, and turns
       files:write(("leaf.%04d.obj"):format(f), ("v 0 %g 0\nv 1 %g %g\nv 0 %g 1\nf 1 2 3\n"):format(f ^ 2 / 10, f / 5,

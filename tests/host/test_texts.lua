@@ -12,7 +12,7 @@ local function names_of(points)
   return names
 end
 
-describe("an attribute that is a text", function()
+describe("an attribute that is a string", function()
   it("is made with a default, by its own name or among `attributes`", function()
     local result = scene.run [[
 return rapid.create { points = two } :attribute { material = "bark", attributes = { name = "leaf" } } :solve {}]]
@@ -24,7 +24,7 @@ return rapid.create { points = two } :attribute { material = "bark", attributes 
     assert.same({ "leaf", "bark" }, names_of(scene.kernel("p.v = p.v", named)))
   end)
 
-  it("is the empty text where nothing says otherwise", function()
+  it("is the empty string by default", function()
     local result = scene.run [[
 return rapid.create { points = rapid.points.from { P = {{0, 0, 0}}, name = {"leaf"} } } :merge(rapid.create { points =
   two }) :solve {}]]
@@ -49,7 +49,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, count = 30000, att
     end
   end)
 
-  it("makes the same file on any number of threads, whichever texts came first", function()
+  it("makes the same file on any number of threads, whichever string came first", function()
     local text = [[
 local first = rapid.param("first", 0, "of texts that no point has at the end")
 return rapid.create {}
@@ -129,7 +129,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {1, 1, 0}}, n
     end
   end)
 
-  it("is no amount: where numbers are asked for, the error says so", function()
+  it("is not a number: an error says so if a number is required", function()
     local reported = scene.error [[
 return rapid.create { points = two } :attribute { kind = "a" } :drag { linear = rapid.attr "kind" } :solve {}]]
     assert.truthy(reported:find('"kind" is string', 1, true), reported)
@@ -147,7 +147,7 @@ return rapid.create { seed = 5 }
       if p:rand(1, frame) < 0.1 then p.name = p.name .. (frame.number % 10) end
     end) :gravity {} :solve {}]]
 
-describe("texts", function()
+describe("strings", function()
   local function done(name, arguments)
     local result = scene.command(name, text, arguments)
     assert.equal(0, result.status, result.stderr)
@@ -174,7 +174,7 @@ describe("texts", function()
     for frame = 7, 8 do shell(("cmp whole.%04d.bgeo merged.%04d.bgeo"):format(frame, frame)) end
   end)
 
-  it("are told by info and diff", function()
+  it("are printed by info and diff", function()
     done("run", "-f 3 -o b.vdb -o b.csv -o b.npz")
     local reported = command.rapid("info b.vdb", { cwd = scene.folder.path }).stdout
     assert.truthy(reported:find('name +string  "a" "a2" "a3" "b" "b2"'), reported)
@@ -184,13 +184,13 @@ describe("texts", function()
     end
   end)
 
-  it("are told by trace", function()
+  it("are printed by trace", function()
     local reported = json.decode(done("trace", "--json --id 0 -f 1-6"))
     local name = reported[1].steps[1].values.name
     assert.truthy(name == "a" or name == "b", name)
   end)
 
-  it("are left out of a .ply and a .prt, which is told once", function()
+  it("are skipped in .ply and .prt files, which is reported once", function()
     local result = scene.command("run", text, "-f 1-4 -o c.####.ply -o c.####.prt -o c.####.bgeo")
     assert.equal(0, result.status, result.stderr)
     for _, extension in ipairs { "ply", "prt" } do
@@ -202,7 +202,7 @@ describe("texts", function()
     assert.is_nil(result.stderr:find("c.####.bgeo", 1, true))
   end)
 
-  it("are told of where they are asked for, and nowhere else", function()
+  it("are reported as skipped if they are requested by name, and not otherwise", function()
     local result = scene.command("run", text, "-f 1-4 -o with.####.ply:name -o without.####.ply:v")
     assert.equal(0, result.status, result.stderr)
     assert.matches('with.####.ply: .ply can\'t store strings, so "name" is not written; use one of ', result.stderr, 1,

@@ -91,19 +91,19 @@ end
 describe("a wrong kernel", function()
   local static, dynamic = 0, 0
 
-  it("whose code betrays it is told before the first frame, with node, file and line", function()
+  it("that its code reveals is reported before the first frame, with node, file and line", function()
     static = check_all(before_the_first_frame, "") + check_all(by_the_plan, "")
   end)
 
-  it("is told with node, file, line, point and frame where it runs", function()
+  it("is reported with node, file, line, point and frame while it runs", function()
     dynamic = check_all(at_a_point, " (point id 0, frame 2)")
   end)
 
-  it("is told of in at least thirty kinds", function()
+  it("is reported in at least thirty kinds", function()
     assert.truthy(static + dynamic >= 30, static + dynamic)
   end)
 
-  it("is told with the point that it fails at, whichever thread comes upon one first", function()
+  it("is reported with the same point, whichever thread fails first", function()
     local text = [[
 return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing = 1 } }
   :points("kernel", function(p)

@@ -56,7 +56,7 @@ describe("a file that is there to be slow, or long", function()
     try(meshes, '} :emit { source = rapid.mesh.read "%s", count = 1')
   end)
 
-  it("is told in lines of bounded length, where it has one endless name", function()
+  it("is reported in lines of bounded length if it has one endless name", function()
     local folder = command.folder()
     local endless = ("n"):rep(100000)
     local header = "id,Px,Py,Pz," .. endless
@@ -101,7 +101,7 @@ describe("a file that is there to be slow, or long", function()
     end
   end)
 
-  it("is written in little memory, where it has one endless text", function()
+  it("is written in little memory if it has one endless string", function()
     local folder = command.folder()
     -- In .npz all strings of an attribute have the same length: 80 MB here.
     local text = "id,Px,Py,Pz,name\n0,0,0,0," .. ("n"):rep(1e5) .. "\n"

@@ -83,7 +83,7 @@ local function run(folder, text, arguments)
 end
 
 describe("a scene without end", function()
-  it("is refused with what it would take, and where", function()
+  it("is refused with the memory it would take, and the line", function()
     local folder = command.folder()
     for _, case in ipairs(refused) do
       local result = run(folder, (case[1]:gsub("TWO", two):gsub("BALL", ball)))
@@ -93,7 +93,7 @@ describe("a scene without end", function()
     end
   end)
 
-  it("is none that lets go what it makes", function()
+  it("is not refused if it frees what it allocates", function()
     local folder = command.folder()
     local shape = ("function() for i = 1, 500 do local _ = %s end return %s end"):format(ball, ball)
     local result = run(folder, ("return %s :collide { shape = %s } :solve {}"):format(two, shape))

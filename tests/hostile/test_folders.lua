@@ -10,7 +10,7 @@ local point = "rapid.create { points = rapid.points.from { P = {{0, 1, 0}} } } "
   ":points('k', function(p) p.v = p.v end) :solve {}"
 
 describe("a library of Lua", function()
-  it("that is beside a scene, in the current folder, is not Rapid's", function()
+  it("in the current folder, next to a scene, does not replace Rapid's", function()
     local folder = command.folder()
     command.shell("mkdir jit table", { cwd = folder.path })
     for _, name in ipairs { "jit/vmdef", "jit/util", "jit/bc", "vmdef", "ffi", "bit", "table/new", "table/clear",
@@ -31,7 +31,7 @@ describe("a library of Lua", function()
 end)
 
 describe("a program", function()
-  it("that is beside a scene, in the current folder, is not run, whatever PATH says", function()
+  it("in the current folder, next to a scene, is not run, whatever PATH contains", function()
     local folder = command.folder()
     folder:write("scene.lua", 'local rapid = require "rapid" return ' .. point)
     for _, name in ipairs { "ffmpeg", "dot", "sbatch", "squeue", "scancel" } do

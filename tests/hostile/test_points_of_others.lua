@@ -35,7 +35,7 @@ describe("a point with a number that is none", function()
     end
   end)
 
-  it("has no place on a shape, and ends no run by a signal", function()
+  it("has no position on a shape, and ends no run by a signal", function()
     local folder = command.folder()
     local shapes = [[
 local rapid = require "rapid"

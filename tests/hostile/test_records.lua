@@ -116,7 +116,7 @@ describe("FARM.json", function()
     end
   end)
 
-  it("is told of without commands for the terminal, and its tasks are not waited for", function()
+  it("is printed without terminal commands, and its tasks are not waited for", function()
     local folder = folder_with ""
     folder:write("out/FARM.json", job(', "name": "\\u001b[2J"', folder.path))
     command.shell("mkfifo out/FARM/1.status", { cwd = folder.path })

@@ -42,7 +42,7 @@ folder:write("test_it.lua", tests)
 folder:write("points.csv", "Px,Py,Pz,heat\27[2J,group:some\27[2J\n1,2,3,4,1\n")
 folder:write("others.csv", "Px,Py,Pz,heat\27[2J,group:some\27[2J\n1,2,3,5,0\n")
 
-describe("what is printed", function()
+describe("printed text", function()
   it("holds no command of a terminal, whatever names are", function()
     -- Command lines with their status.
     for arguments, status in pairs {
@@ -64,7 +64,7 @@ describe("what is printed", function()
     end
   end)
 
-  it("shows what the text was", function()
+  it("shows the original string", function()
     local result = command.rapid("run scene.lua -f 1", { cwd = folder.path })
     assert.truthy(result.stdout:find("of the scene: \\x1b[2J\t\\x9b\t\\x0d\n", 1, true), result.stdout)
     assert.falsy(result.stdout:find(clear, 1, true))

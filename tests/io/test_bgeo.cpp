@@ -118,7 +118,7 @@ TEST_CASE("a .bgeo of another program is read: texts by their table, odd sizes b
     CHECK(points.id()[0] == 0);
 }
 
-TEST_CASE("groups of a .bgeo are read behind attributes of the whole, in words of 32, ordered or not", "[io][bgeo]")
+TEST_CASE("groups of a .bgeo are read after detail attributes, in words of 32, ordered or not", "[io][bgeo]")
 {
     const TemporaryFolder folder;
     std::string text = "BgeoV";

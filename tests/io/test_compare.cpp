@@ -188,7 +188,7 @@ TEST_CASE("an integer and a float of equal value are the same, a vector and a sc
     CHECK_THAT(to_text(compare(a, b)), Catch::Contains("vec3 / float  can't be compared"));
 }
 
-TEST_CASE("texts are equal or not, whatever the order in which they came", "[io][compare]")
+TEST_CASE("strings are compared by their characters, not by the order of their tokens", "[io][compare]")
 {
     PointSet a = diagonal_points(), b = a;
     a.add({"name", token_of("leaf")});

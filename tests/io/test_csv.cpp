@@ -101,7 +101,7 @@ TEST_CASE("a .csv that can't be understood is an error that names the line", "[i
     CHECK_THAT(error("idx,idy,idz,Px,Py,Pz\n1,2,3,1,2,3\n"), Catch::EndsWith("is vec3; it must be int64"));
 }
 
-TEST_CASE("a .csv of another program has texts with quotes or without, told by the first line", "[io][csv]")
+TEST_CASE("a .csv of another program has strings with or without quotes, by its first line", "[io][csv]")
 {
     const TemporaryFolder folder;
     std::ofstream(folder / "a.csv", std::ios::binary) << "name,Px,Py,Pz,kind,heat\r\nleaf,1,2,3,\"a, \"\"b\"\"\",1\r\n"

@@ -69,7 +69,7 @@ TEST_CASE("points with trails come back from .bgeo and .ply with the same bits",
     CHECK(skipped.list().empty());
 }
 
-TEST_CASE("a .bgeo has open polygons behind its points", "[io][lines][bgeo]")
+TEST_CASE("a .bgeo has open polygons after its points", "[io][lines][bgeo]")
 {
     const TemporaryFolder folder;
     const PointSet points = with_curves();

@@ -43,7 +43,7 @@ std::string bytes_of(const std::filesystem::path& path)
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-TEST_CASE("the parts of a set are the set, to the bit, whatever its size and the gaps of its ids", "[merge_parts]")
+TEST_CASE("the merged parts of a set are bit-identical to the set, for any size and gaps of ids", "[merge_parts]")
 {
     CHECK(rc::check([] {
         test::RandomPoints options;

@@ -71,8 +71,7 @@ same("group_hot", "|b1", i == 1)
 )"));
 }
 
-TEST_CASE("what numpy saves is read: compressed or not, of any type and order; what is no attribute is left out",
-          "[io][npz]")
+TEST_CASE("files of numpy are read: compressed or not, of any type and order; other arrays are skipped", "[io][npz]")
 {
     const std::string save = GENERATE("savez", "savez_compressed");
     CAPTURE(save);

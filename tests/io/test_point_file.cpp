@@ -82,7 +82,7 @@ TEST_CASE("of a file of points that is not finished nothing stays", "[io][pieces
     CHECK_THROWS_WITH(PointFile(folder / "a.xyz", PointSet()), Catch::Contains("a.xyz: unknown extension"));
 }
 
-TEST_CASE("what must be kept until the end is refused beyond --memory, what is written at once is not", "[io][pieces]")
+TEST_CASE("data kept until the end is refused beyond --memory, data written at once is not", "[io][pieces]")
 {
     const TemporaryFolder folder;
     const std::uint64_t before = memory_budget();

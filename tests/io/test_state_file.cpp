@@ -76,7 +76,7 @@ TEST_CASE("columns of several pieces are kept, those that compress and those tha
     CHECK(StateFile(written(folder, mixed)).state() == mixed);
 }
 
-TEST_CASE("a file with any bit flipped, or with more behind it, is refused", "[state]")
+TEST_CASE("a file with any bit flipped, or with trailing bytes, is refused", "[state]")
 {
     const test::TemporaryFolder folder;
     const std::string text = test::file_text(written(folder, state_of(kept_points())));
@@ -96,7 +96,7 @@ TEST_CASE("a file with any bit flipped, or with more behind it, is refused", "[s
     CHECK(!refused(text));
 }
 
-TEST_CASE("what is no file of a state is said to be none", "[state]")
+TEST_CASE("a file that is not a state is reported as such", "[state]")
 {
     const test::TemporaryFolder folder;
     const fs::path path = folder.write("points.csv", "P.x,P.y,P.z\n1,2,3\n");

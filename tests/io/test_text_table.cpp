@@ -21,7 +21,7 @@ Column<Token> column_of(const std::vector<std::string>& strings)
 
 }  // namespace
 
-TEST_CASE("a table of texts is in the order of the points, not in that in which texts came", "[io][texts]")
+TEST_CASE("a table of strings is in the order of the points, not of the tokens", "[io][texts]")
 {
     for (const char* first : {"late", "middle", "early"}) token_of(first);
     const TextTable table = text_table(column_of({"early", "middle", "early", "", "late"}));
@@ -33,7 +33,7 @@ TEST_CASE("a table of texts is in the order of the points, not in that in which 
     CHECK(text_table(Column<Token>()).strings.empty());
 }
 
-TEST_CASE("a place of -1 is the empty text, and one beyond the table is an error", "[io][texts]")
+TEST_CASE("an index of -1 is the empty string, and one beyond the table is an error", "[io][texts]")
 {
     const std::vector<Token> strings = {token_of("leaf")};
     const auto column = [&](const std::vector<std::int32_t>& indices) {
@@ -58,8 +58,7 @@ TEST_CASE("texts of a file have the tokens of the process, also when more are me
     CHECK(token_of_word("") == Token());
 }
 
-TEST_CASE("each format that holds texts gives them back; the others leave them out, and all else is there",
-          "[io][texts]")
+TEST_CASE("formats with strings return them; others skip them, and keep everything else", "[io][texts]")
 {
     const PointSet points = random_points({.size = 300, .wide = false});
     int with_strings = 0;

@@ -54,7 +54,7 @@ TEST_CASE("a .vdb keeps negative zeros, NaN attributes and a few metres beside a
     CHECK(differing_columns(points, read_points(folder / "a.vdb")) == "");
 }
 
-TEST_CASE("all points in one place, and no points at all, are written to .vdb and read", "[io][vdb][extreme]")
+TEST_CASE("points at one position, and empty sets, are written to .vdb and read", "[io][vdb][extreme]")
 {
     const TemporaryFolder folder;
     PointSet heap = random_points({.size = 3000});
@@ -86,7 +86,7 @@ TEST_CASE("a .vdb without points keeps its attributes and groups, for OpenVDB to
     CHECK(descriptor.groupMap().count("hot") == 1);
 }
 
-TEST_CASE("OpenVDB itself finds the attributes, groups and places that were written", "[io][vdb]")
+TEST_CASE("OpenVDB itself finds the attributes, groups and positions that were written", "[io][vdb]")
 {
     const TemporaryFolder folder;
     const PointSet points = random_points({.size = 4000});

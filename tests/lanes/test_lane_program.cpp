@@ -42,7 +42,7 @@ Failed run(const LaneProgram& program, std::vector<float>& x, const std::vector<
 
 }  // namespace
 
-TEST_CASE("a program goes over any number of points, and stores nothing behind the last", "[lanes]")
+TEST_CASE("a program processes any number of points, and stores nothing after the last", "[lanes]")
 {
     for (const std::size_t size : {1u, 7u, 127u, 128u, 129u, 1000u}) {
         std::vector<float> x(size);
@@ -69,7 +69,7 @@ TEST_CASE("points that are not visited stay as they are", "[lanes]")
     }
 }
 
-TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
+TEST_CASE("nothing of a tile with a missing value is stored", "[lanes]")
 {
     std::vector<float> x(400, 5.0f);
     x[200] = std::numeric_limits<float>::max();  // twice this overflows
@@ -78,7 +78,7 @@ TEST_CASE("of a tile in which a value is none nothing is stored", "[lanes]")
         if (i != 200) CHECK(x[i] == (i >= 128 && i < 256 ? 5.0f : 10.0f));
 }
 
-TEST_CASE("what is steady is computed anew where its column, or the chunk, has other values", "[lanes]")
+TEST_CASE("a uniform value is computed again if its column or the chunk has other values", "[lanes]")
 {
     // Computes into = column 0 times dt, which is in slot 3.
     LaneProgram program;

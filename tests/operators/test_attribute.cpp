@@ -46,7 +46,7 @@ TEST_CASE("a whole number makes a float; a known name has its own type", "[attri
     CHECK(points.find<float>("life"));
 }
 
-TEST_CASE("the value of attribute goes to all points without one, whoever makes the attribute", "[attribute]")
+TEST_CASE("attribute sets all points without a value, whichever node makes the attribute", "[attribute]")
 {
     const Uses uses = NodeTest("attribute", {{"heat", 2.0}}).uses();
     REQUIRE(uses.makes.size() == 1);
@@ -101,7 +101,7 @@ TEST_CASE("attribute refuses illegal names and values", "[attribute]")
     CHECK(refusal("hitnum", 0.5) == "hitnum = 0.5 is not whole; it must be an integer");
 }
 
-TEST_CASE("attribute makes no attribute that the plan leaves out", "[attribute]")
+TEST_CASE("attribute makes no pruned attribute", "[attribute]")
 {
     NodeTest attribute("attribute", {{"heat", 2.0}, {"wet", 1.0}});
     attribute.pruned = {"heat"};

@@ -94,7 +94,7 @@ TEST_CASE("create refuses illegal frame rates, and known attributes of another t
           }) == "the initial points have \"pscale\" as vec3; it must be float");
 }
 
-TEST_CASE("create drops what the plan leaves out of the initial points", "[create]")
+TEST_CASE("create drops pruned attributes of the initial points", "[create]")
 {
     PointSet points = points_at({{0, 0, 0}});
     points.add({"heat", 1.0f});

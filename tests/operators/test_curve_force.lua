@@ -130,7 +130,7 @@ return rapid.create { fps = 24 }
     end
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function fault(arguments)
       return scene.error("return rapid.create {} :curve_force { " .. arguments .. " } :solve {}")
     end
@@ -177,7 +177,7 @@ describe("rapid.points.along", function()
     assert.near({0, 0, 0.5}, closed[8].P, 1e-6)
   end)
 
-  it("of a curve that moves bears along its way, between the frames too", function()
+  it("of a moving curve emits along its path, between the frames too", function()
     local text = [[
 local function path(frame) return rapid.points.along({{0, frame.time, 0}, {1, frame.time, 0}}, { count = 50 }) end
 return rapid.create { fps = 24, seed = 2 } :points("r", function(p) local _ = p.birthtime end)
@@ -187,7 +187,7 @@ return rapid.create { fps = 24, seed = 2 } :points("r", function(p) local _ = p.
     for i = 1, #result do assert.near(result[i].birthtime, result[i].P.y, 2e-3) end
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function fault(arguments) return scene.error("rapid.points.along(" .. arguments .. ")") end
     assert.truthy(fault("{{0, 0, 0}}"):find("a curve is a list of at least two points", 1, true))
     assert.truthy(fault("{{0, 0, 0}, 3}"):find("point 2 is 3", 1, true))

@@ -141,7 +141,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
     assert.near({3 - math.sin(1), 0, math.cos(1)}, p.v, 2e-2)
   end)
 
-  it("takes each line of a file for a curve of its own", function()
+  it("reads each line of a file as a separate curve", function()
     -- Nothing attracts points between the end of the first curve and the beginning of the second.
     scene.folder:write("two.obj", "v 0 0 0\nv 1 0 0\nv 5 0 0\nv 6 0 0\nl 1 2\nl 3 4\n")
     local p = after(":curve_force { curve = rapid.curve.read 'two.obj', radius = 1 }", { P = "{3, 0.1, 0}" })
@@ -153,7 +153,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {%s}, v = {%s} 
 end)
 
 describe("a curve", function()
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function fault(text) return scene.error(text .. " return rapid.create {} :solve {}") end
     local function says(expected, text) assert.matches(expected, fault(text), 1, true) end
     says("it has 1 point; a curve needs at least two", "rapid.curve.from { points = {{0, 0, 0}} }")

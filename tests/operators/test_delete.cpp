@@ -27,7 +27,7 @@ TEST_CASE("delete with a group and where removes the points for which both hold"
           std::vector<std::int64_t>{0, 1});
 }
 
-TEST_CASE("a group that nobody joined deletes nothing", "[delete][extreme]")
+TEST_CASE("a group without points deletes nothing", "[delete][extreme]")
 {
     CHECK(NodeTest("delete", {{"group", "nobody"}})(2, three_points()).size() == 3);
     CHECK(NodeTest("delete", {{"group", "nobody"}})(2, {}).empty());

@@ -62,7 +62,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0,
     end
   end)
 
-  it("does what a rod and a contact do, whichever comes first", function()
+  it("acts together with a contact, in either order", function()
     local function last(nodes)
       local result = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, -1, 0}, {0, 0, 0}, {0.05, 0.2, 0}},
@@ -125,7 +125,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = places } }
     end
   end)
 
-  it("ties all that are near at first, to the distance that is asked for", function()
+  it("joins all pairs that are near at the start, at the given distance", function()
     local p = points_of(scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {3, 0, 0}} } }
   :distance { within = 1.5, rest = 0.5 } :solve { iterations = 4 }]], { frames = {1, 4} }), 4)
@@ -133,7 +133,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
     assert.near({3, 0, 0}, p[3].P, 0)
   end)
 
-  it("breaks what is stretched by more than its strain, and for good", function()
+  it("breaks pairs that are stretched by more than the strain, permanently", function()
     -- A weight on a spring: stretched by 2 compliance m g at the lowest point of its oscillation.
     local stretched = 2 * 0.01 * 9.81
     local function lowest(strain)
@@ -224,7 +224,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{9, 9, 9}, {0,
     assert.near(1, (p[1].P - p[2].P):length(), 1e-4)
   end)
 
-  it("says what is wrong with its pairs", function()
+  it("reports wrong pairs", function()
     local function wrong(arguments)
       return scene.error(("return rapid.create { points = two } :distance { %s } :solve {}"):format(arguments))
     end
@@ -251,7 +251,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}} } }
     assert.near({-speed * math.sin(angle), 0, -speed * math.cos(angle)}, result[13][1].v, 1e-3)
   end)
 
-  it("is drawn to a place by an attribute", function()
+  it("is pulled to the position in an attribute", function()
     local p = points_of(scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}, {2, 0, 0}},
     home = {{5, 5, 5}, {6, 6, 6}} } } :gravity {} :pin { target = rapid.attr "home" } :solve {}]],

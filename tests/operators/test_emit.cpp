@@ -420,8 +420,7 @@ TEST_CASE("values that all newborn points share stay uniform columns", "[emit]")
     CHECK((*points.find_group("hot"))[9] == 1);
 }
 
-TEST_CASE("newborn points inherit the attributes of the source's points, except those that every point has of its own",
-          "[emit]")
+TEST_CASE("newborn points inherit the source's attributes, except those that every point sets itself", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     from.set("heat", Column<float>(std::span<const float>(std::vector<float>{5, 6})));
@@ -523,7 +522,7 @@ TEST_CASE("emit declares what it makes, so that the columns exist from the first
     CHECK(std::count(uses.gives.begin(), uses.gives.end(), "life") == 1);
 }
 
-TEST_CASE("emit makes no attribute that the plan leaves out, and emits the same points", "[emit]")
+TEST_CASE("emit makes no pruned attribute, and emits the same points", "[emit]")
 {
     PointSet from = points_at({{0, 0, 0}, {1, 0, 0}});
     const std::vector<Vec3f> normals = {{0, 1, 0}, {1, 0, 0}};

@@ -54,7 +54,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {1,
     assert.near({0, 0, 0}, points[3].v, 0)
   end)
 
-  it("is asked by kernels, in compiled traces, the same on any number of threads", function()
+  it("is evaluated by compiled kernels, bit-identical on any number of threads", function()
     local text = turning .. [[
 return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0.1 } }
   :points("k", function(p) p.v = grid:sample(p.P) end) :field { grid = grid, mode = "velocity" } :solve {}]]
@@ -67,7 +67,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
     end
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function fault(text) return scene.error(text) end
     local tail = " :solve {}"
     assert.truthy(fault(still .. " return rapid.create {} :field { grid = grid, drag = 3 }" .. tail)

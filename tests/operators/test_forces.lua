@@ -119,7 +119,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}} } }
     assert.near({0, 0, 0}, p.v, 1e-5)
   end)
 
-  it("holds points to places of their own, and to a shape", function()
+  it("pulls points to positions of their own, and to a shape", function()
     local p = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, home = {{5, 6, 7}} } }
   :spring { target = rapid.attr "home", stiffness = 30, damping = 8 } :solve {}]], { frames = {240, 240} })[240][1]
@@ -149,7 +149,7 @@ return rapid.create { fps = 24 / (2 * math.pi * %.17g),
     assert.truthy(fine < 0.01, fine)
   end)
 
-  it("falls off as it is told, is softened by a core, and is nothing at the centre", function()
+  it("falls off with its exponent, is softened by a core, and is zero at the centre", function()
     local function first(options, place)
       return scene.run(([[
 return rapid.create { fps = 1000, points = rapid.points.from { P = {{%s}} } } :attract { %s } :solve {}]])

@@ -67,7 +67,7 @@ describe("goal", function()
     assert.is_true(there > 15 and there < 45)
   end)
 
-  it("counts from birth where it is told to", function()
+  it("counts the time from birth if requested", function()
     local result = scene.run([[
 return rapid.create { fps = 20 }
   :emit { source = rapid.points.from { P = {{1, 2, 3}} }, rate = 70, attributes = { goal = {4, 5, 6} } }
@@ -124,7 +124,7 @@ describe("goal, to points", function()
     end
   end)
 
-  it("by id: of a set with ids of its own, those", function()
+  it("by id: uses the ids of the target points", function()
     scene.folder:write("places.csv", "id,Px,Py,Pz\n1,5,5,5\n0,6,6,6\n")
     local result = scene.run([[
 return rapid.create { fps = 10, points = two } :goal { to = rapid.points.read "places.csv", time = 0.1 } :solve {}]])
@@ -169,7 +169,7 @@ return rapid.create { fps = 10, points = random }
     end
   end)
 
-  it("by the nearest: who has a place keeps it, and who comes later takes one that is free or of the dead", function()
+  it("by the nearest: a point keeps its target, and later ones take free targets or those of dead points", function()
     local result = scene.run([[
 local places = rapid.points.from { P = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}} }
 return rapid.create { fps = 10 }
@@ -241,7 +241,7 @@ return rapid.create { fps = 10, points = two }
     end
   end)
 
-  it("that moves: each keeps its place on it", function()
+  it("that moves: each point keeps its position on it", function()
     local moving = ":transform { [1] = rapid.translate(0, 0, 0), " ..
       "[11] = rapid.translate(0, 2, 0) * rapid.rotate({0, 1, 0}, 90) }"
     for _, shape in ipairs { "rapid.mesh.box { size = {2, 2, 2} }", "rapid.shape.box { size = {2, 2, 2} }" } do

@@ -67,7 +67,7 @@ TEST_CASE("a group needs a name", "[group]")
     CHECK(error_of([] { NodeTest("group", {{"name", ""}}); }) == "name = \"\" is empty; give the group a name");
 }
 
-TEST_CASE("a group that the plan leaves out is neither made nor tested", "[group]")
+TEST_CASE("a pruned group is neither made nor tested", "[group]")
 {
     NodeTest group("group", {{"name", "hot"}});
     group.pruned = {"group:hot"};

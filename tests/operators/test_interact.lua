@@ -27,7 +27,7 @@ describe("interact", function()
     assert.near(-9.81, points[1].v.y, 1e-5)
   end)
 
-  it("acts at every sub-step, with what else acts on each point, and keeps momentum", function()
+  it("acts in every substep, together with other forces, and keeps momentum", function()
     for _, substeps in ipairs { 1, 2, 8 } do
       local result = scene.run(([[
 return rapid.create { fps = 24, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } }
@@ -114,7 +114,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {4,
     assert.truthy(result[73][1].P.x > result[73][2].P.x + 0.5)
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     assert.truthy(scene.error("return rapid.create {} :interact {} :solve {}"):find("radius", 1, true))
     assert.truthy(scene.error("return rapid.create {} :interact { radius = 1, drag = -1 } :solve {}")
       :find("drag = -1 is out of range", 1, true))
@@ -124,7 +124,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {4,
       :find('mass = 0 is out of range; it must be above 0', 1, true))
   end)
 
-  it("finds neighbours within any radius, however small beside the scene", function()
+  it("finds neighbours within any radius, however small compared with the scene", function()
     for _, radius in ipairs { 1e-9, 1e-6, 1, 1e6 } do
       -- Two that approach within the radius, and one a hundred million times as far.
       local points = scene.run(([[

@@ -61,7 +61,7 @@ describe("a level set that grows in a sequence of files", function()
     end
   end)
 
-  it("carries what has a radius, sticks to it or rests on it", function()
+  it("carries points with a radius that stick to it or rest on it", function()
     for _, response in ipairs { "stick", "bounce" } do
       local p = run("gaps.####.vdb", "{0, 0.4, 0}",
         (response == "bounce" and ":gravity { g = {0, -5, 0} }" or "") ..
@@ -74,7 +74,7 @@ describe("a level set that grows in a sequence of files", function()
     end
   end)
 
-  it("is asked in kernels for its distance, gradient and velocity", function()
+  it("gives kernels its distance, gradient and velocity", function()
     local p = run("grow.####.vdb", "{0, 0.35, 0}", [[:attribute { d = 0, u = {0, 0, 0}, n = {0, 0, 0} }
   :points("ask", function(p) p.d, p.u, p.n = ball:distance(p.P), ball:velocity(p.P), ball:gradient(p.P) end)]], 5)
     for frame = 2, 5 do
@@ -95,7 +95,7 @@ describe("a level set that grows in a sequence of files", function()
 end)
 
 describe("a level set that moves in a sequence of files", function()
-  it("drives what is before it, and what is behind it stays", function()
+  it("pushes points in front of it, and leaves points behind it at rest", function()
     local result = run("move.####.vdb", "{0.4, 0, 0}, {-0.31, 0, 0}", bounce:format(1), 9,
       { v = "{0, 0, 0}, {0, 0, 0}", pscale = "0, 0" })
     local time = 8 / 24 - 0.1 / speed
@@ -138,7 +138,7 @@ return rapid.create { fps = 24, points = rapid.points.grid { size = {1.2, 0.9, 0
 end)
 
 describe("a sequence of level sets as a value", function()
-  it("bears points from the file of the frame, and is called by other functions", function()
+  it("emits points from the file of the frame, and can be called by other functions", function()
     local text = [[
 local ball = rapid.levelset.read "grow.####.vdb"
 return rapid.create { fps = 24 } :emit { source = %s, count = 40, birth = "end", life = 0.03 } :solve {}]]
@@ -153,7 +153,7 @@ return rapid.create { fps = 24 } :emit { source = %s, count = 40, birth = "end",
     end
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     assert.matches('frame 2 of "gaps.####.vdb" is missing', scene.error [[
 return rapid.create {} :emit { source = rapid.levelset.read "gaps.####.vdb", count = 1 } :solve {}]], 1, true)
     assert.matches("a mesh can't be called", scene.error "rapid.mesh.sphere {} {}", 1, true)

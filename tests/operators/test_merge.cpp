@@ -207,7 +207,7 @@ TEST_CASE("consecutive ids take the memory of their runs", "[merge]")
     CHECK(adopted.runs() == 2);
 }
 
-TEST_CASE("merge drops what the plan leaves out", "[merge]")
+TEST_CASE("merge drops pruned attributes", "[merge]")
 {
     const auto here = simulation(), there = simulation();
     here->next_id = 1;

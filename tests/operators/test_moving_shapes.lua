@@ -67,7 +67,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 1, 0}}, v 
     end
   end)
 
-  it("draws to the nearest place of a mesh, from any distance", function()
+  it("pulls to the nearest position on a mesh, from any distance", function()
     local result = scene.run(plate .. [[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 40, 0}, {5, 0, 0}} } }
   :spring { target = plate, stiffness = 1e6, damping = 200 } :solve { substeps = 32 }]], { frames = {1, 20} })
@@ -177,7 +177,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.3, 0}} }
 end)
 
 describe("a pin", function()
-  it("keeps points to their place over the faces of a mesh, at each sub-step", function()
+  it("keeps points at their positions over the faces of a mesh in each substep", function()
     -- The second corner of one triangle moves sideways while the triangle turns about z.
     local function corners(frame)
       local t, list = frame - 1, {}

@@ -20,7 +20,7 @@ return %s]]
     for frame, points in plain:frames() do assert.same_points(points, shown[frame]) end
   end)
 
-  it("refuses what it can't show, with what would be right", function()
+  it("refuses arguments that it can't draw, and names the right ones", function()
     for says, right in pairs {
       ['blend = "screen"'] = 'blend = "screen"',
       ['draw = "discs"'] = 'draw = "discs" is unknown; it must be one of balls, cards',

@@ -63,7 +63,7 @@ describe("an attribute out of range", function()
     assert.truthy(text:find('node "collide1": point 0, frame 2: bounce = 2 ', 1, true), text)
   end)
 
-  it("is nobody's matter outside the group, nor is an infinite mass", function()
+  it("is ignored outside the group, as is an infinite mass", function()
     local points = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}, {0, 1, 0}}, own = {0.5, 7},
     mass = {1, math.huge} } }

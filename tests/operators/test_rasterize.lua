@@ -128,7 +128,7 @@ found = { sum }]], 1)[1]
     assert.truthy(math.abs(small[1] - larger[1]) > 1e-3 * small[1])
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function says(expected, more)
       local text = drift:gsub("smoke.####.vdb", more.file or "smoke.####.vdb"):format(more.add or "")
       local result = scene.command("run", text, "-f 1-2")

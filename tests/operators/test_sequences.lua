@@ -91,7 +91,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}} }
     assert.near(-0.5 * 9.81 * t * t, gone[24][1].P.y, 1e-4)
   end)
 
-  it("is told what is wrong", function()
+  it("reports wrong arguments", function()
     write_squares("flat", 1, 3, function() return 0 end)
     local function message(read)
       return scene.error(("return rapid.create {} :emit { source = %s, count = 1 } :solve {}"):format(read))
@@ -105,7 +105,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0.1, 0}} }
 end)
 
 describe("a sequence of level sets", function()
-  it("has the file of each frame that counting gives, and none where there is nothing", function()
+  it("has the file of each frame by its number, and nothing for a missing file", function()
     for file = 3, 6 do
       local made = scene.command("run", ([[
 local ball = rapid.levelset.sphere { radius = 0.2, center = {%d, 0, 0}, voxel = 0.05 }:write("ball.%04d.vdb")
@@ -159,7 +159,7 @@ return rapid.create { fps = 24 }
     end
   end)
 
-  it("bears along the way from file to file, by ids", function()
+  it("emits along the path from file to file, by ids", function()
     write_points(1, 8)
     local points = scene.run([[
 return rapid.create { fps = 24 }
@@ -187,7 +187,7 @@ return rapid.create { fps = 24 } :emit { source = function(frame) return set { n
     assert.near(2, points[1].P.x, 1e-6)
   end)
 
-  it("is told what is wrong", function()
+  it("reports wrong arguments", function()
     local function message(read)
       return scene.error(("return rapid.create {} :emit { source = %s, count = 1 } :solve {}"):format(read))
     end

@@ -137,7 +137,7 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
     end
   end)
 
-  it("are the same to the bit on one, two and three threads", function()
+  it("are bit-identical on one, two and three threads", function()
     local emit = "rate = 4000, birth = 'random', velocity = {0, 1, 0}, spread = 60, life = {0.1, 0.4}"
     local function run(threads)
       return scene.run(([[
@@ -288,7 +288,7 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
     assert.near(math.ceil(24 * math.sqrt(1 / g)) / 24, points[1].birthtime, 1e-6)
   end)
 
-  it("kill_parent: leaves the children in its place, in the same frame", function()
+  it("kill_parent: replaces the parent by its children in the same frame", function()
     local _, result = born('on = "age > 0.21", count = 3, kill_parent = true, inherit = {"heat"}',
       { before = ':gravity {} :attribute { heat = 4 } :points("read_age", function(p) local _ = p.age end)' })
     for frame = 1, 13 do
@@ -326,7 +326,7 @@ return sparks]], { frames = {1, 2} })
     end
   end)
 
-  it("of one chain bear along the path of the frame before", function()
+  it("of one chain emit along the path of the frame before", function()
     local result = scene.run([[
 local born = rapid.create { fps = 24, points = rapid.points.from { P = {{0, 0, 0}}, v = {{0, 5, 0}}, n = {2} } }
 return born:gravity {} :points("read", function(p) local _ = p.birthtime + p.parent end)
@@ -344,7 +344,7 @@ return born:gravity {} :points("read", function(p) local _ = p.birthtime + p.par
   end)
 end)
 
-describe("a node that can't bear", function()
+describe("a node that can't emit", function()
   local function fails(text, message)
     local found = scene.error(text, { frames = {1, 3} })
     assert.truthy(found:find(message, 1, true), found)
@@ -354,7 +354,7 @@ describe("a node that can't bear", function()
       .. ("return rapid.create {} :spawn { %s } :solve {}"):format(emit)
   end
 
-  it("is refused with what would be right", function()
+  it("is refused with a remedy", function()
     fails(with("", "from = parents, count = 1"), "no solve moves its points; end its chain with :solve {}")
     fails("local inner = rapid.create { points = rapid.points.from { P = {{0, 0, 0}} } } :gravity { name = 'pull' }\n"
       .. "local outer = inner:solve { name = 'end' }\n"

@@ -14,7 +14,7 @@ return rapid.create { seed = 5 }
 describe(":trail", function()
   local result = rapid.run(scene.folder:write("trail.lua", text), { frames = {1, 20} })
 
-  it("keeps the places of the frames before, to the bit, as many as there were", function()
+  it("stores the positions of all earlier frames, bit-identical", function()
     local long = 0
     for frame = 2, 20 do
       local points = result[frame]

@@ -36,7 +36,7 @@ end
 local function clamp(x) return math.max(0, math.min(1, x)) end
 
 describe("transfer", function()
-  it("gives each point the values of the nearest place, inside of the mesh and beyond its edges", function()
+  it("gives each point the values of the nearest position, inside the mesh and beyond its edges", function()
     local points = run "source = square"
     assert.is_true(#points > 2000)
     for i = 1, #points do
@@ -84,7 +84,7 @@ describe("transfer", function()
     end
   end)
 
-  it("is told what is wrong", function()
+  it("reports wrong arguments", function()
     local function message(transfer)
       scene.folder:write("square.ply", ply)
       return scene.error(('local square = rapid.mesh.read "square.ply" return rapid.create { points = two } ' ..
@@ -109,7 +109,7 @@ return rapid.create { fps = 24, points = %s }
       options or { frames = {2, 2} })[2]
   end
 
-  it("is the nearest place of a mesh, and what the mesh has there of vertices and faces", function()
+  it("is the nearest position on a mesh, with the values of vertices and faces there", function()
     local points = requested [[
 p.near, p.heat, p.way = square:closest(p.P), square:closest(p.P, "heat"), square:closest(p.P, "way")
 p.wet = square:closest(p.P, "wet")]]
@@ -149,7 +149,7 @@ p.wet = square:closest(p.P, "wet")]]
     assert.near(0.25, points[1].heat, 1e-5)
   end)
 
-  it("is a place of a shape and of a level set within its band", function()
+  it("is a position on a shape, and on a level set within its band", function()
     local points = requested("p.near = square:closest(p.P)", nil, "rapid.points.from { P = {{3, 0, 4}, {0, -9, 0}} }",
       "rapid.shape.sphere { radius = 1 }")
     assert.near({0.6, 0, 0.8}, points[1].near, 1e-6)
@@ -169,7 +169,7 @@ p.wet = square:closest(p.P, "wet")]]
     end
   end)
 
-  it("says what is wrong", function()
+  it("reports wrong arguments", function()
     local function fault(kernel, shape)
       scene.folder:write("square.ply", ply)
       return scene.error(([[

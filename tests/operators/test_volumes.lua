@@ -57,7 +57,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{-1.5, 0, 0}} 
     assert.near(0, velocity("offset = 3, before = 'none'", 3), 1e-6)
   end)
 
-  it("is asked by nodes in Lua that take a grid, at the time of each sub-step", function()
+  it("is evaluated by nodes in Lua that take a grid, at the time of each substep", function()
     scene.folder:write("drift.lua", [[
 local rapid = require "rapid"
 return rapid.node { name = "drift", doc = "Reads a flow.", makes = { seen = {0, 0, 0} },
@@ -81,7 +81,7 @@ return rapid.create { points = rapid.points.grid { size = {3, 3, 3}, spacing = 0
 end)
 
 describe("a sequence of fogs", function()
-  it("bears by the density between two files, each by what is left or has come of it", function()
+  it("emits by the density between two files", function()
     for frame = 2, 4 do
       local points = scene.run(([[
 return rapid.create { seed = 5 }
@@ -118,7 +118,7 @@ return rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {0.31, -0.42,
   end)
 
   -- Uses many points, because a loop over three may end while its trace is recorded.
-  it("is asked in compiled kernels and predicates", function()
+  it("is evaluated in compiled kernels and predicates", function()
     local result = scene.run([[
 local lattice = rapid.points.grid { size = {2, 2, 2}, spacing = 0.1 }
 local fog = rapid.fog.from_points(lattice, { voxel = 0.1 })
@@ -151,10 +151,10 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0.5, 0, -0.6}
   end)
 end)
 
-describe("what is no volume", function()
+describe("a wrong volume", function()
   local function fault(text) return scene.error(text) end
 
-  it("is refused with what would be right", function()
+  it("is refused with a remedy", function()
     local tail = " return rapid.create { points = two } :solve {}"
     assert.truthy(fault("rapid.grid.read 'none.####.vdb'"):find("there is no file", 1, true))
     assert.truthy(fault("rapid.grid.read('v.####.vdb', { after = 'loop' })"):find("after = \"loop\"", 1, true))

@@ -380,7 +380,7 @@ TEST_CASE("a style is that of a group, and the later one counts", "[io][picture]
     CHECK_FALSE(streaks(180));
 }
 
-TEST_CASE("of what a later style leaves open an earlier one counts", "[picture]")
+TEST_CASE("an earlier style applies to parameters that a later one does not set", "[picture]")
 {
     const PointSet points = balls({{0, 0, 0}}, {Vec3f(0.2f, 0.1f, 0.05f)}, 0.3f);
     const PictureScene adding = styled({.additive = true});

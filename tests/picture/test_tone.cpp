@@ -51,7 +51,7 @@ TEST_CASE("the byte of a light up to 0.8 without the dither is the nearest to sR
     CHECK(display_byte(std::numeric_limits<float>::infinity()) == 255);
 }
 
-TEST_CASE("brighter light is compressed, and what is no light is black", "[picture][tone]")
+TEST_CASE("brighter light is compressed; zero, negative and undefined light is black", "[picture][tone]")
 {
     CHECK(mean_of(0.8f) < mean_of(0.9f));
     CHECK(mean_of(0.9f) < mean_of(1.2f));

@@ -143,7 +143,7 @@ TEST_CASE("every block starts on a cache line", "[buffer]")
     for (int i = 0; i < 100; ++i) CHECK(address(Buffer(bytes)) % 64 == 0);
 }
 
-TEST_CASE("no bytes have a place as well, and are let go as others are", "[buffer]")
+TEST_CASE("an empty block has an address, and is freed like others", "[buffer]")
 {
     Buffer none(0);
     CHECK(none.data() != nullptr);

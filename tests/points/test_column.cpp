@@ -196,7 +196,7 @@ TEST_CASE("a mask gives the runs of points that stay", "[column]")
     CHECK(runs_of({0, 2, 255, 0}) == Runs{{1, 2}});  // any value but 0 keeps a point
 }
 
-TEST_CASE("of several runs the first of the longest is told, with what stays before it", "[column]")
+TEST_CASE("the first of the longest runs is found, with the points that stay before it", "[column]")
 {
     const auto longest_of = [](std::vector<std::uint8_t> mask) {
         const Compaction compaction = Compaction::from_mask(mask);

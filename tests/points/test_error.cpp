@@ -39,7 +39,7 @@ TEST_CASE("a file without a known line is named without one", "[error]")
     CHECK(std::string(Error("it is empty").at({"bunny.obj"}).what()) == "bunny.obj: it is empty");
 }
 
-TEST_CASE("as an error rises, the place and the node nearest to the fault stay", "[error]")
+TEST_CASE("as an error rises, the line and the node nearest to the fault stay", "[error]")
 {
     Error error("x");
     error.at({"lift.lua", 16}).in_node("lift1").at({"sparks.lua", 3}).in_node("outer");

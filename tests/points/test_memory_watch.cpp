@@ -48,7 +48,7 @@ void take(Reported& reported, std::size_t mebibytes, bool leave)
 
 }  // namespace
 
-TEST_CASE("a run is asked to end where it takes more than its budget, and once more where it does not", "[memory]")
+TEST_CASE("a run that exceeds its budget is requested to end, and once more if it does not", "[memory]")
 {
     const MemoryBudget budget(1);
     Reported leaves, stays, grows;
@@ -76,7 +76,7 @@ TEST_CASE("little memory is let pass whatever the budget", "[memory]")
     CHECK(reported == 0);
 }
 
-TEST_CASE("memory is not watched where nobody has set a budget", "[memory]")
+TEST_CASE("memory is not watched without a budget", "[memory]")
 {
     const auto threads = [] {
         const std::filesystem::directory_iterator all("/proc/self/task");

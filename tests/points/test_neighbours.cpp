@@ -21,7 +21,7 @@ std::vector<std::vector<std::uint32_t>> by_all_pairs(const std::vector<Vec3f>& P
 
 }  // namespace
 
-TEST_CASE("neighbours are those that all pairs give, of a set and of any place, on any number of threads",
+TEST_CASE("neighbours are those among all pairs, for points and for any position, on any number of threads",
           "[neighbours][threads]")
 {
     // Evenly distributed; far from the origin; in clumps so distant that most cells are empty; on a lattice, exactly at
@@ -58,7 +58,7 @@ TEST_CASE("neighbours are those that all pairs give, of a set and of any place, 
     CHECK(found == expected);
 }
 
-TEST_CASE("a place far from all points has no neighbours, and an empty set has none", "[neighbours]")
+TEST_CASE("a position far from all points has no neighbours, and an empty set has none", "[neighbours]")
 {
     std::vector<std::uint32_t> near = {1};
     Neighbours({{Vec3f(0, 0, 0), Vec3f(1, 0, 0)}}, 0.5).find(Vec3d(1e9, 0, -1e12), near);

@@ -60,7 +60,7 @@ TEST_CASE("the values of a thread are destroyed when it ends, the latest first")
     CHECK(destroyed == "21");
 }
 
-TEST_CASE("a value that can't be made is an error, and is made when it is asked for again")
+TEST_CASE("a value whose construction fails is an error, and is constructed at the next request")
 {
     thread_local PerThread<Refused> kept;
     is_refused = true;

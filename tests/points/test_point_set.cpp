@@ -19,7 +19,7 @@ std::vector<std::int64_t> ids_of(const PointSet& set)
 
 }  // namespace
 
-TEST_CASE("a set has P, v and id, and nothing that nobody asked for", "[point_set]")
+TEST_CASE("a set has P, v and id, and no other attributes", "[point_set]")
 {
     const PointSet set;
     CHECK(set.empty());

@@ -85,7 +85,7 @@ TEST_CASE("a scene drawn today is drawn the same by the next version", "[random]
     CHECK(RandomKey(0, "").value == (mixed[0] | std::uint64_t{mixed[1]} << 32));
 }
 
-TEST_CASE("numbers drawn side by side are those drawn one by one, to the bit", "[random]")
+TEST_CASE("numbers drawn side by side are bit-identical to those drawn one by one", "[random]")
 {
     const RandomKey key(7, "emit1");
     const std::uint64_t first = 0xFFFFFFF0, use = GENERATE(std::uint64_t{0}, std::uint64_t{5} << 32 | 16);

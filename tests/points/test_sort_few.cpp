@@ -9,7 +9,7 @@
 
 namespace rapid {
 
-TEST_CASE("lists of any length are sorted, and what lies behind them is left alone", "[sort]")
+TEST_CASE("lists of any length are sorted, and the memory after them is untouched", "[sort]")
 {
     std::mt19937 random(3);
     for (std::uint32_t count = 0; count <= 2 * max_sorted_by_rank; ++count) {

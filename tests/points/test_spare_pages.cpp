@@ -27,7 +27,7 @@ std::size_t take_all(SparePages& pages, std::size_t bytes)
 
 }  // namespace
 
-TEST_CASE("pages of all columns of a frame serve those of the next, where so many are kept", "[spare_pages]")
+TEST_CASE("pages of all columns of a frame are reused in the next", "[spare_pages]")
 {
     SparePages pages;
     pages.keep(12);

@@ -13,7 +13,7 @@
 using namespace rapid;
 using namespace rapid::test;
 
-TEST_CASE("equal texts are one token, others are others, and the empty text is 0", "[points][token]")
+TEST_CASE("equal strings have one token, different ones differ, and the empty string is 0", "[points][token]")
 {
     const Token leaf = token_of("leaf"), bark = token_of("bark");
     CHECK(leaf == token_of(std::string("le") + "af"));
@@ -27,7 +27,7 @@ TEST_CASE("equal texts are one token, others are others, and the empty text is 0
                Catch::StartsWith("no string has the number 4000000000"));
 }
 
-TEST_CASE("a text is UTF-8 without zeros", "[points][token]")
+TEST_CASE("a string is UTF-8 without zeros", "[points][token]")
 {
     for (const char* right : {"\x7f", "\u00fc", "\u0800", "\ud7ff", "\ue000", "\uffff", "\U00010000", "\U0010ffff"})
         CHECK(token_of(right).text() == right);
@@ -40,7 +40,7 @@ TEST_CASE("a text is UTF-8 without zeros", "[points][token]")
     }
 }
 
-TEST_CASE("threads that bring the same texts get the same tokens", "[points][token][threads]")
+TEST_CASE("threads with the same strings get the same tokens", "[points][token][threads]")
 {
     constexpr std::size_t strings = 1000, calls = 64;
     std::vector<std::vector<Token>> tokens(calls, std::vector<Token>(strings));
@@ -57,7 +57,7 @@ TEST_CASE("threads that bring the same texts get the same tokens", "[points][tok
     for (const auto& other : tokens) CHECK(other == tokens[0]);
 }
 
-TEST_CASE("texts without end are an error of memory, not the end of the process", "[points][token]")
+TEST_CASE("endless strings are an error of memory, not the end of the process", "[points][token]")
 {
     const MemoryBudget small(1);
     const std::string error = error_of([] {

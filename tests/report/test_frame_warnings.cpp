@@ -6,7 +6,7 @@
 
 using namespace rapid;
 
-TEST_CASE("the kind of a warning has its place and its names, and none of its numbers", "[report]")
+TEST_CASE("the kind of a warning has its line and its names, but not its numbers", "[report]")
 {
     CHECK(kind_of_warning("a.lua:12: node \"drag2\": moved 1.5e-06 m in 3 steps") ==
           "a.lua:12: node \"drag2\": moved # m in # steps");
@@ -18,7 +18,7 @@ TEST_CASE("the kind of a warning has its place and its names, and none of its nu
     CHECK(kind_of_warning("12") == "#");
 }
 
-TEST_CASE("of warnings that differ in numbers ten are told, and the last of the rest with its frame", "[report]")
+TEST_CASE("ten warnings that differ only in numbers are printed, and the last of the rest with its frame", "[report]")
 {
     FrameWarnings warnings;
     int reported = 0;
@@ -33,7 +33,7 @@ TEST_CASE("of warnings that differ in numbers ten are told, and the last of the 
         std::vector<std::string>{"990 more warnings of this kind, the last in frame 1000: node \"a\": off by 1000 m"});
 }
 
-TEST_CASE("what was told is not told again, after others of its kind either", "[report]")
+TEST_CASE("a warning is not repeated, even after others of its kind", "[report]")
 {
     FrameWarnings warnings;
     CHECK(warnings.add("off by 1 m", 1));

@@ -77,7 +77,7 @@ TEST_CASE("a bar is drawn at most twenty times a second, and for the last frame"
     CHECK(text.find("frame 1000/1000") != std::string::npos);
 }
 
-TEST_CASE("a line of text takes the bar away, and the bar comes back below it", "[report]")
+TEST_CASE("a line of text replaces the progress bar, which is drawn again below it", "[report]")
 {
     Memory memory;
     Progress progress(memory.file(), ProgressStyle::Bar, 1, 2);

@@ -135,7 +135,7 @@ TEST_CASE("a sweep whose step is in doubt, or with two equal rows, is refused", 
     CHECK(complaint([&] { study.complete(); }) == "sweep: a has the value 1 twice; remove one");
 }
 
-TEST_CASE("a knob of texts alone gives a line to each value, without order", "[study]")
+TEST_CASE("a parameter with strings has a line for each value, without an order", "[study]")
 {
     Study study;
     study.sweep = {{"method", {std::string("a"), std::string("b")}}};

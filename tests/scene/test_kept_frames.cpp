@@ -53,7 +53,7 @@ TEST_CASE("a frame of a file has the bits of the one that was saved", "[kept]")
     CHECK(read.statistics().seconds == 0);
 }
 
-TEST_CASE("a frame of another key, and a file that is none, are errors that name the file", "[kept]")
+TEST_CASE("a frame of another key, and a file of another kind, are errors that name the file", "[kept]")
 {
     const test::TemporaryFolder folder;
     Scene scene = test::opened(two_outputs);

@@ -100,7 +100,7 @@ TEST_CASE("merged parts are the points of all, in the order of their ids", "[mer
     }
 }
 
-TEST_CASE("a merge ends where the program says so, behind a whole frame", "[merge]")
+TEST_CASE("a merge ends after a whole frame when the program requests it", "[merge]")
 {
     const Parts parts;
     const std::string whole = parts.folder / "whole.####.csv";

@@ -162,7 +162,7 @@ TEST_CASE("a program's shape without an outside ends no run: its points count as
     CHECK_THAT(now.warnings()[0], Contains("some points can't leave a shape"));
 }
 
-TEST_CASE("a setting puts a program's shape into the place of the scene's", "[offers]")
+TEST_CASE("a setting replaces a shape of the scene by one of the program", "[offers]")
 {
     SceneOptions options;
     options.objects = {{"ball", ball({0, 1, 0}, 0.5)}};
@@ -172,7 +172,7 @@ TEST_CASE("a setting puts a program's shape into the place of the scene's", "[of
     CHECK(bits_of(good(set.advance_to(20)), "P") == bits_of(good(direct.advance_to(20)), "P"));
 }
 
-TEST_CASE("what is not offered is an error that says what is", "[offers]")
+TEST_CASE("an object that is not offered is an error that lists the offered ones", "[offers]")
 {
     SceneOptions options;
     options.objects = {{"ball", ball({0, 1, 0}, 0.5)}, {"other", ball({0, 1, 0}, 0.5)}};

@@ -27,7 +27,7 @@ Size size_of(const std::string& png)
 
 }  // namespace
 
-TEST_CASE("a sheet has its pictures in rows of a series, with labels and free places", "[picture]")
+TEST_CASE("a sheet has a row for each series, with labels and gaps", "[picture]")
 {
     const test::TemporaryFolder folder;
     Scene scene = test::opened(

@@ -67,7 +67,7 @@ TEST_CASE("Rapid's own files are where it says, and all of the library is loaded
     good(Installation::load_all());
 }
 
-TEST_CASE("a plan tells what it keeps and leaves out", "[reports]")
+TEST_CASE("a plan lists what it keeps and prunes", "[reports]")
 {
     Scene scene = opened(
         "rapid.create { name = 'spare' } :drag { linear = 1 }\n"
@@ -79,7 +79,7 @@ TEST_CASE("a plan tells what it keeps and leaves out", "[reports]")
     CHECK_THAT(report.text, StartsWith("KEPT\n nodes\n") && Contains("PRUNED") && Contains("spare"));
 }
 
-TEST_CASE("the points behind a node are those before it, changed by its formula", "[reports]")
+TEST_CASE("the points after a node are those before it, changed by its formula", "[reports]")
 {
     Scene scene = opened(
         "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}, {5, 1, 0}} } } :attribute { heat = 2 }"
@@ -103,7 +103,7 @@ TEST_CASE("the points behind a node are those before it, changed by its formula"
     CHECK(height(good(scene.advance_to(3)), 0) == height_before);
 }
 
-TEST_CASE("points behind no node, or before the first frame, are an error", "[reports]")
+TEST_CASE("points after a missing node, or before the first frame, are an error", "[reports]")
 {
     Scene scene = opened(
         "rapid.create { name = 'spare' } :drag { linear = 1 }\n"
@@ -124,7 +124,7 @@ TEST_CASE("points behind no node, or before the first frame, are an error", "[re
     CHECK(good(scene.advance_to(3)).size() == 1);
 }
 
-TEST_CASE("a frame tells where its time went, and no more than there was", "[reports]")
+TEST_CASE("the profile of a frame adds up to no more than its time", "[reports]")
 {
     Scene scene = opened(ball);
     const SceneFrame frame = good(scene.advance_to(3));
@@ -177,7 +177,7 @@ TEST_CASE("a life has birth, contacts and death at the moments of the formula", 
     CHECK_THAT(trace.lives.text, StartsWith("point 0 of create1\n") && Contains("its life ended"));
 }
 
-TEST_CASE("only the frames that are asked for are told", "[reports]")
+TEST_CASE("only the requested frames are traced", "[reports]")
 {
     Scene scene = opened(ball);
     const std::string json = good(scene.trace({{1}, "create1", 3, 9, 3})).lives.json;
@@ -187,7 +187,7 @@ TEST_CASE("only the frames that are asked for are told", "[reports]")
     }
 }
 
-TEST_CASE("behind a trace a scene is at its start, and gives the bits that it gave before", "[reports]")
+TEST_CASE("after a trace a scene is at its start, and its frames are bit-identical to before", "[reports]")
 {
     Scene scene = opened(ball);
     const float before = height(good(scene.advance_to(7)), 1);
@@ -196,7 +196,7 @@ TEST_CASE("behind a trace a scene is at its start, and gives the bits that it ga
     CHECK(height(good(scene.advance_to(7)), 1) == before);
 }
 
-TEST_CASE("a wrong trace is an error, and one that fails half-way tells what is known", "[reports]")
+TEST_CASE("a wrong trace is an error, and one that fails half-way returns the frames before", "[reports]")
 {
     Scene scene = opened(ball);
     CHECK_THAT(scene.trace({{0}, "creat1", 1, 9, 1}).error().message, Contains("did you mean \"create1\""));
@@ -257,7 +257,7 @@ TEST_CASE("an error has the calls of the script in which it was raised", "[repor
     CHECK(unnamed.error().script_stack.empty());
 }
 
-TEST_CASE("a program is told of a script that is late, before it is stopped", "[reports]")
+TEST_CASE("a program is notified of a slow script before it is stopped", "[reports]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("late.lua", "while true do end");
@@ -277,7 +277,7 @@ TEST_CASE("a program is told of a script that is late, before it is stopped", "[
     CHECK_THAT(text, Contains("ran for more than 0.2 s"));
 }
 
-TEST_CASE("a program is told of the files that a scene reads, before they are read", "[reports]")
+TEST_CASE("a program is notified of each file before a scene reads it", "[reports]")
 {
     const test::TemporaryFolder folder;
     folder.write("speed.lua", "return 3");
@@ -293,7 +293,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10, speed =
     CHECK(std::any_of(read.begin(), read.end(), [](const std::string& path) { return path.ends_with("speed.lua"); }));
 }
 
-TEST_CASE("points tell their errors, sub-steps and sleep where a program asks for it", "[reports]")
+TEST_CASE("points have their errors, substeps and sleep if a program requests them", "[reports]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("told.lua", R"(local rapid = require "rapid"

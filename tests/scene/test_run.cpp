@@ -225,7 +225,7 @@ TEST_CASE("the statistics of a frame have every figure of the table, also if a c
     CHECK(frames[0] == frames[1]);
 }
 
-TEST_CASE("without a cache a run ends behind its frame all the same", "[run]")
+TEST_CASE("a run without a cache also ends after its current frame", "[run]")
 {
     const test::TemporaryFolder folder;
     SceneRun run = made(options(folder));
@@ -389,7 +389,7 @@ TEST_CASE("what can't be a run is refused before a file is opened", "[run]")
     CHECK(fs::is_empty(folder.path()));
 }
 
-TEST_CASE("what is wrong with a scene and its files is found before the first frame", "[run]")
+TEST_CASE("mistakes in a scene and its files are found before the first frame", "[run]")
 {
     const test::TemporaryFolder folder;
     const RunOptions right = options(folder);
@@ -421,7 +421,7 @@ return rapid.create {} :emit { source = rapid.mesh.sphere {}, rate = 10 } :conta
     CHECK_THAT(run.prepare().error().message, Contains("the run is already prepared"));
 }
 
-TEST_CASE("advice that takes too long is none, and leaves a scene that runs", "[run]")
+TEST_CASE("advice that takes too long is dropped, and the scene still runs", "[run]")
 {
     SceneOptions options;
     options.script_seconds = 0.2;
@@ -483,7 +483,7 @@ TEST_CASE("formats and folders of outputs are known without a scene", "[run]")
     CHECK_FALSE(SceneInside::output_folders(requested));
 }
 
-TEST_CASE("what a plan keeps for files is explained", "[run]")
+TEST_CASE("the attributes that a plan keeps for files are explained", "[run]")
 {
     Scene scene = test::opened(cloud);
     FileOutputs files;

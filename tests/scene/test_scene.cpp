@@ -101,7 +101,7 @@ TEST_CASE("groups and detail values are read", "[scene]")
     CHECK(std::get<double>(good(frame.detail("count"))) > 0);
 }
 
-TEST_CASE("a column of texts is of tokens, whose texts are told", "[scene]")
+TEST_CASE("a column of strings contains tokens, which give the strings", "[scene]")
 {
     Scene scene = opened(
         "local rapid = require 'rapid'\n"
@@ -256,7 +256,7 @@ TEST_CASE("frames are computed forward", "[scene]")
     CHECK_THAT(frame.write("points.nothing").error().message, Contains(".vdb"));
 }
 
-TEST_CASE("behind a snapshot come the same bits, in this scene and in another", "[scene]")
+TEST_CASE("frames after a snapshot are bit-identical, in this scene and in another", "[scene]")
 {
     Scene scene = opened(cloud);
     CHECK(scene.save().error().kind == SceneError::WrongCall);
@@ -345,7 +345,7 @@ TEST_CASE("another thread cancels an advance", "[scene]")
     good(scene.advance());
 }
 
-TEST_CASE("a stop that is asked for ends opening, and all that a scene does later", "[scene]")
+TEST_CASE("a requested stop ends opening and all later calls of a scene", "[scene]")
 {
     const test::TemporaryFolder folder;
     const auto after = [](std::stop_source& stop, int milliseconds) {
@@ -385,7 +385,7 @@ TEST_CASE("a stop that is asked for ends opening, and all that a scene does late
     CHECK(good(SceneInside::open(file, {}, hooks_of(std::stop_source()))).next_frame() == 1);
 }
 
-TEST_CASE("parameters are told where the plan of a scene fails, too", "[scene]")
+TEST_CASE("parameters are listed even if the plan of a scene fails", "[scene]")
 {
     const test::TemporaryFolder folder;
     std::vector<std::string> reported;
@@ -430,7 +430,7 @@ TEST_CASE("another thread cancels a frame that is long in itself", "[scene]")
     good(scene.advance());
 }
 
-TEST_CASE("the progress callback is told of each frame, and ends the run", "[scene]")
+TEST_CASE("the progress callback is called for each frame, and can end the run", "[scene]")
 {
     std::vector<std::int64_t> reported;
     SceneOptions options;
@@ -447,7 +447,7 @@ TEST_CASE("the progress callback is told of each frame, and ends the run", "[sce
     CHECK(bits_of(good(scene.advance())) == run(whole, 5));
 }
 
-TEST_CASE("a call from a callback is refused, and what a callback throws is an error", "[scene]")
+TEST_CASE("a call from a callback is refused, and an exception of a callback is an error", "[scene]")
 {
     Scene* running = nullptr;
     SceneOptions options;
@@ -652,7 +652,7 @@ TEST_CASE("a frame is shown as a picture, and written", "[scene]")
     CHECK(std::filesystem::file_size(file) > 10 * frame.size());
 }
 
-TEST_CASE("points that were written are read, to the bit", "[scene]")
+TEST_CASE("points that were written are read back bit-identical", "[scene]")
 {
     const TemporaryFolder folder;
     Scene scene = opened(cloud);
@@ -676,7 +676,7 @@ TEST_CASE("points that were written are read, to the bit", "[scene]")
     CHECK_THAT(scene.picture(read).error().message, Contains("another scene"));
 }
 
-TEST_CASE("what of a file is no point is told", "[scene]")
+TEST_CASE("skipped contents of a file are reported", "[scene]")
 {
     const TemporaryFolder folder;
     const SceneFrame read = good(SceneFrame::read(folder.write(

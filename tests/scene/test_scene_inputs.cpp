@@ -73,7 +73,7 @@ TEST_CASE("a fingerprint is that of the parameters that the scene has now", "[in
     CHECK(good(SceneInside::fingerprint(scene)).hash == before);
 }
 
-TEST_CASE("files that frames read are told once, and known when they change", "[inputs]")
+TEST_CASE("files that frames read are reported once, and again when they change", "[inputs]")
 {
     const test::TemporaryFolder folder;
     folder.write("late.ply", triangle(0.5));

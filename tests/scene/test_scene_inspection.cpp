@@ -58,7 +58,7 @@ TEST_CASE("outputs are known before a frame, with the creates whose points they 
     CHECK(opened("return rapid.create { fps = 30 } :solve {}").fps() == 30);
 }
 
-TEST_CASE("attributes are told with their bytes, and whether they are kept", "[inspection]")
+TEST_CASE("attributes are listed with their size and whether they are kept", "[inspection]")
 {
     Scene scene = opened(
         "return rapid.create { name = 'made' } :attribute { heat = 1 } :group { name = 'low', where = function(p) "
@@ -73,7 +73,7 @@ TEST_CASE("attributes are told with their bytes, and whether they are kept", "[i
     CHECK(std::none_of(all.begin(), all.end(), [](const auto& one) { return one.name == "substeps"; }));
 }
 
-TEST_CASE("a scene that tells points has the attributes of its solve", "[inspection]")
+TEST_CASE("a scene with per-point diagnostics has the attributes of its solve", "[inspection]")
 {
     const test::TemporaryFolder folder;
     const auto file = folder.write("scene.lua", std::string("local rapid = require 'rapid'\n") + warm);
@@ -86,7 +86,7 @@ TEST_CASE("a scene that tells points has the attributes of its solve", "[inspect
     }
 }
 
-TEST_CASE("arguments are told as texts, those of functions for a frame", "[inspection]")
+TEST_CASE("arguments are reported as strings, functions with their value in a frame", "[inspection]")
 {
     Scene scene = opened(warm);
     CHECK(good(SceneInside::arguments(scene, 3)).at("down").at("g") == "{0, -3, 0}");
@@ -100,7 +100,7 @@ TEST_CASE("arguments are told as texts, those of functions for a frame", "[inspe
     CHECK_THAT(arguments.error().message, Contains("no g"));
 }
 
-TEST_CASE("points behind all nodes are those behind each, and the scene stays where it is", "[inspection]")
+TEST_CASE("points after all nodes equal those after each node, and the scene stays at its frame", "[inspection]")
 {
     Scene scene = opened(warm);
     good(scene.advance_to(3));
@@ -126,7 +126,7 @@ TEST_CASE("points behind all nodes are those behind each, and the scene stays wh
     CHECK(from_start.contains("solve1"));
 }
 
-TEST_CASE("points behind all nodes are other ones where parameters are", "[inspection]")
+TEST_CASE("points after all nodes change with the parameters", "[inspection]")
 {
     Scene scene = opened(
         "local x = rapid.param('x', 1, 'm')\n"
@@ -136,7 +136,7 @@ TEST_CASE("points behind all nodes are other ones where parameters are", "[inspe
     CHECK(good(SceneInside::points_after_nodes(scene, 2)).at("solve1").column("P")->at<float>(0)[0] == 4);
 }
 
-TEST_CASE("a wrong frame or snapshot for the points behind nodes is refused", "[inspection]")
+TEST_CASE("a wrong frame or snapshot for the points after nodes is refused", "[inspection]")
 {
     Scene scene = opened(warm);
     const SceneError early = SceneInside::points_after_nodes(scene, 0).error();
@@ -154,7 +154,7 @@ TEST_CASE("a wrong frame or snapshot for the points behind nodes is refused", "[
     CHECK(good(scene.advance()).number() == 4);
 }
 
-TEST_CASE("a frame that fails has no points behind nodes, and the frames before it have", "[inspection]")
+TEST_CASE("a failed frame has no points after nodes, but the frames before it do", "[inspection]")
 {
     Scene scene = opened(
         "return rapid.create { points = rapid.points.grid {} }\n"
@@ -186,7 +186,7 @@ TEST_CASE("a point of a merge is traced back to its create", "[inspection]")
     CHECK(same.id == 1);
 }
 
-TEST_CASE("a point of a merge that is not known by its place is an error that says why", "[inspection]")
+TEST_CASE("a point of a merge that its index does not identify is an error with the reason", "[inspection]")
 {
     Scene twice = opened(std::string(merged) + "return chain('a', 0):merge(chain('b', 0))");
     CHECK_THAT(SceneInside::origin(twice, good(twice.advance_to(2)), 0).error().message,
@@ -200,7 +200,7 @@ TEST_CASE("a point of a merge that is not known by its place is an error that sa
                Contains("an output \"sparks\" that the scene does not have"));
 }
 
-TEST_CASE("a graph without places has the nodes of the one that is laid out", "[inspection]")
+TEST_CASE("a graph without a layout has the same nodes as one with a layout", "[inspection]")
 {
     Scene scene = opened(warm);
     const std::string bare = good(SceneInside::graph_json(scene, nullptr));

@@ -37,7 +37,7 @@ double highest(const ShapeMesh& mesh)
 
 }  // namespace
 
-TEST_CASE("a box is told as the mesh that it is", "[shapes]")
+TEST_CASE("a box is reported as a mesh", "[shapes]")
 {
     Scene scene = opened(resting);
     const SceneShapes shapes = good(scene.shapes(1));
@@ -79,7 +79,7 @@ TEST_CASE("shapes that rest are the same in all frames, and outlive the scene", 
     CHECK(highest(kept.meshes().front()) == Approx(2));
 }
 
-TEST_CASE("shapes are where they are in a frame, with what they are to the points", "[shapes]")
+TEST_CASE("shapes have their positions in the frame, and their roles", "[shapes]")
 {
     Scene scene = opened(shapes_of_all_kinds);
     const SceneShapes second = good(scene.shapes(2)), fifth = good(scene.shapes(5));

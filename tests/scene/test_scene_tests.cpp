@@ -40,7 +40,7 @@ const char* const three =
 
 }  // namespace
 
-TEST_CASE("each test of a file is told when it starts and ends", "[tests]")
+TEST_CASE("the start and end of each test of a file are reported", "[tests]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);
@@ -52,7 +52,7 @@ TEST_CASE("each test of a file is told when it starts and ends", "[tests]")
     CHECK_THAT(reported.events[3].message, Contains("test_three.lua:3: "));
 }
 
-TEST_CASE("tests are chosen by name, and those before one that ended its process are left out", "[tests]")
+TEST_CASE("tests are chosen by name, and those before one that ended its process are skipped", "[tests]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);
@@ -98,7 +98,7 @@ TEST_CASE("a file that can't be run is broken, and wrong options are refused", "
     CHECK(run_scene_tests(file, {"", 0, -1, {}}, {}).error().kind == SceneError::WrongCall);
 }
 
-TEST_CASE("what the program throws while it is told is an error behind the last test", "[tests]")
+TEST_CASE("an exception of the program's callback is an error after the last test", "[tests]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder.write("test_three.lua", three);

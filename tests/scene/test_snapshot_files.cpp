@@ -29,7 +29,7 @@ Scene opened(const std::string& text = cloud) { return test::opened(text); }
 
 }  // namespace
 
-TEST_CASE("behind a snapshot of a file come the bits of the run that went on", "[snapshots]")
+TEST_CASE("a run continued from a snapshot file is bit-identical to the uninterrupted run", "[snapshots]")
 {
     const test::TemporaryFolder folder;
     const std::string file = folder / "deep/cloud.state";

@@ -266,7 +266,8 @@ TEST_CASE("nothing goes through a wall of two voxels, at any speed", "[first_con
     }
 }
 
-TEST_CASE("a path that starts at rest meets what it falls to, or ends, at any acceleration", "[first_contact][extreme]")
+TEST_CASE("a path that starts at rest meets the shape below it, or ends, at any acceleration",
+          "[first_contact][extreme]")
 {
     const ShapePtr ball = level_set_sphere(0.7, {0, 0, 0}, {0.05, 5});
     const double a = std::pow(10.0, GENERATE(range(-1, 35)));

@@ -46,7 +46,7 @@ TEST_CASE("points that fall together have no residue, and gravity's energy", "[l
     CHECK(ledger.residue->angular_momentum <= 1e-5);
 }
 
-TEST_CASE("a spring holds what it is stretched by", "[ledger]")
+TEST_CASE("a spring stores the energy of its stretch", "[ledger]")
 {
     const double compliance = 0.01;
     Scene scene(points({{0, 0, 0}, {1.5f, 0, 0}}).set<float>("mass", {1, 1}));

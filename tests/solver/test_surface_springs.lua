@@ -253,7 +253,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = %s, v = %s, F =
     end
   end)
 
-  it("is told as exact where it is", function()
+  it("is reported as exact if it is", function()
     local function reported(shape)
       local result = scene.command("run", ([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{1, 0, 0}}, v = {{0, 20, 0}} } }

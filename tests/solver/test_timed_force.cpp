@@ -83,7 +83,7 @@ TEST_CASE("a force that changes in time has no potential", "[timed_force]")
     CHECK(!force.uniform_at(0.5));
 }
 
-TEST_CASE("a force that is the same for all points at a time is told as such", "[timed_force]")
+TEST_CASE("a force that is uniform at each time is reported as uniform", "[timed_force]")
 {
     std::vector<std::shared_ptr<const Force>> winds;
     for (int k = 0; k < 3; ++k) winds.push_back(std::make_shared<Wind>(k));

@@ -2,7 +2,7 @@
 local scene = require "testing.scene"
 
 describe("follow_curve", function()
-  it("goes through the curve's points at even times, and on straight behind the end", function()
+  it("goes through the curve's points at even times, and straight on after the end", function()
     local result = scene.run([[
 return rapid.create { fps = 4, points = rapid.points.from { P = {{10, 0, 0}} } }
   :follow_curve { points = {{0, 0, 0}, {1, 2, 0}, {3, 2, 1}, {4, 0, 1}}, duration = 1.5 } :solve {}]],
@@ -18,7 +18,7 @@ return rapid.create { fps = 4, points = rapid.points.from { P = {{10, 0, 0}} } }
     assert.near({14 + 2, -4, 1}, result[11][1].P, 1e-5)
   end)
 
-  it("takes a point of any age to its place: all that were born at one place lie on the curve", function()
+  it("moves points by their age: all points born at one position lie on the curve", function()
     local result = scene.run([[
 return rapid.create { fps = 10 } :emit { source = rapid.points.from { P = {{0, 0, 0}} }, rate = 70, birth = "even" }
   :follow_curve { points = {{1, 1, 1}, {2, 1, 4}}, duration = 2 } :solve {}]], { frames = {1, 15} })

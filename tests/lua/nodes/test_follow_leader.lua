@@ -11,7 +11,7 @@ end
 
 describe("follow_leader", function()
   -- The leader moves in a straight line: v' = (w - v) / response, w constant over the frame, then P' = P + v dt.
-  it("brings points behind the leader as its formula says", function()
+  it("brings points to the distance from the leader that its formula gives", function()
     local result = run("P = {{0, 0, 0}, {-4, 0, 0}}, v = {{1, 0, 0}, {0, 0, 0}}",
       "distance = 1, time = 0.8, response = 0.3, speed = 100", 40)
     local x, v, kept = -4, 0, math.exp(-0.1 / 0.3)
@@ -25,7 +25,7 @@ describe("follow_leader", function()
     assert.near(result[40][1].P.x - 1, result[40][2].P.x, 0.15)
   end)
 
-  it("lets nobody be faster than the speed, and leaves all alone where nobody leads", function()
+  it("limits points to the speed, and moves none without a leader", function()
     local fast = run("P = {{0, 0, 0}, {50, 0, 0}}, v = {{1, 0, 0}, {0, 0, 0}}", "speed = 2", 20)
     assert.near({-2, 0, 0}, fast[20][2].v, 1e-3)
     local alone = scene.run([[
@@ -34,7 +34,7 @@ return rapid.create { points = two } :follow_leader { leader = "nobody" } :group
     assert.near({1, 1, 0}, alone[4][2].P, 0)
   end)
 
-  it("gives each point a place of its own in the train", function()
+  it("gives each point its own position in the train", function()
     local result = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.grid { size = {1, 1, 1}, spacing = 0.2 } }
   :points("on", function(p) if p.id == 0 then p.v = vec3(0, 0, 2) end end)

@@ -14,7 +14,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P, v = v } }
 end
 
 describe("look_ahead", function()
-  it("passes a ball without contact, and comes out behind it", function()
+  it("passes a ball without contact", function()
     local result = run("rapid.shape.sphere { radius = 0.6 }", "time = 1.5, clearance = 0.1, strength = 30")
     for _, points in result:frames() do
       assert.points(points).outside(function(P) return P:length() - 0.68 end)
@@ -36,7 +36,7 @@ describe("look_ahead", function()
     assert.is_true(result[96]:min("P").x > 1)
   end)
 
-  it("turns by four times what is missing over the time squared", function()
+  it("turns with four times the missing distance over the time squared", function()
     local p = scene.run([[
 return rapid.create { fps = 240, points = rapid.points.from { P = {{-1, 0.5, 0}}, v = {{2, 0, 0}} } }
   :look_ahead { shape = rapid.shape.sphere { radius = 0.6 }, clearance = 0.1, strength = 100 } :solve {}]],

@@ -12,7 +12,7 @@ return rapid.create { fps = 10, points = two } :spin { axis = {0, 0, 3}, rate = 
     end
   end)
 
-  it("gives each point a rate of its own, that stays", function()
+  it("gives each point its own rate, which stays constant", function()
     local result = scene.run([[
 return rapid.create { fps = 10, points = rapid.points.grid { size = {2, 1, 1}, spacing = 0.1 } }
   :spin { rate = 100, variation = 0.5 } :solve {}]], { frames = {1, 11} })

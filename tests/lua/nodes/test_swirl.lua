@@ -12,7 +12,7 @@ return rapid.create { fps = 10, points = rapid.points.from { P = {{2, 5, 0}, {1,
     assert.near({1.2, 0, 0}, result[2][3].v, 1e-7)
   end)
 
-  it("gives a newborn the share of its own time", function()
+  it("turns a newborn point for the part of the frame that it has lived", function()
     local result = scene.run([[
 return rapid.create { fps = 10 } :emit { source = rapid.points.from { P = {{1, 0, 0}} }, count = 4, birth = "even" }
   :swirl { strength = 2 } :solve {}]], { frames = {2, 2} })

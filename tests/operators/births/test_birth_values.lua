@@ -27,7 +27,7 @@ describe("attributes at birth", function()
     assert.is_true(points:min "heat" >= 2 and points:max "heat" < 5)
   end)
 
-  it("are on the way between two vectors", function()
+  it("are on the line between two vectors", function()
     local points = born "Cd = {{1, 0, 0}, {0, 0.5, 1}}"
     for i = 1, #points do
       local Cd = points[i].Cd
@@ -36,7 +36,7 @@ describe("attributes at birth", function()
     assert.near({0.5, 0.25, 0.5}, points:mean "Cd", 5 * math.sqrt(1 / 12 / 4000))
   end)
 
-  it("are on a ramp, at a uniform place", function()
+  it("are on a ramp, at a uniform position", function()
     local points = born "Cd = {{0, {1, 0, 0}}, {0.25, {0, 1, 0}}, {1, {0, 0, 1}}}"
     local first = 0
     for i = 1, #points do

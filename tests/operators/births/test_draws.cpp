@@ -57,7 +57,7 @@ TEST_CASE("a turned vector keeps its length, and 1 - cos of its turn is the part
     }
 }
 
-TEST_CASE("a vector is turned as it is alone, whichever are beside it", "[cone]")
+TEST_CASE("a vector is turned in the same way alone and among others", "[cone]")
 {
     const Cone cone(0.7);
     auto [all, draws] = random_case(21);

@@ -9,7 +9,7 @@ return rapid.create { fps = 24, seed = 5 }
 end
 
 describe("a function of the newborn", function()
-  it("sets any attribute from any other, at the place and velocity of birth", function()
+  it("sets any attribute from any other, at the position and velocity of birth", function()
     local points = run([[count = 500, velocity = {0, 2, 0}, birth = function(p, frame)
       p.heat = p.P.x + 10 * frame.number
       p.Cd = vec3(p.P.x, p.v.y, p.dt)
@@ -55,7 +55,7 @@ describe("a function of the newborn", function()
     assert.equal(3, points:min "heat")
   end)
 
-  it("edits what is born from points, of a chain before and of its own", function()
+  it("edits points born from points of another chain and of its own", function()
     local result = scene.run([[
 local stars = rapid.create { points = rapid.points.from { P = {{0, 0, 0}, {5, 0, 0}}, v = {{0, 1, 0}, {0, 3, 0}} } }
   :solve {}
@@ -79,7 +79,7 @@ return rapid.create { fps = 24 }
     for _, threads in ipairs { 2, 7 } do assert.same_points(one, points(threads)) end
   end)
 
-  it("is told what is wrong, with the line inside", function()
+  it("reports mistakes with the line inside the function", function()
     local function message(more)
       return scene.error(([[
 return rapid.create { fps = 24 }

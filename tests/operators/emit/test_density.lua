@@ -34,7 +34,7 @@ local function mean(points, value)
 end
 
 describe("emit by a density", function()
-  it("draws places on faces in proportion to it, and points have it as an attribute", function()
+  it("distributes births over faces in proportion to it, and points have it as an attribute", function()
     local points = run('rapid.mesh.read "square.ply"', 'count = 20000, density = "heat"')
     assert.equal(20000, #points)
     -- A density of 2x has the mean 2/3 and a variance of 1/18.
@@ -53,7 +53,7 @@ describe("emit by a density", function()
     assert.near(2.75, mean(points, function(p) return p.P.x end), 5 * math.sqrt(3 / 16 / 20000))
   end)
 
-  it("is refused where there is none, by name", function()
+  it("is refused by name if the source does not have it", function()
     local function error_of(source, emit)
       return scene.error(("return rapid.create {} :emit { source = %s, count = 1, %s } :solve {}"):format(source, emit))
     end

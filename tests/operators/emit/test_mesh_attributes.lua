@@ -58,7 +58,7 @@ return rapid.create { fps = 24 } :emit { source = rapid.mesh.read %q, count = 30
     :format(file, more or ""), { frames = {2, 2} })
 end
 
-describe("what is born on a mesh of an OBJ file", function()
+describe("a point born on a mesh of an OBJ file", function()
   scene.folder:write("squares.obj", obj)
 
   it("has its texture coordinates, seams included, its normals and colours", function()
@@ -85,7 +85,7 @@ describe("what is born on a mesh of an OBJ file", function()
     assert.is_true(born("squares.obj", 'source_group = "stone"')[2]:min("P").x >= 1)
   end)
 
-  it("is told of groups that are not there, and of sources without any", function()
+  it("is an error for missing groups, and for sources without groups", function()
     local function message(more)
       return scene.error(("return rapid.create {} :emit { %s, count = 1 } :solve {}"):format(more))
     end
@@ -98,7 +98,7 @@ describe("what is born on a mesh of an OBJ file", function()
   end)
 end)
 
-describe("what is born on a mesh of a PLY file", function()
+describe("a point born on a mesh of a PLY file", function()
   scene.folder:write("squares.ply", ply)
 
   it("has the values of its vertices and of its faces, and births go by either", function()
@@ -121,7 +121,7 @@ describe("what is born on a mesh of a PLY file", function()
     assert.near(14 / 9, both:mean("P").x, 5 * math.sqrt(0.08 / 3000))
   end)
 
-  it("is told what the file has besides", function()
+  it("is an error that lists the attributes of the file", function()
     local warnings = table.concat(born("squares.ply").warnings, "\n")
     assert.matches('not read: the list "flags" of its faces', warnings, 1, true)
     assert.matches('not read: the 1 elements "edge"', warnings, 1, true)
@@ -238,7 +238,7 @@ describe("attributes that a glTF file names by itself", function()
     check("own.glb", 1e-5)
   end)
 
-  it("are told where they are no numbers and no vectors of three", function()
+  it("are reported if they are neither numbers nor vectors of three", function()
     scene.folder:write("own.bin", bytes "floats")
     scene.folder:write("own.gltf", document('"uri": "own.bin", ', "floats"))
     local result = scene.command("check", [[

@@ -9,7 +9,7 @@ return rapid.create { fps = 24 } :points("read", function(p) local _ = p.birthti
 end
 
 describe("points that are a function of the frame", function()
-  it("bear on the parabola of their places and velocities, without beads", function()
+  it("emit evenly along the parabola through their positions and velocities", function()
     local points = run([[rapid.points.from { P = {{3 * frame.time, 5 * frame.time ^ 2, 0}},
       v = {{3, 10 * frame.time, 0}} }]], 'rate = 480, birth = "even", inherit_velocity = 0')[13]
     assert.equal(240, #points)
@@ -20,7 +20,7 @@ describe("points that are a function of the frame", function()
     end
   end)
 
-  it("bear on it without velocities too, from the third frame on", function()
+  it("emit along it without velocities too, from the third frame on", function()
     local points = run("rapid.points.from { P = {{3 * frame.time, 5 * frame.time ^ 2, 0}} }",
       'rate = 480, birth = "even", inherit_velocity = 0')[13]
     for i = 1, #points do
@@ -69,7 +69,7 @@ describe("points that are a function of the frame", function()
 end)
 
 describe("points with a transform", function()
-  it("bear along the motion", function()
+  it("emit along the motion", function()
     local points = scene.run([[
 local turning = rapid.points.from { P = {{1, 0, 0}} }
   :transform(function(frame) return rapid.rotate({0, 0, 1}, 360 * frame.time) end)

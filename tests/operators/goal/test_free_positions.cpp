@@ -21,7 +21,7 @@ std::vector<Vec3d> random_positions(std::size_t n, unsigned seed)
 
 }  // namespace
 
-TEST_CASE("places are taken as a search of all would: the nearest of those with the fewest takers", "[goal]")
+TEST_CASE("positions are chosen as by a full search: the nearest of those with the fewest points", "[goal]")
 {
     const std::size_t n = GENERATE(1, 2, 7, 100, 513);
     CAPTURE(n);
@@ -40,7 +40,7 @@ TEST_CASE("places are taken as a search of all would: the nearest of those with 
     }
 }
 
-TEST_CASE("who is nowhere takes some place all the same", "[goal]")
+TEST_CASE("a point without a finite position still gets a target", "[goal]")
 {
     FreePositions free(random_positions(5, 3), std::vector<std::uint32_t>(5));
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();

@@ -143,7 +143,7 @@ describe("a pin's place that is a function of the frame is one of time:", functi
     end
   end)
 
-  it("what a rod hangs on it follows with its error told", function()
+  it("points on a rod follow it, and their error is estimated", function()
     local nodes = [[:group { name = "hook", where = function(p) return p.id == 0 end } :gravity {}
       :pin { group = "hook", target = function(f) return {0.3 * math.sin(9 * f.time), 1, 0} end }
       :distance { pairs = {{1, 2}} } :solve { substeps = 4 }]]

@@ -49,7 +49,7 @@ TEST_CASE("a plane's points are those with normal · x = offset, for a normal of
     CHECK_THAT(at.gradient, close_to(n, 1e-15));
 }
 
-TEST_CASE("a plane across an axis has that axis for its normal, to the bit", "[analytic]")
+TEST_CASE("the normal of a plane across an axis is exactly that axis", "[analytic]")
 {
     CHECK(query(make_plane({0, 3, 0}, 0), {1, 2, 3}).gradient == Vec3d(0, 1, 0));
     CHECK(query(make_plane({0, 0, -0.1}, 0), {1, 2, 3}).gradient == Vec3d(0, 0, -1));

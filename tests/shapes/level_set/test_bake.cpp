@@ -103,7 +103,7 @@ TEST_CASE("an empty grid bakes to one that is outside everywhere", "[level set]"
     CHECK(BakedSampler(baked).distance({1, 2, 3}) >= 1.0);
 }
 
-TEST_CASE("distances of many points are to the bit those of each", "[level set]")
+TEST_CASE("distances of many points are bit-identical to those of single points", "[level set]")
 {
     const auto shape = GENERATE(0, 1);
     const auto sphere = level_set_sphere(1, {0.3, -0.2, 5}, {0.05, 3});

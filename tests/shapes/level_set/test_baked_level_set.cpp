@@ -80,7 +80,7 @@ int winding_number(const Mesh& mesh, const Vec3d& P)
 
 }  // namespace
 
-TEST_CASE("a level set of a mesh is to the bit what is baked from its OpenVDB grid", "[level set][baked]")
+TEST_CASE("a level set of a mesh is bit-identical to one baked from its OpenVDB grid", "[level set][baked]")
 {
     int measured = 0;  // the others are baked from the grid anyway
     rc::prop("", [&] {
@@ -98,7 +98,7 @@ TEST_CASE("a level set of a mesh is to the bit what is baked from its OpenVDB gr
     CHECK(measured > 30);
 }
 
-TEST_CASE("spheres, boxes and tori are to the bit what is baked from their OpenVDB grids", "[level set][baked]")
+TEST_CASE("spheres, boxes and tori are bit-identical to those baked from their OpenVDB grids", "[level set][baked]")
 {
     rc::prop("", [] {
         const Vec3d center = (*rc::gen::inRange(0, 3) == 0 ? 3000.0 : 1.0) * any_place(1.5);
@@ -129,7 +129,7 @@ TEST_CASE("a level set of a mesh is negative where the winding number is not 0",
     });
 }
 
-TEST_CASE("the grid and the surface of a level set are made once, whoever asks", "[level set][baked][threads]")
+TEST_CASE("the grid and the surface of a level set are built once for all threads", "[level set][baked][threads]")
 {
     std::vector<std::string> warnings;
     const LevelSetPtr shape = level_set_from_mesh(make_torus(0.8, 0.3, 40, Vec3d::Zero()), {0.03, 3}, warnings);
@@ -148,7 +148,7 @@ TEST_CASE("the grid and the surface of a level set are made once, whoever asks",
     CHECK(surfaces[0]->openness().closed());
 }
 
-TEST_CASE("a level set whose grid could not be made is asked for it again", "[level set][baked]")
+TEST_CASE("a level set builds its grid again after a failure", "[level set][baked]")
 {
     int queries = 0;
     const auto grid = [&]() -> LevelSetGridPtr {

@@ -80,7 +80,7 @@ TEST_CASE("births in a fog are as many at each voxel as its density says, spread
     }
 }
 
-TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
+TEST_CASE("a tile of a fog emits as its voxels would", "[density_grid]")
 {
     const DensityFolder folder;
     const auto grid = fog();
@@ -100,7 +100,7 @@ TEST_CASE("a tile of a fog bears as its voxels would", "[density_grid]")
     for (int axis = 0; axis < 3; ++axis) CHECK(std::abs(sum[axis] / double(in_tile) - 3.5) < 5 * deviation);
 }
 
-TEST_CASE("what is no fog is an error that says what is, and what is in the file", "[density_grid]")
+TEST_CASE("a file without a fog is an error that lists the grids of the file", "[density_grid]")
 {
     const DensityFolder folder;
     const auto one = fog("smoke"), other = fog("heat"), negative = fog(), empty = fog();

@@ -148,7 +148,7 @@ TEST_CASE("vectors that are all alike are so everywhere that a point reaches", "
         CHECK((Vec3f(value->x(), value->y(), value->z()) - Vec3f(1, -2, 0.5f)).norm() < 1e-6f);
 }
 
-TEST_CASE("a fog and a vector grid in one file are read again to the bit", "[grid_of_points]")
+TEST_CASE("a fog and a vector grid in one file are read back bit-identical", "[grid_of_points]")
 {
     const test::TemporaryFolder folder;
     const Cloud cloud = random_cloud(500, 0.3);

@@ -229,7 +229,7 @@ TEST_CASE("a piece turned inwards inside another is a cavity, and one inside tha
     CHECK(warnings.size() == (mesh->signed_volume() < 0 ? 1 : 0));
 }
 
-TEST_CASE("a piece turned inwards beside the others is solid, and pieces that overlap are one", "[level set]")
+TEST_CASE("a separate piece turned inwards is solid, and overlapping pieces are one", "[level set]")
 {
     std::vector<std::string> warnings;
     const auto pair = level_set_from_mesh(

@@ -63,7 +63,7 @@ std::vector<double> distances(const Shape& shape)
 
 }  // namespace
 
-TEST_CASE("a level set read back from its file is the same to the bit", "[level set][file]")
+TEST_CASE("a level set read back from its file is bit-identical", "[level set][file]")
 {
     const LevelSetFolder folder;
     const auto torus = level_set_torus(0.8, 0.3, {0.1, 0.2, 0.3}, {0.05, 3});
@@ -245,7 +245,7 @@ TEST_CASE("a level set that a full disk has no room for is an error, and nothing
     CHECK(test::file_names(disk.folder().path()).empty());
 }
 
-TEST_CASE("a level set that can't be written says where, and leaves nothing behind", "[level set][file]")
+TEST_CASE("a level set that can't be written reports the path and leaves no file", "[level set][file]")
 {
     const LevelSetFolder folder;
     const auto sphere = level_set_sphere(1, Vec3d::Zero(), {0.2, 3});

@@ -281,7 +281,7 @@ end_header
     CHECK_THAT(Cd[3], close_to(Vec3f{0.2f, 0.2f, 0.2f}, 1e-6));
 }
 
-TEST_CASE("a glTF mesh stands where its node puts it", "[mesh][read]")
+TEST_CASE("a glTF mesh is placed by the transform of its node", "[mesh][read]")
 {
     const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const std::string buffer = base64(std::string(reinterpret_cast<const char*>(corners), sizeof corners));

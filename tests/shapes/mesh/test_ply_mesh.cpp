@@ -47,7 +47,7 @@ TEST_CASE("an index without a vertex is an error that names the face", "[mesh][p
     CHECK(folder.error(square_file("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; there are 4, from 0");
 }
 
-TEST_CASE("elements before and behind the vertices are passed over", "[mesh][ply]")
+TEST_CASE("elements before and after the vertices are skipped", "[mesh][ply]")
 {
     const PlyFolder folder;
     const MeshPtr mesh = folder.read(

@@ -94,7 +94,7 @@ TEST_CASE("neighbouring frames share position and velocity where they meet", "[p
     CHECK_THAT(one.derivative(1), close_to(next.derivative(0), 1e-14));
 }
 
-TEST_CASE("a point at rest has the velocity 0 to the bit, whatever the ends", "[path]")
+TEST_CASE("a point at rest has exactly the velocity 0, whatever the ends", "[path]")
 {
     const Vec3d P(0.1, 1e5 / 3, -7e-9);
     for (const FramePath& path :

@@ -96,7 +96,7 @@ TEST_CASE("a ball that moves by more than its size between files meets points wh
     CHECK_THAT(contact.n, close_to(n, 0.5 * voxel / ball_radius + std::numbers::pi / 96));
 }
 
-TEST_CASE("at both ends of an interval a deforming level set is that of the mesh there, to the bit", "[deforming]")
+TEST_CASE("at both ends of an interval a deforming level set is bit-identical to that of the mesh", "[deforming]")
 {
     const Body ball = fast_ball();
     Deformation deformation(ball.level_set(voxel));

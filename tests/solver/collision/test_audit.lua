@@ -63,7 +63,7 @@ describe("the audit of collisions", function()
     assert.near(0, sum.lost, 1e-6)
   end)
 
-  it("has what a method makes of the energy: what the points have gained is what it added less what it took", function()
+  it("balances: the energy gained by the points is what the method added minus what it removed", function()
     for _, method in ipairs { "continuous", "project", "backtrack" } do
       local sum = audit("P = {{0, 1, 0}, {3, 0.5, 0}}, v = {{0, 0, 0}, {0.5, 3, 0}}",
         (":gravity {} :collide { shape = rapid.shape.plane {}, bounce = 1, method = %q } :solve {}"):format(method), 97)

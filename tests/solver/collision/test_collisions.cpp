@@ -199,7 +199,7 @@ TEST_CASE("an oblique impact loses μ (1 + ε) |vn| of its tangential speed", "[
     CHECK_THAT(scene.v(), close_to(Vec3d(3 - 0.25 * 1.5 * 4, 2, 0), 1e-6));
 }
 
-TEST_CASE("the bounces that a rest leaves out would have taken as much by friction", "[collide]")
+TEST_CASE("the bounces that a rest skips would have lost as much by friction", "[collide]")
 {
     // Dropped with a tangential speed: once with a frame long enough to come to rest, once with frames of one bounce
     // each.
@@ -492,7 +492,7 @@ TEST_CASE("a point that is born in a shape leaves it by the shortest way, withou
     CHECK(scene.last.trapped == 0);
 }
 
-TEST_CASE("deep inside, where there is no gradient, a point goes back the way that it came", "[collide]")
+TEST_CASE("deep inside, without a gradient, a point returns along its path", "[collide]")
 {
     Scene scene(points({{0, 0.25f, 0}, {0, 0.25f, 0}}).v({{0, 0, -2}, {0, 0, 0}}));
     scene.gravity({0, 0, 1}).collide(std::make_shared<NarrowBall>(1, 0.1), 0.0f).run(1);

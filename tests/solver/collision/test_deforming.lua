@@ -91,7 +91,7 @@ return rapid.create { fps = 24, points = two }
 end)
 
 describe("a mesh as a collider", function()
-  it("is refused, with what to take", function()
+  it("is refused, with the shape to use instead", function()
     local message = scene.error [[
 return rapid.create { fps = 24, points = two } :collide { shape = rapid.mesh.box {} } :solve {}]]
     assert.truthy(message:find("use rapid.levelset.from_mesh(mesh, { voxel = 0.02 })", 1, true), message)

@@ -71,7 +71,7 @@ describe("a level set's cube", function()
     end
   end)
 
-  it("holds what lies exactly on it, to the bit", function()
+  it("holds points that lie exactly on it, bit-identical", function()
     local points = run(":gravity {} " .. cube, "P = {{0, 1, 0}, {1, 0, 0}, {0.5, 1, 0.5}}", 25)
     assert.equal(1, points[25][1].P.y)
     assert.equal(0.5, points[25][3].P.x)

@@ -16,7 +16,7 @@ local function statistics(text, frames)
 end
 
 describe("the limit of impacts", function()
-  it("ends a jam of points at two thousand impacts of each, counts it and tells", function()
+  it("ends a jam after two thousand impacts of a point, and reports it", function()
     local stats, result = statistics(lid, "1-24")
     local impacts, limits = 0, 0
     for _, frame in ipairs(stats.frames) do
@@ -28,7 +28,7 @@ describe("the limit of impacts", function()
     assert.matches("were stopped for the rest of it", result.stderr)
   end)
 
-  it("lets what is jammed rest where it is", function()
+  it("leaves jammed points at rest", function()
     local result = scene.run(lid, { frames = {12, 24} })
     for frame = 12, 24 do
       for i = 1, 4 do assert.near(result[12][i].P, result[frame][i].P, 1e-6) end

@@ -104,7 +104,7 @@ describe("a wall that moves", function()
   -- x = x0 cosh ωt + u/ω sinh ωt. The Coriolis force, 2 ω x', exceeds the lifting force, ω² y, so the bead leaves at
   -- the end of the rod. Within a voxel of the end the field's normals turn, and one facet after another seems to
   -- release it.
-  it("bears what seems to part from the last voxel of a face, up to its end", function()
+  it("supports points near the edge of the last voxel of a face", function()
     local rate, height, reach = math.rad(30), 0.05, 1.25
     for _, pressed in ipairs { 1.2, 2 } do -- multiples of the lifting force
       local u = pressed * rate * height / 2
@@ -139,7 +139,7 @@ describe("a wall that moves", function()
     end
   end)
 
-  it("keeps outside what is born in a body that turns about a place beside it, in few contacts", function()
+  it("moves points out that are born in a body turning about a point outside it, in few contacts", function()
     local points = run([[:collide { bounce = 1, record = 0, cut = {},
       shape = rapid.shape.sphere { radius = 0.147, center = {-0.063, 0.063, -0.063} },
       transform = function(frame) return rapid.rotate({0, 0, 1}, 152 * frame.time) end }]],

@@ -26,7 +26,7 @@ TEST_CASE("the contact tolerance grows with the coordinates that are rounded, an
     CHECK(obstacle.contact_tolerance({0, 0, 0}, 2) == 0x1p-21);
 }
 
-TEST_CASE("the largest radius is that of the points that are asked about", "[obstacle]")
+TEST_CASE("the largest radius is that of the queried points", "[obstacle]")
 {
     const PointSet set = points({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}).set<float>("pscale", {0.5f, 2, 1});
     const ShapeCollider plane(make_plane({0, 1, 0}, 0));

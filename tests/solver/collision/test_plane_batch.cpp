@@ -18,7 +18,7 @@ void add(PlaneBatch& batch, const Vec3d& P, const Vec3d& v, const Vec3d& a = {0,
     batch.add(static_cast<std::uint32_t>(batch.size()), P, v, a, /*dt=*/0.5, {0, /*bounce=*/0.5, /*friction=*/0.25});
 }
 
-TEST_CASE("a batch tells which points miss a plane, slide on it and bounce off it once", "[plane]")
+TEST_CASE("a batch distinguishes points that miss a plane, slide on it and bounce off it once", "[plane]")
 {
     PlaneBatch batch;
     add(batch, {0, 10, 0}, {1, 0, 0});             // does not descend in time

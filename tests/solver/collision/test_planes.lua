@@ -46,7 +46,7 @@ describe("a point that rests on a plane", function()
     end
   end)
 
-  it("stays where the action bears less than its weight", function()
+  it("stays if the action lifts less than its weight", function()
     for _, height in ipairs(lifted(-1, 64, 13, 20, 3)) do assert.near(0, height, 2e-5) end
   end)
 end)
@@ -63,7 +63,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = P } }
       { frames = {10, 10} })[10]
   end
 
-  it("come to the same places as the sub-steps are doubled", function()
+  it("reach the same positions when the substeps are doubled", function()
     local differences, last = {}, positions(16)
     for k, substeps in ipairs { 32, 64, 128, 256 } do
       local now, largest = positions(substeps), 0

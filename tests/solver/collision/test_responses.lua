@@ -116,7 +116,7 @@ describe("record", function()
     assert.equal(0, result[2][1].hittotal)
   end)
 
-  it("leaves out contacts that are slower than it says, and names the collider", function()
+  it("skips contacts below the given speed, and names the collider", function()
     local result = scene.run([[
 return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 2, 0}, {5, 0.1, 0}} } } :gravity {}
   :collide { shape = rapid.shape.sphere { radius = 0.1, center = {9, 9, 9} } }
@@ -133,7 +133,7 @@ return rapid.create { fps = 24, points = rapid.points.from { P = {{0, 2, 0}, {5,
 end)
 
 describe("a collide node", function()
-  it("refuses what it does not know", function()
+  it("refuses unknown values", function()
     local function message(options)
       local text = "return rapid.create {} :collide { shape = rapid.shape.plane {}, %s } :solve {}"
       return scene.error(text:format(options))

@@ -40,7 +40,7 @@ TEST_CASE("sliding friction stops a point after v/(μ g)", "[slide]")
 
 // The point is so slow that friction turns within the shortest piece. The final velocity of a piece uses the mean of
 // the accelerations at both ends, as along curved surfaces.
-TEST_CASE("a slow point goes where it is pulled, and not to and fro across the pull", "[slide]")
+TEST_CASE("a slow point moves in the direction of the pull, and not back and forth across it", "[slide]")
 {
     const double excess = GENERATE(0.02, 0.1), turn = GENERATE(0.5, 1.5, 2.5);  // m/s² over friction; rad
     CAPTURE(excess, turn);
@@ -60,7 +60,7 @@ TEST_CASE("a slow point goes where it is pulled, and not to and fro across the p
     CHECK_THAT(v, close_to(Vec3d(excess * time, 0, 0), 2 * speed));
 }
 
-TEST_CASE("a surface does not bear a point that is pulled off it, or that it falls away from", "[slide]")
+TEST_CASE("a surface does not support a point that is pulled off it, or that it falls away from", "[slide]")
 {
     CHECK(slide_on(support({0, 1, 0}, 0), {1, 0, 0}, {0, g, 0}, 1, 0).kind == Slide::Leaves);
     Support ball = support({0, 1, 0}, 0);

@@ -18,7 +18,7 @@ end
 
 local landing = math.sqrt(2 * 0.4 / g) -- from y = 0.5
 
-describe("what sticks", function()
+describe("a point that sticks", function()
   it("stays where it is on a disc that turns, for ten seconds", function()
     for _, degrees in ipairs { 30, 400 } do
       for _, substeps in ipairs { 1, 3 } do
@@ -113,7 +113,7 @@ describe("what sticks", function()
   end)
 
   -- A plate whose corners move as {x (1 + 0.02 f), y, z} turned by 8 degrees a frame.
-  it("keeps its place on the faces of a mesh that deforms", function()
+  it("keeps its position on the faces of a deforming mesh", function()
     local frames = 40
     local function at(frame, x, y, z)
       local angle = math.rad(8 * (frame - 1))

@@ -34,7 +34,7 @@ PointSet column(std::size_t n, float r, float mass)
     return points(at).set<float>("pscale", std::vector<float>(n, r)).set<float>("mass", std::vector<float>(n, mass));
 }
 
-TEST_CASE("the k-th grain of a column from its top bears (2k - 1) m g in two contacts", "[contact_forces]")
+TEST_CASE("the k-th grain of a column from its top carries (2k - 1) m g in two contacts", "[contact_forces]")
 {
     const std::size_t n = 8;
     const double mass = 0.3;
@@ -73,7 +73,7 @@ TEST_CASE("a grain that slides on a slope is held back by mu m g cos", "[contact
     CHECK(friction(scene) == Approx(0.2 * g * std::cos(angle)).epsilon(1e-5));
 }
 
-TEST_CASE("the sides of a smooth groove bear m g / sqrt 2 each", "[contact_forces]")
+TEST_CASE("each side of a smooth groove carries m g / sqrt 2", "[contact_forces]")
 {
     const double root = std::sqrt(2.0);
     Granular scene(points({{0, static_cast<float>(0.1 * root), 0}}).set<float>("pscale", {0.1f}));
@@ -114,7 +114,7 @@ TEST_CASE("an oblique impact is recorded by its impulses, on both points", "[con
     CHECK(normal(scene, 1) == Approx(normal(scene, 0)));
 }
 
-TEST_CASE("beside a rod a contact is recorded once, by any number of iterations", "[contact_forces]")
+TEST_CASE("next to a rod a contact is recorded once, by any number of iterations", "[contact_forces]")
 {
     const int iterations = GENERATE(1, 2, 8);
     CAPTURE(iterations);
@@ -136,7 +136,7 @@ TEST_CASE("beside a rod a contact is recorded once, by any number of iterations"
     }
 }
 
-TEST_CASE("beside a rod friction is recorded once, and its work too, by any number of iterations", "[contact_forces]")
+TEST_CASE("next to a rod friction and its work are recorded once, by any number of iterations", "[contact_forces]")
 {
     const auto impact = [](int iterations, double& force) {
         Granular scene(points({{-0.15f, 0, 0}, {0.15f, 0, 0}, {5, 0, 0}, {6, 0, 0}})

@@ -31,7 +31,7 @@ describe("record of contact", function()
     assert.equal(9, contacts)
   end)
 
-  it("makes no attribute where nobody asks", function()
+  it("makes no attribute without record = true", function()
     assert.falsy(pcall(function() return run("record = false")[1].normalforce end))
   end)
 

@@ -114,7 +114,8 @@ TEST_CASE("mass scaling takes six sevenths off the compression of a tall stack, 
     CHECK(worst_of(1) < worst_of(0) / 6);
 }
 
-TEST_CASE("with mass scaling contacts of a stack bear at most m g / (2 sinh(k/2)), as in the closed form", "[contacts]")
+TEST_CASE("with mass scaling contacts of a stack carry at most m g / (2 sinh(k/2)), as in the closed form",
+          "[contacts]")
 {
     const std::size_t n = 12;
     const double k = GENERATE(0.5, 1.0, 2.0);
@@ -394,7 +395,7 @@ TEST_CASE("a heavy point on a light one on a floor that moves goes as it does on
     });
 }
 
-TEST_CASE("what a point rests on bears those that press it too, and has its velocity", "[contacts]")
+TEST_CASE("the support of a point carries its load, and has its velocity", "[contacts]")
 {
     const std::array<std::uint8_t, 3> support = {255, 0, 0};
     const std::array<Vec3d, 3> support_v = {Vec3d(1, 2, 3), Vec3d::Zero(), Vec3d::Zero()};

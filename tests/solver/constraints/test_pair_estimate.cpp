@@ -57,7 +57,7 @@ void check_estimate(Spheres spheres, double factor)
 
 }  // namespace
 
-TEST_CASE("the number of pairs is told before they are found, for points evenly and unevenly spread", "[contacts]")
+TEST_CASE("the number of pairs is estimated before the search, for evenly and unevenly spread points", "[contacts]")
 {
     const double scatter = GENERATE(0.001, 0.1, 1, 2);
     CAPTURE(scatter);
@@ -71,7 +71,7 @@ TEST_CASE("the number of pairs is told before they are found, for points evenly 
     check_estimate(std::move(clump), 1.3);
 }
 
-TEST_CASE("the number of pairs of two sizes of points is told, too", "[contacts]")
+TEST_CASE("the number of pairs of two sizes of points is estimated, too", "[contacts]")
 {
     Spheres two;
     two.add(50, 1, 0.5f, 4);

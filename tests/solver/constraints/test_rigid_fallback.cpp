@@ -185,7 +185,7 @@ TEST_CASE("a body without a solution goes as a surface that accelerates and draw
     }
 }
 
-TEST_CASE("a body without a solution goes along with what drives it", "[rigid_fallback]")
+TEST_CASE("a body without a solution moves with its driver", "[rigid_fallback]")
 {
     Body body(3, 5, false);
     RigidFallback fallback;

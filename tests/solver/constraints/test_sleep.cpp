@@ -249,7 +249,7 @@ TEST_CASE("a point that slides slowly, or that no force acts on, does not fall a
     CHECK(floats.last.asleep == 0);
 }
 
-TEST_CASE("a sleeper wakes under a larger load, and bears it", "[sleep]")
+TEST_CASE("a sleeper wakes under a larger load, and supports it", "[sleep]")
 {
     Granular scene = asleep_on_floor({{0, r, 0}});
     scene.sleep().run(12);

@@ -239,7 +239,7 @@ TEST_CASE("a heap of spinning grains gains no energy, and comes to rest", "[spin
     for (std::size_t i = 0; i < 64; ++i) CHECK(scene.w(i).isZero(0));
 }
 
-TEST_CASE("what turns in one place does not sleep", "[spin]")
+TEST_CASE("a point that turns in place does not sleep", "[spin]")
 {
     Spinning scene(points({{0, 0.1f, 0}}).set<float>("pscale", {0.1f}).set<Vec3f>("w", {Vec3f(0, 5, 0)}));
     scene.gravity().floor(0, 0.5f).substeps(4).sleep().run(48);

@@ -173,7 +173,7 @@ return rapid.create { points = rapid.points.from { P = P, v = v } } :gravity {}
     assert.truthy(found[1].position_max > 0)
   end)
 
-  it("the error of a frame is told, within a factor of four, in the 1st, 2nd, 4th, 8th, ... and each 40th", function()
+  it("the error of a frame is estimated within a factor of four in frames 1, 2, 4, 8, ... and each 40th", function()
     local run = scene.command("run", text:format(4), "-f 1-42 --stats stats.json")
     assert.equal(0, run.status, run.stderr)
     assert.match("\nerror    from substeps: [^\n]+, in one frame %(7 of 42 estimated%); not estimated: the sum " ..

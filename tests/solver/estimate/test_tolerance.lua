@@ -189,7 +189,7 @@ describe("the error of a run", function()
     end
   end)
 
-  it("is told in the summary", function()
+  it("is reported in the summary", function()
     local _, summary = reported "substeps = 4"
     assert.match("error    estimated: [^\n]*all[%a ]* within [%d.]+ %S*m\n", summary)
   end)

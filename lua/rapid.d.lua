@@ -914,7 +914,7 @@ function Node:emit(params) end
 
 ---@class rapid.params.fade_by_age
 ---@field attribute? string  float attribute that is written [name of a number attribute, default "pscale", constant]
----@field first? number|fun(frame: rapid.Frame): number  value at birth [number, default 1]
+---@field first? number|fun(frame: rapid.Frame): number  value at birth; for pscale a radius in metres [number, default 1]
 ---@field hold? number|fun(frame: rapid.Frame): number  fraction of the life before the change begins [number, from 0 to 0.999, default 0]
 ---@field last? number|fun(frame: rapid.Frame): number  value at death [number, default 0]
 ---@field group? string  limits the node to the points of this group [string, constant]

@@ -10,7 +10,7 @@ return rapid.node {
   doc  = "Changes an attribute over the life of each point.",
   params = {
     attribute = { "write_number", default = "pscale", doc = "float attribute that is written" },
-    first     = { "float", default = 1, doc = "value at birth" },
+    first     = { "float", default = 1, doc = "value at birth; for pscale a radius in metres" },
     last      = { "float", default = 0, doc = "value at death" },
     hold      = { "float", default = 0, min = 0, max = 0.999, doc = "fraction of the life before the change begins" },
   },

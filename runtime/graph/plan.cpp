@@ -163,6 +163,13 @@ void warn_of_units(const Plan& plan, std::vector<std::string>& warnings)
                     warn(fmt::format("pscale = {} is a radius in metres, larger than the source; give a smaller one",
                                      describe(*pscale)));
             }
+        if (node.type->name == "fade_by_age" && !node.arguments.count("first")) {
+            const auto attribute = node.arguments.find("attribute");
+            const std::string* name =
+                attribute == node.arguments.end() ? nullptr : attribute->second.get<std::string>();
+            if (!name || *name == "pscale")
+                warn("sets pscale to 1 at birth, which is a radius of 1 m; give first, such as first = 0.02");
+        }
         const auto life = node.arguments.find("life");
         if (life == node.arguments.end() || !node.type->has(Stage::Emission)) continue;
         const double fps = plan.simulations[planned.simulation].fps;

@@ -242,6 +242,15 @@ describe("a warning", function()
     expect("pscale = 4 is a radius in metres, larger than the source; give a smaller one",
       warnings(chain:format "attributes = { pscale = 4 }"))
     expect("life = 48 is in seconds; if frames are meant, divide by 24", warnings(chain:format "life = 48"))
+    local fading = "return rapid.create { points = rapid.points.from { P = {{0, 1, 0}}, life = {2}, Alpha = {1} } } "
+      .. ":fade_by_age { %s } :solve {}"
+    for _, given in ipairs { "", "attribute = 'pscale', hold = 0.5" } do
+      expect("sets pscale to 1 at birth, which is a radius of 1 m; give first, such as first = 0.02",
+        warnings(fading:format(given)))
+    end
+    for _, given in ipairs { "first = 1", "attribute = 'Alpha'" } do
+      assert.equal("", warnings(fading:format(given)))
+    end
     assert.equal("", warnings(chain:format "life = {1, 20}, attributes = { Cd = {12, 1, 0}, pscale = 0.5 }"))
   end)
 

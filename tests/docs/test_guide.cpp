@@ -20,7 +20,7 @@ TEST_CASE("each scene of the guide emits points and names its camera", "[docs]")
 {
     const std::string text = test::read_text(test::project / "docs/guide.md");
     const auto scenes = test::matches(text, std::regex(R"re(\n```lua (\w+\.lua)\n([^`]*)```)re"));
-    REQUIRE(scenes.size() == 5);
+    REQUIRE(scenes.size() == 6);
     for (const auto& scene : scenes) {
         CAPTURE(scene[1]);
         const test::TemporaryFolder folder;

@@ -40,7 +40,7 @@ local function check_whole(least, most)
 end
 
 local function not_finite(name, x)
-  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe.value(x)), 0)
+  error(("%s became %s; a float must be between -3.4e38 and 3.4e38"):format(name, describe.value(x)), 0)
 end
 
 local function load_number(data, k) return tonumber(data[k]) end

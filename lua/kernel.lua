@@ -103,7 +103,7 @@ local function wrong_type(name, expected, value)
   error(("attribute %q takes %s, not %s%s"):format(name, expected, describe.value(value), remedy), 0)
 end
 local function not_finite(name, value)
-  error(("%s became %s; a float is finite, within 3.4e38 either way"):format(name, describe.value(value)), 0)
+  error(("%s became %s; a float must be between -3.4e38 and 3.4e38"):format(name, describe.value(value)), 0)
 end
 local function not_whole(name, value)
   error(("attribute %q takes a whole number, not %s"):format(name, describe.value(value)), 0)

@@ -130,7 +130,7 @@ function Program:compute(state, op, a, b, depth)
 end
 
 function Program:compare(op, a, b)
-  if a.kind ~= "number" or b.kind ~= "number" then give_up "it compares what are no numbers" end
+  if a.kind ~= "number" or b.kind ~= "number" then give_up "it compares values that are not numbers" end
   local x, y = constant_of(self, a), constant_of(self, b)
   if x and y then
     if op == "Less" then return x < y elseif op == "LessOrEqual" then return x <= y else return x == y end

@@ -52,13 +52,13 @@ public:
                                       const KernelArguments& arguments, const Before& before) const;
     bool kills() const { return analysis_.kills; }
 
-    // Returns its action inside Solve, at every sub-step, on the points of `group`.
+    // Returns its action inside Solve, at every substep, on the points of `group`.
     std::shared_ptr<const Action> action(const std::string& group, const Evaluation& now,
                                          const KernelArguments& arguments) const;
 
     // Adds its uses, including the names that its node declares.
     void uses(Uses& uses, const KernelArguments& arguments) const;
-    // Adds its uses as an action, in which `force` is the sub-step's force and not an attribute.
+    // Adds its uses as an action, in which `force` is the substep's force and not an attribute.
     void uses_in_action(Uses& uses, const KernelArguments& arguments) const;
 
     int numbers_of(const std::string& attribute) const override

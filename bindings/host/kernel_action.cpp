@@ -1,4 +1,4 @@
-// Runs kernels inside Solve: actions, at every sub-step.
+// Runs kernels inside Solve: actions, at every substep.
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_pass.h"
 #include "bindings/host/script_host.h"

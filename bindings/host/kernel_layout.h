@@ -29,7 +29,7 @@ struct KernelLayout {
     void settle(const PointSet& points, bool mask);
 
     // Turns a settled layout into that of an action: P and v are in double inside Solve, and the force is the
-    // sub-step's.
+    // substep's.
     void settle_action(bool reads_force, bool writes_force);
 
 private:

@@ -61,7 +61,7 @@ struct Points {
 };
 RAPID_NODE(Points);
 
-// action: does the same inside Solve, at every sub-step (paper §2.3).
+// action: does the same inside Solve, at every substep (paper §2.3).
 struct ScriptAction {
     std::string group;
     std::shared_ptr<const Kernel> kernel;

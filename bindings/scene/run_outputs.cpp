@@ -60,7 +60,7 @@ SceneReport report_of(const Snapshot& snapshot)
     std::vector<HeldBytes> kept;
     for (const auto& [name, state] : snapshot.simulations) {
         simulations[name] = state.size();
-        kept.push_back({name, state.size(), "points, ids and what is adopted"});
+        kept.push_back({name, state.size(), "points, ids and adopted ids"});
     }
     for (const auto& [name, state] : snapshot.nodes) {
         nodes[name] = state.size();

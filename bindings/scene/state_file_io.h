@@ -55,7 +55,8 @@ T read_state_file(const std::string& path, const char* what, const std::string& 
     const StateFile file(path);
     const CheckedJson& header = file.header();
     if (header.at("what") != what)
-        throw Error(fmt::format("it holds the {}; it must hold the {}", header.at("what").get<std::string>(), what));
+        throw Error(
+            fmt::format("it contains the {}; it must contain the {}", header.at("what").get<std::string>(), what));
     require_this_build(header.at("build").get<std::string>());
     require_key(header, key);
     T value;

@@ -364,7 +364,7 @@ void ViewRequests::send_point(const Json& json, const PendingRequest& request)
     });
 }
 
-// Sends a point's path: its positions in all frames in memory, with speed, error and sub-steps.
+// Sends a point's path: its positions in all frames in memory, with speed, error and substeps.
 void ViewRequests::send_path(const Json& json, const PendingRequest& request) const
 {
     const auto id = json.at("id").get<std::int64_t>();

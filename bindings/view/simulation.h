@@ -1,6 +1,6 @@
 // The simulation in a viewer: a scene that is run again whenever something changes, or the files of a sequence.
 //
-// Each run has its own thread and Scene. A change abandons the run: its scripts and the sub-steps of Solve end within
+// Each run has its own thread and Scene. A change abandons the run: its scripts and the substeps of Solve end within
 // the frame (SceneHooks::stop), while the next run has already begun. At most two runs end at the same time; then the
 // next one waits.
 #pragma once

@@ -1,4 +1,4 @@
-// Cancels a run from another thread, also within loops: they check at each chunk of points and at each sub-step.
+// Cancels a run from another thread, also within loops: they check at each chunk of points and at each substep.
 #pragma once
 
 #include <atomic>

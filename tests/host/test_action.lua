@@ -181,7 +181,7 @@ end) :solve {}]], { frames = {1, 2} })
   it("names the node, the line, the point and the frame", function()
     for body, expected in pairs {
       ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
-      ["p.v = p.v / 0"] = "v became vec3(nan, nan, nan); a float is finite, within 3.4e38 either way",
+      ["p.v = p.v / 0"] = "v became vec3(nan, nan, nan); a float must be between -3.4e38 and 3.4e38",
       ["error 'no'"] = "no",
       ["local x = step.number"] = 'the step has no "number"; it has time, dt, index and detail',
       ["local t = step.nothing.x"] = 'the step has no "nothing"; it has time, dt, index and detail',

@@ -224,7 +224,7 @@ describe("an error in a detail function", function()
       ["points[1].N = vec3(1, 0, 0)"] = 'no attribute "N"; add :attribute{ N = {0, 0, 0} } before it',
       ["points:max 'colour'"] = 'no attribute "colour"; the colour of points is Cd',
       ["points[1].heat = vec3(0, 0, 0)"] = 'attribute "heat" takes a number, not vec3(0, 0, 0)',
-      ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float is finite, within 3.4e38 either way",
+      ["points[1].P = vec3(1 / 0, 0, 0)"] = "P became vec3(inf, 0, 0); a float must be between -3.4e38 and 3.4e38",
       ["points[1].id = 3"] = "id is read-only",
       ["points:add { id = 3 }"] = "id is read-only",
       ["points:add { dt = 0.1 }"] =

@@ -36,12 +36,12 @@ local at_a_point = {
   ["p.heat = p.P"] = 'attribute "heat" takes a number, not vec3(0, 1, 0)',
   ["p.heat = {}"] = 'attribute "heat" takes a number, not a table',
   ["p.heat = p.heat > 0"] = 'attribute "heat" takes a number, not true',
-  ["p.heat = math.sqrt(-p.heat)"] = "heat became nan; a float is finite, within 3.4e38 either way",
-  ["p.heat = 1 / (p.heat - 1)"] = "heat became inf; a float is finite, within 3.4e38 either way",
-  ["p.heat = 10 ^ 39"] = "heat became 1e+39; a float is finite, within 3.4e38 either way",
+  ["p.heat = math.sqrt(-p.heat)"] = "heat became nan; a float must be between -3.4e38 and 3.4e38",
+  ["p.heat = 1 / (p.heat - 1)"] = "heat became inf; a float must be between -3.4e38 and 3.4e38",
+  ["p.heat = 10 ^ 39"] = "heat became 1e+39; a float must be between -3.4e38 and 3.4e38",
   ["p.v = 1"] = 'attribute "v" takes a vec3, not 1',
   ["p.v = {0, 1, 0}"] = 'attribute "v" takes a vec3, not a table; vec3(x, y, z) makes one',
-  ["p.v = p.P / 0"] = "v became vec3(nan, inf, nan); a float is finite, within 3.4e38 either way",
+  ["p.v = p.P / 0"] = "v became vec3(nan, inf, nan); a float must be between -3.4e38 and 3.4e38",
   ["p.v = p.v + 1"] = "can't compute vec3(0, 0, 0) + 1; both must be a vec3",
   ["p.v = p.v * nil"] = "can't compute vec3(0, 0, 0) * nil; the other must be a number or a vec3",
   ["p.v.x = 1"] = read_only,
@@ -58,7 +58,7 @@ local at_a_point = {
   ["p.heat = 2 * p"] = "p is the point; use one of its attributes, such as p.v",
   ["p.heat = p()"] = "p is the point; use one of its attributes, such as p.v",
   ["p.v = vec3(3e38, 3.5e38, 0)"] =
-    "v became vec3(3e+38, 3.5e+38, 0); a float is finite, within 3.4e38 either way",
+    "v became vec3(3e+38, 3.5e+38, 0); a float must be between -3.4e38 and 3.4e38",
   ["p.heat = p:rand()"] = "p:rand needs the index of the random number, not nil",
   ["p.heat = frame.nubmer"] = 'the frame has no "nubmer"; it has number, time, dt and detail',
   ["frame.number = 3"] = read_only,
@@ -110,8 +110,8 @@ return rapid.create { points = rapid.points.grid { size = {30, 30, 30}, spacing 
     if p.id % 5000 == 4711 then p.v = p.v / 0 end
   end) :solve {}]]
     for _, threads in ipairs { 1, 4 } do
-      assert.equal('scene.lua:3: node "kernel": v became vec3(nan, nan, nan); a float is finite, within 3.4e38 ' ..
-        "either way (point id 4711, frame 2; P = {-9.5, -7.5, -13.5}, v = {0, 0, 0})",
+      assert.equal('scene.lua:3: node "kernel": v became vec3(nan, nan, nan); a float must be between -3.4e38 ' ..
+        "and 3.4e38 (point id 4711, frame 2; P = {-9.5, -7.5, -13.5}, v = {0, 0, 0})",
         (scene.error(text, { threads = threads }):gsub("%-nan", "nan")))
     end
   end)

@@ -67,7 +67,7 @@ TEST_CASE("a frame of another key, and a file of another kind, are errors that n
     CHECK_FALSE(SceneInside::load_frame(folder.write("text", "no frame"), ""));
     good(good(scene.save()).write(folder / "snapshot"));
     CHECK_THAT(SceneInside::load_frame(folder / "snapshot", "").error().message,
-               Contains("it holds the snapshot of a scene"));
+               Contains("it contains the snapshot of a scene"));
 
     const std::string whole = test::file_text(folder / "frame");
     for (std::size_t at = 8; at < whole.size(); at += 61) {

@@ -129,8 +129,8 @@ TEST_CASE("a file that holds no shapes is an error that names it", "[shapes]")
     Scene scene = opened(resting);
     good(SceneInside::save(good(scene.advance()), folder / "frame", ""));
     const SceneError other = SceneInside::load_shapes(folder / "frame").error();
-    CHECK_THAT(other.text(),
-               StartsWith((folder / "frame").string() + ": it holds the frame of a scene; it must hold the shapes"));
+    CHECK_THAT(other.text(), StartsWith((folder / "frame").string() +
+                                        ": it contains the frame of a scene; it must contain the shapes"));
     CHECK_FALSE(SceneInside::load_shapes(folder / "missing"));
     CHECK_FALSE(SceneInside::load_shapes(folder.write("text", "no shapes")));
     CHECK_FALSE(SceneInside::save(SceneShapes(), folder / "text/below"));

@@ -248,7 +248,8 @@ void read_faces(PlyFile& file, const PlyElement& face, MeshFile& mesh)
         corners.clear();
         for (const std::int64_t corner : list) {
             if (corner < 0 || corner >= vertices)
-                throw Error(fmt::format("face {} has the vertex {}; there are {}, from 0", row, corner, vertices));
+                throw Error(
+                    fmt::format("face {} has the vertex {}; the mesh has {}, numbered from 0", row, corner, vertices));
             corners.push_back(static_cast<std::int32_t>(corner));
         }
         // A face with one or two corners is a point or a line and has no surface.

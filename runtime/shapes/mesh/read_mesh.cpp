@@ -35,8 +35,8 @@ void check(const MeshFile& file)
     const auto vertices = static_cast<std::int64_t>(file.positions.size());
     for (const Mesh::Triangle& t : file.triangles)
         if (t.minCoeff() < 0 || t.maxCoeff() >= vertices)
-            throw Error(
-                fmt::format("a face has the vertices {}, {} and {}; there are {}, from 0", t[0], t[1], t[2], vertices));
+            throw Error(fmt::format("a face has the vertices {}, {} and {}; the mesh has {}, numbered from 0", t[0],
+                                    t[1], t[2], vertices));
 }
 
 // Returns true if corners of the same vertex have different values.

@@ -42,9 +42,11 @@ std::string square_file(const std::string& faces, const std::string& body)
 TEST_CASE("an index without a vertex is an error that names the face", "[mesh][ply]")
 {
     const PlyFolder folder;
-    CHECK(folder.error(square_file("1", "3 0 1 1000000\n")) == "face 0 has the vertex 1000000; there are 4, from 0");
-    CHECK(folder.error(square_file("2", "3 0 1 2\n3 0 1 4\n")) == "face 1 has the vertex 4; there are 4, from 0");
-    CHECK(folder.error(square_file("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; there are 4, from 0");
+    CHECK(folder.error(square_file("1", "3 0 1 1000000\n")) ==
+          "face 0 has the vertex 1000000; the mesh has 4, numbered from 0");
+    CHECK(folder.error(square_file("2", "3 0 1 2\n3 0 1 4\n")) ==
+          "face 1 has the vertex 4; the mesh has 4, numbered from 0");
+    CHECK(folder.error(square_file("1", "3 0 1 -1\n")) == "face 0 has the vertex -1; the mesh has 4, numbered from 0");
 }
 
 TEST_CASE("elements before and after the vertices are skipped", "[mesh][ply]")

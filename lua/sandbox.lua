@@ -97,12 +97,23 @@ local function safe_format(format, ...)
 end
 jit.off(safe_format) -- unpack is not compiled: its loop would be, in vain
 
--- Returns a message of the compiler with a remedy if it is likely that a comma or a bracket is missing.
-local function with_remedy(message)
+-- Returns the remedy for a message of the compiler, or nil: a missing comma, bracket or colon.
+local function remedy_for(message)
   local bracket, near = message:match "'([})])' expected.* near '([^']+)'$"
-  if not bracket then return message end
-  if near == "<eof>" then return ("%s; a %s is missing before the end of the file"):format(message, bracket) end
-  return near:find "^[%w_\"{]" and ("%s; is a comma missing before %s?"):format(message, near) or message
+  if bracket then
+    if near == "<eof>" then return ("a %s is missing before the end of the file"):format(bracket) end
+    if near == ":" then return ("is a %s missing before the colon?"):format(bracket) end
+    if bracket == ")" and near:find "^[=,]" then return "values and vectors have braces: { size = {4, 1, 4} }" end
+    return near:find "^[%w_\"{]" and ("is a comma missing before %s?"):format(near)
+  end
+  if message:find("function arguments expected near", 1, true) then return "are braces {} missing after the name?" end
+  near = message:match "'<eof>' expected near '([%a_][%w_]*)'$"
+  return near and ("is a colon missing before %s?"):format(near)
+end
+
+local function with_remedy(message)
+  local remedy = remedy_for(message)
+  return remedy and ("%s; %s"):format(message, remedy) or message
 end
 
 -- native.read_module(name) returns the text and the chunk name of a module next to the graph, or nil and the searched

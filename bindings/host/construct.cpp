@@ -79,7 +79,9 @@ void check_named(const Table& options)
     const Value* value = !options.list.empty()       ? &options.list.front()
                          : !options.numbered.empty() ? &options.numbered.begin()->second
                                                      : nullptr;
-    if (value) throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}", describe(*value)));
+    if (!value) return;
+    const char* const hint = value->get<double>() ? "; a vector is {x, y, z}, and a number has no comma" : "";
+    throw Error(fmt::format("{} has no name; write {{ NAME = value, ... }}{}", describe(*value), hint));
 }
 
 void refuse_in_kernels(const State& state, const std::string& what, const std::string& remedy)

@@ -102,7 +102,9 @@ void bind_arguments(const Node& node, Operator& op, const FrameClock& clock, con
     if (only_changing) return;
     for (const Param& param : node.type->params) {
         if (node.arguments.count(param.name)) continue;
-        if (param.required) throw Error(fmt::format("{} is missing: {}", param.name, param.doc));
+        if (param.required)
+            throw Error(
+                fmt::format("{} is missing: {} (a name without a value counts as missing)", param.name, param.doc));
         if (!param.fallback.is_nil()) param.assign(param, op.fields(), param.fallback);
     }
 }

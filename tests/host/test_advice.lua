@@ -128,6 +128,16 @@ describe("a message", function()
     expect('did you mean "rate"?', fault(emit:format "rat = 1"))
   end)
 
+  it("explains numbers without a name, and names without a value", function()
+    local emit = "return rapid.create {} :emit { source = %s, rate = %s, attributes = { pscale = %s } } :solve {}"
+    expect("0 has no name; write { NAME = value, ... }; a vector is {x, y, z}, and a number has no comma",
+      fault(emit:format("{0, 1.5, 0}", "2,000", "0.1")))
+    expect("attributes: 15 has no name; write { NAME = value, ... }, and numbers without a comma",
+      fault(emit:format("{0, 1.5, 0}", "2000", "0,015")))
+    expect("source is missing: object that emits the points (a name without a value counts as missing)",
+      fault(emit:format("sky", "2000", "0.1")))
+  end)
+
   it("knows what other programs call a parameter", function()
     local emit = "return rapid.create {} :emit { source = {0, 1.5, 0}, %s } :solve {}"
     expect('unknown parameter "color"; the color of points is Cd: attributes = { Cd = {1, 1, 1} }',
@@ -145,6 +155,11 @@ describe("a message", function()
     expect("scene.lua:2: '}' expected (to close '{' at line 1) near 'life'; is a comma missing before life?",
       fault "return rapid.create {} :emit { source = POINTS, rate = 9\n life = 2 } :solve {}")
     expect("a } is missing before the end of the file", fault "return rapid.create { fps = 24")
+    expect("is a } missing before the colon?", fault "return rapid.create { fps = 24 :solve {}")
+    expect("values and vectors have braces", fault "return rapid.create {} :gravity ( strength = 5 ) :solve {}")
+    expect("values and vectors have braces", fault "return rapid.create { fps = (24, 1) } :solve {}")
+    expect("are braces {} missing after the name?", fault "return rapid.create {} :gravity :solve {}")
+    expect("is a colon missing before solve?", fault "return rapid.create {} solve {}")
     scene.folder:write("forgotten.lua", "return rapid.create {} :solve {}\n")
     expect([[attempt to index global 'rapid' (a nil value); begin the file with: local rapid = require "rapid"]],
       scene.error "require 'forgotten'")

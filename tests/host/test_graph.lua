@@ -130,7 +130,7 @@ return %s]]
       ["rapid.create {} :gravity(5)"] = ":gravity needs a table of parameters: :gravity{ ... }",
       ["rapid.create(24)"] = ":create needs a table of parameters: :create{ ... }",
       ["rapid.create {} :gravity { 0, -9.81, 0 }"] = 'node "gravity1": 0 has no name; write ' ..
-        "{ NAME = value, ... }",
+        "{ NAME = value, ... }; a vector is {x, y, z}, and a number has no comma",
       ["rapid.create {} :gravity { { 0, 1, 0 } }"] = 'node "gravity1": {0, 1, 0} has no name; ' ..
         "write { NAME = value, ... }",
       ["rapid.create {} :gravity({}, {})"] = ":gravity takes only one table of parameters",
@@ -138,7 +138,8 @@ return %s]]
       ["rapid.create {} :points(function() end)"] = ":points needs a name and a function, or a table { name = ..., " ..
         "kernel = ... }",
       ["rapid.create {} :points { name = 'k' }"] =
-        'node "k": kernel is missing: function of a point, function(p, frame)',
+        'node "k": kernel is missing: function of a point, function(p, frame) (a name without a value counts as ' ..
+        "missing)",
       ["rapid.create {} :points { name = 'k', kernel = 3 }"] = 'node "k": kernel = 3 has the wrong type; ' ..
         "it must be a function of a point",
       ["rapid.create {} :merge()"] = ":merge needs another node: a:merge(b)",

@@ -63,7 +63,8 @@ TEST_CASE("a group of no points is a group", "[group][extreme]")
 
 TEST_CASE("a group needs a name", "[group]")
 {
-    CHECK(error_of([] { NodeTest("group", {}); }) == "name is missing: name of the group");
+    CHECK(error_of([] { NodeTest("group", {}); }) ==
+          "name is missing: name of the group (a name without a value counts as missing)");
     CHECK(error_of([] { NodeTest("group", {{"name", ""}}); }) == "name = \"\" is empty; give the group a name");
 }
 

@@ -103,7 +103,10 @@ void read_value(const Param& param, const Value& value, BirthValues& field)
     field.of.clear();
     if (value.is_nil()) return;
     const Table* table = value.table();
-    if (!table || !table->list.empty() || !table->numbered.empty()) wrong_type(param, value);
+    if (!table || !table->numbered.empty()) wrong_type(param, value);
+    if (!table->list.empty())
+        throw Error(fmt::format("{}: {} has no name; write {{ NAME = value, ... }}, and numbers without a comma",
+                                param.name, describe(table->list.front())));
     for (const auto& [name, given] : table->named) {
         Param one = param;
         one.name = name;

@@ -7,6 +7,7 @@
 
 #include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
+#include "runtime/graph/step_shape.h"
 #include "runtime/solver/changing.h"
 #include "runtime/solver/placed_constraint.h"
 
@@ -112,6 +113,8 @@ void FrameCurve::move_to(std::int64_t step, const FrameClock& clock)
     if (coordinates == 0) {
         changes_ = !same(begin_, end_);
         known_.erase(known_.begin(), known_.lower_bound(step));
+        if (changes_) begin_ = in_step(param_, begin_, clock, clock.at_step(step - 1));
+        end_ = in_step(param_, end_, clock, clock.at_step(step));
         return;
     }
 

@@ -30,6 +30,20 @@ local slab = rapid.levelset.from_mesh(rapid.mesh.read "slab.####.obj", { voxel =
 
 local function height(time) return rise * (fps * time) ^ 2 end
 
+describe("a force", function()
+  it("follows a moving shape that a function of the frame returns, also if a number changes with time", function()
+    local function position(shape)
+      local result = scene.run(plate .. ([[
+return rapid.create { fps = 24, points = rapid.points.from { P = {{0.3, 1, 0}} } }
+  :attract { shape = %s, strength = function(frame) return 2 + frame.time end, falloff = 0 }
+  :solve { substeps = 3 }]]):format(shape), { frames = {8, 8} })
+      return result[8][1].P
+    end
+    local constant, called = position "plate", position "function() return plate end"
+    for _, axis in ipairs { "x", "y", "z" } do assert.equal(constant[axis], called[axis]) end
+  end)
+end)
+
 describe("a spring", function()
   -- x'' = -w² (x - u t) from x(0) = 0 at rest: x = u t - u sin(w t) / w
   it("to a plane that rises uniformly follows its closed form, at any step", function()

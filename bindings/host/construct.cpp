@@ -60,9 +60,12 @@ int take_offer(State& state)
     refuse_in_kernels(state, "rapid.host", "get it once outside");
     if (lua_type(state.lua(), 1) != LUA_TSTRING)
         throw Error("rapid.host needs the name of an object that the program offers: rapid.host \"floor\"");
+    static const Offers none;
     return construct(state, [&] {
-        const auto& offers = state.host().options().offers;
-        return (offers ? *offers : Offers()).object(text_at(state.lua(), 1));
+        const auto& given = state.host().options().offers;
+        const Offers& offers = given ? *given : none;
+        const std::string name = text_at(state.lua(), 1);
+        return state.is_loaded() ? offers.object_of_frame(name) : offers.object(name);
     });
 }
 

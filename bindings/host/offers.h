@@ -13,10 +13,20 @@
 namespace rapid {
 
 struct Offers {
-    std::map<std::string, ObjectPtr> objects;  // changes only between frames, on the scene's thread
+    // Change only between frames, on the scene's thread.
+    std::map<std::string, ObjectPtr> objects;
+    std::map<std::string, ObjectPtr> in_motion;  // replace them in functions of the frame
     std::vector<NodeType> node_types;
 
-    // Throws Error if there is none of this name, and lists the existing names.
+    // Returns the object for a function of the frame, which may be the state of a moving one (StateInMotion). Throws
+    // Error as object() does.
+    const ObjectPtr& object_of_frame(const std::string& name) const
+    {
+        const auto found = in_motion.find(name);
+        return found != in_motion.end() ? found->second : object(name);
+    }
+
+    // Returns the object at rest. Throws Error if there is none of this name, and lists the existing names.
     const ObjectPtr& object(const std::string& name) const
     {
         if (const auto found = objects.find(name); found != objects.end()) return found->second;

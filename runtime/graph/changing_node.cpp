@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "runtime/base/at_node.h"
+#include "runtime/base/in_motion.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/step_shape.h"
 #include "runtime/solver/changing.h"
@@ -43,9 +44,11 @@ std::vector<double> numbers_of(const Value& value)
     return numbers;
 }
 
-// Compares values that are not numbers.
+// Compares values that are not numbers. The state of a moving object equals any value, because its user follows the
+// object through the step.
 bool same(const Value& a, const Value& b)
 {
+    if (in_motion(b.object<Object>())) return true;
     const AttributeRef *attribute = a.get<AttributeRef>(), *other = b.get<AttributeRef>();
     if (attribute && other) return attribute->name == other->name;
     const ObjectPtr *object = a.get<ObjectPtr>(), *another = b.get<ObjectPtr>();

@@ -245,9 +245,10 @@ bool is_moving_shape(const Object& object)
            dynamic_cast<const AnimatedMesh*>(&object) || dynamic_cast<const LevelSetSequence*>(&object);
 }
 
-std::shared_ptr<const StepShape> step_shape(const ObjectPtr& object, const FrameClock& clock, const Frame& frame)
+std::shared_ptr<const StepShape> step_shape(const ObjectPtr& given, const FrameClock& clock, const Frame& frame)
 {
     const Step step{clock, clock.step_at(frame)};
+    const ObjectPtr moving = in_motion(given), object = moving ? moving : given;
     const ShapePtr shape = shape_in_step(object, step);
     if (!shape) return nullptr;
     if (step.is_start()) return std::make_shared<StepShape>(shape, 0, 0);

@@ -69,6 +69,8 @@ void read_value(const Param& param, const Value& value, ColliderShape& shape)
         shape = {animated->rest(), nullptr, animated->motion()};
     else if (const auto deforming = value.object<DeformingLevelSet>())
         shape.deforming = deforming;
+    else if (const auto body = in_motion<DeformingLevelSet>(value.object<LevelSet>()))
+        shape.deforming = body;
     else if (const auto moving = value.object<AnimatedMesh>())
         refuse_mesh(param, value, *moving->rest());
     else if (const auto mesh = value.object<Mesh>())

@@ -69,8 +69,11 @@ struct EmitSource {
 void read_value(const Param& param, const Value& value, EmitSource& field)
 {
     const Table* list = value.table();
-    if (!value.get<Vec3d>() && !(list && list->list.size() == 3 && list->list.front().get<double>()))
-        return rapid::read_value(param, value, field.object);
+    if (!value.get<Vec3d>() && !(list && list->list.size() == 3 && list->list.front().get<double>())) {
+        rapid::read_value(param, value, field.object);
+        if (const auto moving = in_motion<AnimatedMesh>(field.object)) field.object = moving;
+        return;
+    }
     Vec3f position;
     rapid::read_value(param, value, position);
     auto points = std::make_shared<PointsObject>();

@@ -68,28 +68,40 @@ struct FromMesh : Grid {
         Grid::declare(declaration);
         return declaration;
     }
-    // Returns one level set for the same mesh and options, however often it is requested.
     ObjectPtr make(MakeContext& context) const
+    {
+        if (mesh.moving) return moving_shape(mesh.moving, context);
+        const auto state = std::dynamic_pointer_cast<const MeshOfFrame>(mesh.still);
+        const auto moving = in_motion<AnimatedMesh>(state);
+        const auto body =
+            moving ? std::dynamic_pointer_cast<const DeformingLevelSet>(moving_shape(moving, context)) : nullptr;
+        return made_once(mesh.still, [&]() -> ObjectPtr {
+            return body ? body->of(*state) : level_set_from_mesh(mesh.still, options(), context.warnings);
+        });
+    }
+
+private:
+    ObjectPtr moving_shape(const std::shared_ptr<const AnimatedMesh>& moving, MakeContext& context) const
+    {
+        return made_once(moving, [&]() -> ObjectPtr {
+            if (moving->deforms()) return std::make_shared<DeformingLevelSet>(moving, options(), context.warnings);
+            return std::make_shared<AnimatedShape>(level_set_from_mesh(moving->rest(), options(), context.warnings),
+                                                   moving->motion());
+        });
+    }
+
+    // Returns one result for the same mesh and options, however often it is requested.
+    template <class F>
+    ObjectPtr made_once(const ObjectPtr& from, const F& build) const
     {
         static std::mutex mutex;
         static Made made;
-        const ObjectPtr from = mesh.moving ? ObjectPtr(mesh.moving) : ObjectPtr(mesh.still);
         const std::lock_guard lock(mutex);
         std::erase_if(made, [](const auto& entry) { return entry.second.result.expired(); });
         MadeFromMesh& known = made[{from.get(), voxel, half_width}];
         ObjectPtr result = known.result.lock();
-        if (!result || known.mesh.lock() != from) known = {from, result = build(context)};
+        if (!result || known.mesh.lock() != from) known = {from, result = build()};
         return result;
-    }
-
-private:
-    ObjectPtr build(MakeContext& context) const
-    {
-        if (!mesh.moving) return level_set_from_mesh(mesh.still, options(), context.warnings);
-        if (mesh.moving->deforms())
-            return std::make_shared<DeformingLevelSet>(mesh.moving, options(), context.warnings);
-        return std::make_shared<AnimatedShape>(level_set_from_mesh(mesh.moving->rest(), options(), context.warnings),
-                                               mesh.moving->motion());
     }
 };
 RAPID_MAKER(FromMesh);

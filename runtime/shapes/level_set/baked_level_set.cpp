@@ -26,6 +26,15 @@ BakedLevelSet::BakedLevelSet(BakedGrid baked, std::uint64_t active_voxels, Sourc
 {
 }
 
+BakedLevelSet::BakedLevelSet(const std::shared_ptr<const BakedLevelSet>& same, ObjectPtr moving)
+    : baked_(same->baked_),
+      active_voxels_(same->active_voxels_),
+      source_(same->source_),
+      same_(same),
+      moving_(std::move(moving))
+{
+}
+
 const LevelSetGridPtr& BakedLevelSet::grid() const { return computed_once(grid_mutex_, grid_, source_.grid); }
 
 MeshPtr BakedLevelSet::surface() const

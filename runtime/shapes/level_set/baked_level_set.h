@@ -8,6 +8,7 @@
 #include <string>
 
 #include "runtime/base/deferred.h"
+#include "runtime/base/in_motion.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/level_set/baked_grid.h"
 #include "runtime/shapes/level_set/level_set.h"
@@ -45,6 +46,7 @@ RAPID_DEFERRED(write_level_set_grid,
                void(const LevelSetGrid& grid, const std::filesystem::path& path, const std::string& name));
 
 class BakedLevelSet final : public ShapeOf<BakedLevelSet, LevelSet>,
+                            public StateInMotion,
                             public std::enable_shared_from_this<BakedLevelSet> {
 public:
     // Functions that recreate the data that the baked grid lacks.
@@ -54,6 +56,9 @@ public:
     };
 
     BakedLevelSet(BakedGrid baked, std::uint64_t active_voxels, Source source);
+    // Creates the same level set as a state of a moving one. It shares the grid with `same`, and keeps it alive.
+    BakedLevelSet(const std::shared_ptr<const BakedLevelSet>& same, ObjectPtr moving);
+    ObjectPtr in_motion() const override { return moving_; }
 
     BakedSampler sampler() const { return BakedSampler(*baked_); }
     Box3d bounds() const override { return sampler().bounds(); }
@@ -77,6 +82,8 @@ private:
     std::shared_ptr<const BakedGrid> baked_;  // shared with the scatters of this level set
     std::uint64_t active_voxels_;
     Source source_;
+    std::shared_ptr<const BakedLevelSet> same_;
+    ObjectPtr moving_;
     mutable std::mutex grid_mutex_, surface_mutex_;
     mutable LevelSetGridPtr grid_;
     mutable MeshPtr surface_;

@@ -18,6 +18,8 @@ public:
     // Return the range of frames in which the mesh may change.
     virtual double begins() const = 0;
     virtual double ends() const = 0;
+    // Returns true if the mesh is given by time, so that that of a frame depends on the clock.
+    virtual bool depends_on_clock() const = 0;
     // Returns true if there is a mesh at this frame.
     virtual bool has(std::int64_t frame) const = 0;
     // Returns the mesh at a step of the clock. Thread-safe.

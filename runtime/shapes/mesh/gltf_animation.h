@@ -24,6 +24,7 @@ public:
     const MeshPtr& rest() const override { return rest_; }
     double begins() const override { return -std::numeric_limits<double>::infinity(); }
     double ends() const override { return std::numeric_limits<double>::infinity(); }
+    bool depends_on_clock() const override { return true; }
     bool has(std::int64_t) const override { return true; }
     MeshPtr at(const FrameClock& clock, std::int64_t frame) const override;
 

@@ -13,6 +13,9 @@ namespace {
 // The spline of a frame and the jumps around it need six meshes. Two more serve the next frame.
 constexpr std::size_t max_recent_meshes = 8;
 
+// The spline to the last frame, and the search for a jump to the frame before, need four meshes.
+constexpr std::size_t max_meshes_in_memory = 4;
+
 // Corners of one vertex may differ by this fraction of the mesh's size, because of an exporter's rounding.
 constexpr double same_corner = 1e-6;
 
@@ -22,12 +25,12 @@ MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::stri
     : files_(std::move(files)), name_(std::move(name)), order_(order)
 {
     if (files_.empty()) throw Error(fmt::format("there is no mesh file \"{}\" at any frame", name_));
+    order_.first = files_.begin()->first;
+    order_.last = files_.rbegin()->first;
     for (int frame = first(); frame < last(); ++frame)
         if (!files_.count(frame))
             throw Error(fmt::format("frame {} of \"{}\" is missing; each frame from {} to {} needs a file", frame,
                                     name_, first(), last()));
-    order_.first = first();
-    order_.last = last();
     const MeshFile file = read_mesh_file(files_.begin()->second);
     corners_ = file.positions.size();
     faces_ = file.triangles.size();
@@ -36,10 +39,27 @@ MeshSequence::MeshSequence(std::map<int, std::filesystem::path> files, std::stri
     recent_.emplace_front(first(), rest_);
 }
 
+MeshSequence::MeshSequence(MeshPtr rest, std::map<int, MeshPtr> meshes)
+    : meshes_(std::move(meshes)), name_(rest->name), rest_(std::move(rest))
+{
+    order_.first = meshes_.begin()->first;
+    order_.last = meshes_.rbegin()->first;
+}
+
+void MeshSequence::append(int frame, MeshPtr mesh)
+{
+    if (frame != last() + 1) meshes_ = {{frame - 1, meshes_.rbegin()->second}};
+    meshes_[frame] = std::move(mesh);
+    if (meshes_.size() > max_meshes_in_memory) meshes_.erase(meshes_.begin());
+    order_.first = meshes_.begin()->first;
+    order_.last = frame;
+}
+
 MeshPtr MeshSequence::at(std::int64_t frame) const
 {
     const std::int64_t nearest = std::clamp<std::int64_t>(frame - order_.offset, first(), last());
     const int held = static_cast<int>(order_.file_of(frame).value_or(nearest));
+    if (!meshes_.empty()) return meshes_.at(held);
     const std::lock_guard lock(mutex_);
     const auto found =
         std::find_if(recent_.begin(), recent_.end(), [&](const auto& kept) { return kept.first == held; });

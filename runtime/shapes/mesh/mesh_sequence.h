@@ -1,7 +1,7 @@
-// A deforming mesh: one file per frame, all with the same vertices and faces in the same order.
+// A deforming mesh: one file or one mesh in memory per frame, all with the same vertices and faces in the same order.
 //
 // FrameSequence determines the mesh beyond the first and last frame. Files are read when first needed, and the most
-// recent few stay cached.
+// recent few stay cached. Meshes in memory are added frame by frame.
 #pragma once
 
 #include <cstdint>
@@ -23,14 +23,23 @@ public:
     // Reads the first file. `name`: the pattern, for messages. order: first and last are replaced by those of the
     // files. Throws Error if there are no files, if a frame is missing in between, or if read_mesh() does.
     MeshSequence(std::map<int, std::filesystem::path> files, std::string name, FrameSequence order = {});
+    // Holds meshes of consecutive frames, at least one, with the faces of `rest`.
+    MeshSequence(MeshPtr rest, std::map<int, MeshPtr> meshes);
+
+    // Adds the mesh of a frame after last(), with the faces of rest(). If frames are left out, the mesh rests until the
+    // frame before, and its motion begins there. Meshes that no path to this frame depends on are dropped. Must not be
+    // called while the sequence is in use.
+    void append(int frame, MeshPtr mesh);
+    const std::map<int, MeshPtr>& meshes() const { return meshes_; }  // in memory
 
     const std::string& name() const { return name_; }
-    int first() const { return files_.begin()->first; }  // frame of the first file
-    int last() const { return files_.rbegin()->first; }
+    int first() const { return static_cast<int>(order_.first); }  // first frame that has a file or a mesh
+    int last() const { return static_cast<int>(order_.last); }
     const FrameSequence& order() const { return order_; }
-    const MeshPtr& rest() const override { return rest_; }  // mesh of the first file
+    const MeshPtr& rest() const override { return rest_; }  // the first mesh ever
     double begins() const override { return order_.begins(); }
     double ends() const override { return order_.ends(); }
+    bool depends_on_clock() const override { return false; }
 
     // Returns true if the sequence has a mesh at this frame.
     bool has(std::int64_t frame) const override { return order_.file_of(frame).has_value(); }
@@ -44,9 +53,10 @@ private:
     MeshPtr read(int frame) const;
 
     std::map<int, std::filesystem::path> files_;
+    std::map<int, MeshPtr> meshes_;  // instead of files
     std::string name_;
     FrameSequence order_;
-    std::size_t corners_, faces_;          // in each file
+    std::size_t corners_ = 0, faces_ = 0;  // in each file
     std::vector<std::int32_t> vertex_of_;  // maps corners to vertices
     MeshPtr rest_;
 

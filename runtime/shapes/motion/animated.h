@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/base/in_motion.h"
 #include "runtime/shapes/mesh/deforming_mesh.h"
 #include "runtime/shapes/motion/motion.h"
 #include "runtime/shapes/shape.h"
@@ -28,6 +29,8 @@ public:
     const MeshPtr& rest() const { return rest_; }  // mesh of the first file of a sequence, without the motion
     const MotionPtr& motion() const { return motion_; }
     FrameRange range() const;
+    // Returns true if the mesh at a frame depends on the rate of the clock, or on its start.
+    bool depends_on_clock() const { return motion_->varies() || (deforming_ && deforming_->depends_on_clock()); }
 
     // Returns true if there is a mesh at a whole frame. A sequence may have none beyond its files.
     bool has(std::int64_t frame) const { return !deforming_ || deforming_->has(frame); }
@@ -47,6 +50,22 @@ private:
     MeshPtr rest_;
     DeformingMeshPtr deforming_;  // null if the mesh does not deform
     MotionPtr motion_;
+};
+
+// The mesh of one frame of a moving mesh.
+class MeshOfFrame : public Mesh, public StateInMotion {
+public:
+    MeshOfFrame(const Mesh& mesh, std::shared_ptr<const AnimatedMesh> moving, std::int64_t frame)
+        : Mesh(mesh), moving_(std::move(moving)), frame_(frame)
+    {
+    }
+
+    ObjectPtr in_motion() const override { return moving_; }
+    std::int64_t frame() const { return frame_; }
+
+private:
+    std::shared_ptr<const AnimatedMesh> moving_;
+    std::int64_t frame_;
 };
 
 class AnimatedShape : public Object {

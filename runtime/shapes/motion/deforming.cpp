@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "runtime/base/error.h"
+#include "runtime/shapes/level_set/baked_level_set.h"
 #include "runtime/shapes/motion/cubic_part.h"
 #include "runtime/shapes/motion/deforming_shape.h"
 
@@ -44,10 +45,17 @@ LevelSetPtr DeformingLevelSet::at(const FrameClock& clock, std::int64_t frame, d
     const std::lock_guard lock(built_->mutex);
     auto& by_frame = built_->by_frame;
     std::erase_if(by_frame, [](const auto& entry) { return entry.second.expired(); });
-    std::weak_ptr<const LevelSet>& known = by_frame[{clock.fps, clock.start, frame}];
+    const bool by_clock = mesh_->depends_on_clock();
+    std::weak_ptr<const LevelSet>& known = by_frame[{by_clock ? clock.fps : 0, by_clock ? clock.start : 0, frame}];
     LevelSetPtr level_set = known.lock();
     if (!level_set || !(level_set->band() >= band)) known = level_set = build(mesh_->at(clock, frame), band);
     return level_set;
+}
+
+LevelSetPtr DeformingLevelSet::of(const MeshOfFrame& mesh) const
+{
+    const auto same = std::static_pointer_cast<const BakedLevelSet>(at({}, mesh.frame(), 0));
+    return std::make_shared<BakedLevelSet>(same, shared_from_this());
 }
 
 LevelSetPtr DeformingLevelSet::build(const MeshPtr& mesh, double band) const

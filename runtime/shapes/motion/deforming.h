@@ -22,7 +22,7 @@ namespace rapid {
 
 struct TriangleTree;
 
-class DeformingLevelSet : public Object {
+class DeformingLevelSet : public Object, public std::enable_shared_from_this<DeformingLevelSet> {
 public:
     static constexpr std::string_view param_type = "deforming level set";
 
@@ -43,6 +43,8 @@ public:
     // Returns the level set of a whole frame. Reuses one that is still in use and has a wide enough band: several nodes
     // share those of a body. Thread-safe unless the motion is a script.
     LevelSetPtr at(const FrameClock& clock, std::int64_t frame, double band) const;
+    // Returns the level set of a mesh of this body, as the state of the body at its frame.
+    LevelSetPtr of(const MeshOfFrame& mesh) const;
     const std::shared_ptr<const TriangleTree>& tree() const { return tree_; }
 
 private:
@@ -52,7 +54,7 @@ private:
     Mesh::Openness open_;  // same for all frames
     std::shared_ptr<const TriangleTree> tree_;
 
-    // Level sets in use, by fps, start and frame.
+    // Level sets in use, by fps, start and frame; fps and start are 0 if the mesh does not depend on them.
     struct Built {
         std::mutex mutex;
         std::map<std::tuple<double, std::int64_t, std::int64_t>, std::weak_ptr<const LevelSet>> by_frame;

@@ -49,6 +49,24 @@ TEST_CASE("a sequence has each frame's vertices, and holds its first and last fi
     CHECK(sequence.at(4)->triangles == sequence.rest()->triangles);
 }
 
+TEST_CASE("a sequence in memory has the meshes that were appended last, and holds them outside", "[mesh]")
+{
+    const auto mesh_of = [](int frame) { return make_sphere(frame, 4, Vec3d::Zero()); };
+    MeshSequence sequence(mesh_of(1), {{7, mesh_of(7)}});
+    for (int frame = 8; frame <= 12; ++frame) sequence.append(frame, mesh_of(frame));
+    CHECK(sequence.last() == 12);
+    CHECK(sequence.first() <= 9);  // the spline from 11 to 12 and the jumps around it need the meshes from 9 on
+    for (const int frame : {9, 10, 11, 12}) CHECK(apex(*sequence.at(frame)) == Approx(frame));
+    CHECK(apex(*sequence.at(100)) == Approx(12));
+    CHECK(apex(*sequence.at(-100)) == Approx(sequence.first()));
+    CHECK(apex(*sequence.rest()) == Approx(1));
+
+    sequence.append(20, mesh_of(20));  // it rested until frame 19
+    CHECK(sequence.first() == 19);
+    CHECK(apex(*sequence.at(19)) == Approx(12));
+    CHECK(apex(*sequence.at(20)) == Approx(20));
+}
+
 TEST_CASE("the file of a frame is the one that walking there step by step ends at", "[mesh][sequence]")
 {
     using Beyond = FrameSequence::Beyond;

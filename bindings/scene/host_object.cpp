@@ -62,6 +62,8 @@ ObjectPtr make_mesh(const HostMesh& mesh, const std::string& name)
     auto made = std::make_shared<Mesh>();
     made->name = name;
     if (mesh.triangles.empty()) throw Error("it has no triangles");
+    made->positions.reserve(mesh.positions.size());
+    made->triangles.reserve(mesh.triangles.size());
     for (const auto& [x, y, z] : mesh.positions) {
         if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z))
             throw Error(fmt::format("position {} is not finite", made->positions.size()));

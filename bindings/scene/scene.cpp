@@ -140,7 +140,9 @@ Result<Done> Scene::set(const std::vector<std::pair<std::string, SceneValue>>& v
 Result<Done> Scene::offer(const std::string& name, const HostObject& object)
 {
     return impl_->call(SceneError::WrongCall, [&] {
-        impl_->offers->objects[name] = make_object(name, object, impl_->options.guard_callbacks);
+        const ObjectPtr made = make_object(name, object, impl_->options.guard_callbacks);
+        impl_->offers->objects[name] = made;
+        impl_->offered_meshes.offer(name, made, impl_->next);
         impl_->node_results_frame.reset();  // its functions may change it
         return Done();
     });
@@ -185,6 +187,7 @@ Result<SceneSnapshot> Scene::save()
         if (!impl_->has_advanced) refuse("no frame has been computed; call advance() first");
         auto data = std::make_shared<SceneSnapshot::Data>();
         data->snapshot = impl_->evaluator->save();
+        data->meshes = impl_->offered_meshes.save();
         data->file = impl_->file;
         data->nodes = impl_->hash_of_nodes();
         return SceneSnapshot(std::move(data));
@@ -202,6 +205,7 @@ Result<Done> Scene::restore(const SceneSnapshot& snapshot)
             impl_->evaluator.reset();
             throw;
         }
+        impl_->offered_meshes.load(snapshot.data_->meshes);
         impl_->next = impl_->evaluator->next_frame();
         impl_->has_advanced = true;
         return Done();

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bindings/scene/offered_meshes.h"
 #include "include/rapid/scene.h"
 #include "include/rapid/shapes.h"
 #include "runtime/graph/error_sources.h"
@@ -40,8 +41,16 @@ struct [[gnu::visibility("hidden")]] SceneSnapshot::Data
     static SceneSnapshot read_from(const StateFile& file);
 
     Snapshot snapshot;
+    std::vector<OfferedPath> meshes;
     std::string file;   // of the scene
     std::string nodes;  // a hash of the graph's nodes, by type and name
+
+    // Lists what a file stores besides its header.
+    template <class Archive>
+    void serialize(Archive & keep)
+    {
+        keep(snapshot, meshes);
+    }
 };
 
 struct [[gnu::visibility("hidden")]] SceneShapes::Data

@@ -187,6 +187,7 @@ void Scene::Impl::start(std::unique_ptr<Plan> fresh)
     errors = std::make_shared<ErrorSources>(error_sources_of(*plan));
     next = plan->first_frame();
     has_advanced = false;
+    offered_meshes.start(next);
 }
 
 void Scene::Impl::start_again()
@@ -207,7 +208,9 @@ SceneFrame Scene::Impl::advance()
         throw;
     }
     data->errors = errors;
-    data->warnings = session->take_warnings();
+    data->warnings = offered_meshes.take_warnings();
+    const std::vector<std::string> of_scripts = session->take_warnings();
+    data->warnings.insert(data->warnings.end(), of_scripts.begin(), of_scripts.end());
     data->warnings.insert(data->warnings.end(), data->result.warnings.begin(), data->result.warnings.end());
     data->scene = number;
     next = evaluator->next_frame();

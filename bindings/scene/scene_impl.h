@@ -19,6 +19,7 @@
 #include "bindings/host/picture_scene.h"
 #include "bindings/host/session.h"
 #include "bindings/run/fingerprint.h"
+#include "bindings/scene/offered_meshes.h"
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_error.h"
 #include "bindings/scene/scene_inside.h"
@@ -51,6 +52,7 @@ struct [[gnu::visibility("hidden")]] Scene::Impl
     Evaluator::WriteHook write;
     std::map<std::string, std::string> settings;  // of parameters, by name
     std::shared_ptr<Offers> offers = std::make_shared<Offers>();
+    OfferedMeshes offered_meshes = OfferedMeshes(*offers);
 
     std::unique_ptr<Session> session;
     std::vector<SceneParameter> parameters;

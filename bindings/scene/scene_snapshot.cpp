@@ -53,7 +53,12 @@ std::string members_as_text(const std::string& path, const CheckedJson& members)
 
 SceneSnapshot::SceneSnapshot(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
 std::int64_t SceneSnapshot::frame() const { return data_->snapshot.frame; }
-std::size_t SceneSnapshot::size() const { return data_->snapshot.size(); }
+std::size_t SceneSnapshot::size() const
+{
+    std::size_t bytes = data_->snapshot.size();
+    for (const OfferedPath& path : data_->meshes) bytes += path.bytes();
+    return bytes;
+}
 
 Result<Done> SceneSnapshot::write(const std::string& path) const { return SceneInside::save(*this, path, ""); }
 
@@ -66,7 +71,7 @@ Result<Done> SceneInside::save(const SceneSnapshot& saved, const std::string& pa
         for (const auto& [name, state] : snapshot.simulations) header["simulations"][name] = state.size();
         for (const auto& [name, state] : snapshot.nodes) header["nodes"][name] = state.size();
         header["fingerprint"] = {{"Rapid", RAPID_ABI}, {"nodes", saved.data_->nodes}};
-        write_state(path, std::move(header), state_of(snapshot));
+        write_state(path, std::move(header), state_of(*saved.data_));
         return Done();
     });
 }
@@ -80,7 +85,7 @@ SceneSnapshot SceneSnapshot::Data::read_from(const StateFile& file)
     auto data = std::make_shared<Data>();
     data->file = file.header().at("graph").get<std::string>();
     data->nodes = fingerprint.at("nodes").get<std::string>();
-    rapid::restore(data->snapshot, file.state());
+    rapid::restore(*data, file.state());
     return SceneSnapshot(std::move(data));
 }
 

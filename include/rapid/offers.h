@@ -22,7 +22,8 @@ namespace rapid {
 // Type of an attribute's values. UInt8 is membership of a group, String the token of a string (SceneFrame::text_of).
 enum class ColumnType { Float = 0, Vec3 = 1, Int32 = 2, Int64 = 3, Quat = 4, UInt8 = 5, String = 6 };
 
-// A triangle mesh, like that of rapid.mesh.read.
+// A triangle mesh, like that of rapid.mesh.read. If it is offered again for each frame with the same triangles, it
+// moves and deforms from frame to frame (Scene::offer).
 struct HostMesh {
     std::vector<std::array<float, 3>> positions;         // m
     std::vector<std::array<std::int32_t, 3>> triangles;  // counter-clockwise seen from outside; indices from 0

@@ -267,7 +267,8 @@ int rapid_offers_guard(rapid_offers* offers, int guard, rapid_error** error);
 /* Calls release(user) once, from any thread, when the offers are released and no scene uses their callbacks any
  * more. */
 int rapid_offers_on_release(rapid_offers* offers, void (*release)(void* user), void* user, rapid_error** error);
-/* positions: shape [count][3], m; triangles: shape [triangle_count][3], counter-clockwise seen from outside. */
+/* positions: shape [count][3], m; triangles: shape [triangle_count][3], counter-clockwise seen from outside. If the mesh
+ * is offered again for each frame, it moves (rapid_scene_offer()). */
 int rapid_offers_mesh(rapid_offers* offers, const char* name, const float* positions, size_t count,
                       const int32_t* triangles, size_t triangle_count, rapid_error** error);
 /* Reads name, type, data and stride (0: packed) of each column; one must be "P". */
@@ -346,7 +347,12 @@ typedef struct rapid_node_type {
 int rapid_offers_node(rapid_offers* offers, const rapid_node_type* type, rapid_error** error);
 
 /* Replaces or adds the objects of `offers`. Functions of the frame that use rapid.host "NAME" get them from the next
- * frame on, everything else when the scene's file is run again (rapid_scene_set()). */
+ * frame on, everything else when the scene's file is run again (rapid_scene_set()).
+ *
+ * A mesh with as many positions and the same triangles as that of the frame before moves from there through the frame,
+ * like the last file of a sequence of meshes: points are born along its path with its velocity, and as a collider it
+ * sweeps points along. With other triangles it is at rest in this frame, with a warning. In a frame without an offer,
+ * and after rapid_scene_restart() and rapid_scene_set(), the last mesh is at rest; a snapshot holds the last meshes. */
 int rapid_scene_offer(rapid_scene* scene, rapid_offers* offers, rapid_error** error);
 /* Releases the offers. Scenes retain the objects offered to them. */
 int rapid_offers_release(rapid_offers* offers, rapid_error** error);

@@ -410,6 +410,11 @@ public:
     // Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on,
     // everything else when the scene's file is run again (set()). Fails with WrongCall if an array is missing or wrong,
     // and names it.
+    //
+    // A mesh with as many positions and the same triangles as that of the frame before moves from there through the
+    // frame, like the last file of a sequence of meshes: points are born along its path with its velocity, and as a
+    // collider it sweeps points along. With other triangles it is at rest in this frame, with a warning. In a frame
+    // without an offer, and after restart() and set(), the last mesh is at rest; a snapshot holds the last meshes.
     Result<Done> offer(const std::string& name, const HostObject& object);
 
     std::int64_t first_frame() const;  // of the scene

@@ -221,6 +221,48 @@ TEST_CASE("a column of strings contains tokens in C, in both directions", "[c]")
     rapid_offers_release(offers, nullptr);
 }
 
+TEST_CASE("a mesh that is offered for each frame in C lifts points at its speed", "[c]")
+{
+    const std::int32_t triangles[] = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
+                                      2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
+    // The box has its top at this height. The caller releases the offers.
+    const auto box_at = [&](float top) {
+        std::vector<float> P;
+        for (const float x : {-1.0f, 1.0f})
+            for (const float y : {top - 0.2f, top})
+                for (const float z : {-1.0f, 1.0f}) P.insert(P.end(), {x, y, z});
+        rapid_offers* offers = nullptr;
+        REQUIRE(rapid_offers_new(&offers, nullptr) == RAPID_OK);
+        REQUIRE(rapid_offers_mesh(offers, "box", P.data(), 8, triangles, 12, nullptr) == RAPID_OK);
+        return offers;
+    };
+    rapid_options options = rapid_default_options();
+    options.offers = box_at(0);
+    rapid_scene* scene = nullptr;
+    REQUIRE(rapid_scene_open_text(
+                "lift.lua",
+                "local rapid = require 'rapid' return rapid.create { fps = 24, points = rapid.points.from { P = {{0, "
+                "0.25, 0}} } } :collide { shape = function() return rapid.levelset.from_mesh(rapid.host 'box', { voxel "
+                "= 0.05 }) end, bounce = 0 } :solve {}",
+                &options, &scene, nullptr) == RAPID_OK);
+    rapid_offers_release(options.offers, nullptr);
+    for (int passed = 0; passed <= 6; ++passed) {
+        const float top = 0.1f * static_cast<float>(passed);  // 2.4 m/s
+        rapid_offers* offers = box_at(top);
+        REQUIRE(rapid_scene_offer(scene, offers, nullptr) == RAPID_OK);
+        rapid_offers_release(offers, nullptr);
+        rapid_frame* frame = nullptr;
+        REQUIRE(rapid_scene_advance(scene, &frame, nullptr) == RAPID_OK);
+        auto P = sized<rapid_column>(), v = sized<rapid_column>();
+        REQUIRE(rapid_frame_column(frame, "P", &P, nullptr) == RAPID_OK);
+        REQUIRE(rapid_frame_column(frame, "v", &v, nullptr) == RAPID_OK);
+        CHECK(static_cast<const float*>(P.data)[1] == Approx(std::max(0.25f, top)).margin(1e-4));
+        CHECK(static_cast<const float*>(v.data)[1] == Approx(top > 0.25f ? 2.4 : 0).margin(1e-4));
+        rapid_frame_release(frame, nullptr);
+    }
+    rapid_scene_release(scene, nullptr);
+}
+
 TEST_CASE("points are written, read, described and compared in C", "[c]")
 {
     const test::TemporaryFolder folder;

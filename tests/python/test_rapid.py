@@ -235,6 +235,26 @@ class Offers(unittest.TestCase):
         scene.offer("square", square(5))
         self.assertEqual((scene.advance()["P"][:, 1] > 4).sum(), 10)
 
+    def test_births_on_a_mesh_offered_for_each_frame_have_its_velocity(self):
+        # A square that grows by a tenth of its size in each frame moves by 2.4 X per second at X.
+        corners = numpy.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], numpy.float32)
+
+        def square(frame):
+            return rapid.Mesh(corners * (1 + 0.1 * (frame - 1)), [[0, 2, 1], [0, 3, 2]])
+        scene = rapid.Scene("a.lua", objects={"square": square(1)}, text="""local rapid = require 'rapid'
+            return rapid.create { fps = 24 }
+              :emit { source = function() return rapid.host 'square' end, rate = 2400 } :solve {}""")
+        for _ in range(2):
+            scene.advance()
+            for frame in (2, 3, 4):
+                scene.offer("square", square(frame))
+                now = scene.advance()
+                born = slice(100 * (frame - 2), None)
+                self.assertEqual(len(now), 100 * (frame - 1))
+                numpy.testing.assert_allclose(now["v"][born], 2.4 / (1 + 0.1 * (frame - 1)) * now["P"][born], atol=1e-4)
+            scene.restart()
+            scene.offer("square", square(1))
+
 
 class Scenes(unittest.TestCase):
     def test_parameters(self):

@@ -506,7 +506,12 @@ class Scene(_Program):
 
     def offer(self, name, thing):
         """Replaces or adds an object. Functions of the frame that use rapid.host "NAME" get it from the next frame on.
-        All other uses get it at the next set()."""
+        All other uses get it at the next set().
+
+        A mesh with as many positions and the same triangles as that of the frame before moves from there through the
+        frame, like the last file of a sequence of meshes: points are born along its path with its velocity, and as a
+        collider it sweeps points along. With other triangles it is at rest in this frame, with a warning. In a frame
+        without an offer, and after restart() and set(), the last mesh is at rest; a snapshot holds the last meshes."""
         offers = make_offers({name: thing}, (), self._guard)
         try:
             self._call("scene_offer", self._handle.value, offers)

@@ -102,7 +102,7 @@ def from_numpy(P, **columns):
 
 class Mesh:
     """A triangle mesh. positions has the shape (n, 3). triangles has the shape (m, 3) and holds indices, in
-    counter-clockwise order as seen from outside."""
+    counter-clockwise order as seen from outside. If it is offered again for each frame, it moves (Scene.offer)."""
 
     def __init__(self, positions, triangles):
         self._positions = _numbers_of(positions, "positions")

@@ -246,7 +246,7 @@ fs::path last_picture(const std::string& output, std::optional<std::int64_t> las
 {
     const FramePattern pattern(parse_output_target(output).pattern);
     if (!last || fs::path(pattern.text()).extension() != ".png") return {};
-    if (!pattern.has_frame()) return fs::exists(pattern.text()) ? fs::path(pattern.text()) : fs::path();
+    if (!pattern.has_frame()) return fs::exists(pattern.name()) ? fs::path(pattern.name()) : fs::path();
     fs::path file;
     for (const auto& [frame, path] : pattern.existing())
         if (frame <= *last) file = path;

@@ -15,7 +15,10 @@ CacheFiles find_cache(const std::string& text)
         throw Error("is a folder; name a file, or a sequence such as cache.####.vdb").at({text, 0});
     if (std::filesystem::exists(text, none)) return {text, false, {{0, text}}};
     const FramePattern pattern(text);
-    if (!pattern.has_frame()) throw Error("no such file").at({text, 0});
+    if (!pattern.has_frame()) {
+        if (!std::filesystem::exists(pattern.name(), none)) throw Error("no such file").at({text, 0});
+        return {text, false, {{0, pattern.name()}}};
+    }
     CacheFiles found{text, true, pattern.existing()};
     if (found.frames.empty())
         throw Error(fmt::format("no frame of this sequence exists; the first would be {}", pattern.expand(1)))

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "runtime/files/frame_pattern.h"
+
 namespace rapid {
 namespace {
 
@@ -27,6 +29,15 @@ const std::vector<Maker>& makers()
 }
 
 }  // namespace
+
+std::filesystem::path MakeContext::resolve(const std::string& path) const
+{
+    std::filesystem::path file = FramePattern::of_files(folder / path).name();  // an absolute path stays itself
+    if (find_file)
+        if (const std::string found = find_file(path); !found.empty()) file = found;
+    if (on_read) on_read(file);
+    return file;
+}
 
 MakerRegistration::MakerRegistration(Declare declare) { declarations().push_back(declare); }
 

@@ -26,15 +26,8 @@ struct MakeContext {
     std::function<void(const std::filesystem::path& file)> on_read;  // may be empty
     std::function<std::string(const std::string& path)> find_file;   // may be empty, and return nothing
 
-    // Returns the path of a file that will be read.
-    std::filesystem::path resolve(const std::string& path) const
-    {
-        std::filesystem::path file = folder / path;  // an absolute path stays itself
-        if (find_file)
-            if (const std::string found = find_file(path); !found.empty()) file = found;
-        if (on_read) on_read(file);
-        return file;
-    }
+    // Returns the path of a file that will be read, with escapes (FramePattern) resolved.
+    std::filesystem::path resolve(const std::string& path) const;
 };
 
 struct Maker {

@@ -24,6 +24,9 @@ public:
     // Return true if the name depends on the frame, and on the output.
     bool has_frame() const { return digits_.has_value(); }
     bool has_output() const { return text_.find("{output}") != std::string::npos; }
+    // Returns the name of the only file: the text without the backslashes of escapes. A pattern with a frame number is
+    // returned unchanged.
+    const std::string& name() const { return has_frame() ? text_ : before_; }
 
     std::string expand(int frame, std::string_view output = "main") const;
     // Returns the pattern for one output.

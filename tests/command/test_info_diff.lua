@@ -49,6 +49,13 @@ describe("rapid info", function()
     assert.truthy(rapid("info one.####.csv").stdout:find("one.0002.csv\n", 1, true))
   end)
 
+  it("takes a character literally after a backslash", function()
+    csv("take#2.csv", { "0,0,0,0,0,0,0,1" })
+    local result = rapid [[info 'take\#2.csv']]
+    assert.equal(0, result.status, result.stderr)
+    assert.truthy(result.stdout:find("points +1\n"), result.stdout)
+  end)
+
   it("does not wait for the writer of a pipe", function()
     os.execute("mkfifo " .. folder:file "pipe.csv")
     local result = rapid "info pipe.csv"

@@ -54,6 +54,10 @@ TEST_CASE("folders and escaped characters are no pattern, and neither is the nam
     }
     CHECK(FramePattern::of_files(folder / "50\\%s.####.obj").existing().at(3) == folder / "50%s.0003.obj");
     CHECK(FramePattern::of_files(folder / "take#3.obj").has_frame());
+    // An escape also names a single file, whether it exists or not.
+    CHECK(FramePattern::of_files(folder / "take\\#2.obj").name() == (folder / "take#2.obj").string());
+    CHECK(FramePattern("take\\#9.{output}.obj").name() == "take#9.{output}.obj");
+    CHECK(FramePattern("take.####.obj").name() == "take.####.obj");
 }
 
 TEST_CASE("the existing files of a sequence are those that the pattern would write", "[files][pattern]")

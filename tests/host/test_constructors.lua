@@ -85,6 +85,22 @@ describe("rapid.mesh", function()
     assert.near({2, 1, 2}, points:max "P", 0.05)
   end)
 
+  it("of every kind takes a character of the file's name literally after a backslash", function()
+    local ball = scene.command("run", "rapid.levelset.sphere { voxel = 0.1 }:write 'ball.vdb' return rapid.create {}",
+      "-f 1 --quiet")
+    assert.equal("", ball.stderr)
+    os.rename(scene.folder:file "ball.vdb", scene.folder:file "ball#2.vdb")
+    scene.folder:write("roof#2.obj", "v 0 1 0\nv 2 1 0\nv 2 1 2\nf 1 3 2\n")
+    scene.folder:write("line#2.obj", "v 0 1 0\nv 2 1 0\nl 1 2\n")
+    scene.folder:write("one#2.csv", "Px,Py,Pz\n0,1,0\n")
+    local result = scene.run([[
+local roof, line = rapid.mesh.read "roof\\#2.obj", rapid.curve.read "line\\#2.obj"
+return rapid.create { points = rapid.points.read "one\\#2.csv" }
+  :emit { source = roof, count = 2 } :emit { source = line, count = 3 }
+  :collide { shape = rapid.levelset.read "ball\\#2.vdb" } :solve {}]])
+    assert.equal(1 + 2 * (2 + 3), #result[3])
+  end)
+
   it("is moved, turned and scaled, by the right motion first", function()
     local points = born [[
 rapid.mesh.grid { size = {2, 2} }:transform(rapid.translate(10, 0, 0) * rapid.rotate({0, 0, 1}, 90) * rapid.scale(3))]]

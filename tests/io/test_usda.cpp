@@ -157,6 +157,22 @@ def Xform "world" (
     CHECK(points.id()[1] == 1);
 }
 
+TEST_CASE("prims, values and metadata of a .usda may be nested 60,000 deep", "[io][usda]")
+{
+    const TemporaryFolder folder;
+    constexpr int depth = 60000;
+    const std::string open(depth, '['), close(depth, ']');
+    std::string text = "#usda 1.0\n(\n    any = " + open + close + "\n)\n";
+    for (int k = 0; k < depth; ++k)
+        text +=
+            "def Xform \"x\" {\ndouble3 xformOp:translate = (1, 0, 0)\n"
+            "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+    text += "def Points \"p\" {\npoint3f[] points = [(0, 2, 0)]\nasset[] deep = " + open + close + "\n}\n";
+    folder.write("a.usda", text + std::string(depth, '}'));
+
+    CHECK_THAT(read_points(folder / "a.usda").P()[0], close_to(Vec3f(depth, 2, 0), 0));
+}
+
 TEST_CASE("a .usda that is damaged, or of more than one frame, is an error that says so", "[io][usda]")
 {
     const TemporaryFolder folder;

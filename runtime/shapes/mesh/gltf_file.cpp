@@ -176,7 +176,8 @@ private:
         const auto asset = json_.find("asset");
         if (asset == json_.end() || !asset->contains("version")) return;
         const json& version = asset->at("version");
-        const std::string text = version.is_string() ? version.get<std::string>() : version.dump();
+        const std::string text =
+            version.is_number() ? fmt::format("{}", version.get<double>()) : version.get<std::string>();
         if (!text.starts_with("2"))
             throw Error(fmt::format("it is glTF {}, which can't be read; export glTF 2.0", text));
     }

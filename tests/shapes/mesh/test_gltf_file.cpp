@@ -214,11 +214,21 @@ TEST_CASE("lists within lists in the place of glTF's meshes are an error, howeve
     const std::string deep = std::string(500000, '[') + std::string(500000, ']');
     CHECK_THAT(error_of([&] { read(R"({"meshes": )" + deep + "}"); }),
                Catch::Matchers::StartsWith("its JSON is damaged: "));
+    CHECK_THAT(error_of([&] { read(R"({"asset": {"version": )" + deep + "}}"); }),
+               Catch::Matchers::StartsWith("its JSON is damaged: "));
     CHECK(error_of([&] { read(R"({"extras": )" + deep + "}"); }) == "");
-    // Nodes may be as deep.
+}
+
+TEST_CASE("glTF nodes may be nested 60,000 deep, and each moves those below it", "[mesh][gltf]")
+{
+    Gltf gltf;
+    gltf.add_floats(corners, "VEC3", 3);
+    constexpr int depth = 60000;
     std::string nodes;
-    for (int k = 1; k < 60000; ++k) nodes += fmt::format(R"({{"children":[{}]}},)", k);
-    read(R"({"nodes":[)" + nodes + "{}]}");
+    for (int k = 1; k < depth; ++k) nodes += fmt::format(R"({{"translation":[1,0,0],"children":[{}]}},)", k);
+    const MeshFile mesh = gltf.read(one_mesh("", "", nodes + R"({"mesh":0})") + R"(,"scenes":[{"nodes":[0]}])");
+    REQUIRE(mesh.positions.size() == 3);
+    CHECK(mesh.positions[1] == Vec3f(depth, 0, 0));
 }
 
 TEST_CASE("an accessor of glTF is read within its buffer, or refused", "[mesh][gltf]")

@@ -136,7 +136,7 @@ void write_npz(OutputFile& file, const PointSet& points, const FrameInfo&)
     }
     for (const auto& [name, members] : points.groups()) {
         RecordWriter array(ByteOrder::Little);
-        array.add_group(members);
+        array.add_bytes(members);
         write_array(zip, std::string(group_prefix) + name, npy_header("|b1", points.size(), 1), array, points.size());
     }
     zip.finish();

@@ -2,15 +2,19 @@
 //
 // P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, and
 // a quaternion also NAMEw. Integers are int (an int64 that does not fit is refused). A group is uchar group_NAME. Lines
-// (points/point_lines.h) are elements "edge" with vertex1 and vertex2.
+// (points/point_lines.h) are elements "edge" with vertex1 and vertex2. Cd is also uchar red green blue, and Alpha also
+// uchar alpha: other programs show only these.
 //
-// Reads any PLY (files/ply_file.h). red green blue become Cd, and alpha becomes Alpha. Lists are skipped.
+// Reads any PLY (files/ply_file.h). Without Cd red green blue become Cd, and without Alpha alpha becomes Alpha. Lists
+// are skipped.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 
+#include "runtime/base/parallel.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/ply_file.h"
 #include "runtime/files/skipped_contents.h"
@@ -36,6 +40,37 @@ std::string_view ply_type(const AnyColumn& column)
 {
     const AttributeType type = type_of(column);
     return type == AttributeType::Int32 || type == AttributeType::Int64 ? "int" : "float";
+}
+
+// Returns values from 0 to 1 as 0 to 255. Values beyond are clamped, and NaN is 0.
+template <class T, class Component>
+Column<std::uint8_t> colour_bytes(const Column<T>& column, const Component& component)
+{
+    const auto byte = [&](const T& value) {
+        const float part = component(value);
+        return static_cast<std::uint8_t>(part > 0 ? std::min(part, 1.0f) * 255 + 0.5f : 0);
+    };
+    Column<std::uint8_t> bytes(column.size(), column.size() > 0 ? byte(column[0]) : std::uint8_t{0});
+    if (column.is_uniform()) return bytes;
+    const std::span<std::uint8_t> to = bytes.overwrite();
+    for_each_chunk(column.size(), [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) to[i] = byte(column[i]);
+    });
+    return bytes;
+}
+
+// Returns the colours by the names that other programs know. An attribute of the set may have such a name itself.
+std::vector<std::pair<std::string, Column<std::uint8_t>>> shown_colours(const PointSet& points)
+{
+    std::vector<std::pair<std::string, Column<std::uint8_t>>> shown;
+    const bool taken = points.has("red") || points.has("green") || points.has("blue");
+    constexpr const char* names[] = {"red", "green", "blue"};
+    if (const auto* Cd = points.find<Vec3f>("Cd"); Cd && !taken)
+        for (int c = 0; c < 3; ++c)
+            shown.emplace_back(names[c], colour_bytes(*Cd, [c](const Vec3f& rgb) { return rgb[c]; }));
+    if (const auto* Alpha = points.find<float>("Alpha"); Alpha && !points.has("alpha"))
+        shown.emplace_back("alpha", colour_bytes(*Alpha, [](float alpha) { return alpha; }));
+    return shown;
 }
 
 // Returns the elements "edge". Each connects two neighbours on a line.
@@ -70,11 +105,14 @@ void write_ply(OutputFile& file, const PointSet& given, const FrameInfo&)
     };
     for (const char* name : {"P", "v", "id"}) add(name);
     for (const std::string& name : further_attributes(points)) add(name);
-    for (const auto& [name, members] : points.groups()) {
-        records.add_group(members);
-        names.push_back(std::string(group_prefix) + name);
-        properties += fmt::format("property uchar {}\n", names.back());
-    }
+    const auto add_bytes = [&](const std::string& name, const Column<std::uint8_t>& bytes) {
+        records.add_bytes(bytes);
+        names.push_back(name);
+        properties += fmt::format("property uchar {}\n", name);
+    };
+    for (const auto& [name, members] : points.groups()) add_bytes(std::string(group_prefix) + name, members);
+    const auto colours = shown_colours(points);
+    for (const auto& [name, bytes] : colours) add_bytes(name, bytes);
     check_column_names(names, white_space);
 
     const std::string edges = edge_section(lines);
@@ -111,24 +149,35 @@ bool is_membership(const Records& records, std::size_t offset)
 
 std::vector<RecordAttribute> attributes_of(const PlyElement& vertex, const Records& records)
 {
+    std::set<std::string_view> in_file;
+    for (const PlyProperty& property : vertex.properties) in_file.insert(property.name);
     std::vector<std::string> names;
+    std::vector<const PlyProperty*> properties;
     std::vector<std::size_t> offsets;
     std::size_t offset = 0;
     for (const PlyProperty& property : vertex.properties) {
-        names.push_back(rapid_name(property.name));
-        offsets.push_back(offset);
+        const std::string name = rapid_name(property.name);
+        // Rapid writes colours as floats and as bytes. The floats are exact.
+        const bool is_colour = name != property.name && (name.starts_with("Cd") || name == "Alpha");
+        const bool has_floats = is_colour && in_file.count(name) > 0;
+        if (!has_floats || property.type != ScalarType::UInt8) {
+            names.push_back(has_floats ? property.name : name);
+            properties.push_back(&property);
+            offsets.push_back(offset);
+        }
         offset += scalar_bytes(property.type);
     }
     std::vector<RecordAttribute> attributes;
     for (const JoinedColumns& joined : join_components(names)) {
-        const PlyProperty& first = vertex.properties[joined.columns[0]];
+        const PlyProperty& first = *properties[joined.columns[0]];
         const bool one_type = std::all_of(joined.columns.begin(), joined.columns.end(),
-                                          [&](std::size_t c) { return vertex.properties[c].type == first.type; });
-        const bool colour = first.name == "red" || first.name == "alpha";
-        if (one_type && (joined.columns.size() == 1 || first.type == ScalarType::Float ||
-                         first.type == ScalarType::Double || colour)) {
+                                          [&](std::size_t c) { return properties[c]->type == first.type; });
+        const bool single = joined.columns.size() == 1;
+        const bool is_alpha = first.name == "alpha" && joined.name == "Alpha";
+        const bool colour = is_alpha || (first.name == "red" && !single);
+        if (one_type && (single || is_floating(first.type) || colour)) {
             RecordAttribute& attribute = attributes.emplace_back();
-            attribute.name = joined.name;
+            attribute.name = single && !is_alpha ? first.name : joined.name;
             attribute.type = first.type;
             attribute.scale = colour ? colour_scale(first.type) : 1;
             for (const std::size_t c : joined.columns) attribute.offsets.push_back(offsets[c]);
@@ -138,7 +187,7 @@ std::vector<RecordAttribute> attributes_of(const PlyElement& vertex, const Recor
             if (attribute.group) attribute.name.erase(0, group_prefix.size());
         } else {
             for (const std::size_t c : joined.columns)
-                attributes.push_back({vertex.properties[c].name, vertex.properties[c].type, {offsets[c]}});
+                attributes.push_back({properties[c]->name, properties[c]->type, {offsets[c]}});
         }
     }
     return attributes;

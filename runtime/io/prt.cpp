@@ -122,7 +122,7 @@ Layout layout_of(const PointSet& points)
     }
     for (const auto& [name, members] : points.groups()) {
         layout.add(std::string(group_prefix) + name, UInt8Channel, 1);
-        layout.records.add_group(members);
+        layout.records.add_bytes(members);
     }
     check_column_names(layout.names, "");
     return layout;

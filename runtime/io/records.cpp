@@ -170,9 +170,9 @@ void RecordWriter::add(const std::string& name, const AnyColumn& column)
         column);
 }
 
-void RecordWriter::add_group(const Column<std::uint8_t>& members)
+void RecordWriter::add_bytes(const Column<std::uint8_t>& column)
 {
-    const Strided<std::uint8_t> values = members.read();
+    const Strided<std::uint8_t> values = column.read();
     push(Part::Byte, values.data, values.stride, 1, 1);
 }
 

@@ -26,8 +26,8 @@ public:
     // Adds a column. Floats and int32 are unchanged; a string becomes its index in the file's table (text_table.h), an
     // int32. Throws Error if an int64 that must be narrowed does not fit; the message suggests .vdb and .csv.
     void add(const std::string& name, const AnyColumn& column);
-    // Adds membership as a UInt8.
-    void add_group(const Column<std::uint8_t>& members);
+    // Adds bytes, such as the members of a group.
+    void add_bytes(const Column<std::uint8_t>& column);
     // Adds the same number to every record.
     void add_constant(float value);
 

@@ -463,7 +463,7 @@ private:
         for (const auto& [name, members] : points_.groups()) {
             names.push_back(std::string(group_prefix) + name);
             Array& array = add(to, names.back(), "UInt8", 1, points_.size());
-            array.records.add_group(members);
+            array.records.add_bytes(members);
         }
         check_column_names(names, control_characters());
     }

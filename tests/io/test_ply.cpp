@@ -1,4 +1,5 @@
 #include <bit>
+#include <limits>
 
 #include "runtime/io/format.h"
 #include "tests/io/random_points.h"
@@ -48,6 +49,48 @@ TEST_CASE("a .ply has the header and the little-endian records that its format s
     for (int i = 0; i < 6; ++i) CHECK(numbers[i] == static_cast<float>(i + 1));
     CHECK(std::string(second + 24, 4) == std::string("\x02\x01\x00\x00", 4));  // 258
     CHECK(second[32] == 1);
+}
+
+TEST_CASE("a .ply has colours also as the bytes that other programs show, and Rapid reads its floats", "[io][ply]")
+{
+    const TemporaryFolder folder;
+    PointSet points;
+    points.append(4);
+    points.add({"Cd", Vec3f(0.5f, 0, 1)});
+    points.add({"Alpha", 0.25f});
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    points.column<Vec3f>("Cd").write()[1] = Vec3f(-1, 7, nan);
+
+    write_points(folder / "a.ply", points);
+
+    const std::string text = file_text(folder / "a.ply");
+    const std::string_view properties =
+        "property float Alpha\nproperty float Cdx\nproperty float Cdy\nproperty float Cdz\nproperty uchar red\n"
+        "property uchar green\nproperty uchar blue\nproperty uchar alpha\nend_header\n";
+    const std::size_t at = text.find(properties);
+    REQUIRE(at != std::string::npos);
+    constexpr std::size_t record = 6 * 4 + 4 + 4 * 4 + 4;
+    const std::string records = text.substr(at + properties.size());
+    REQUIRE(records.size() == 4 * record);
+    CHECK(records.substr(record - 4, 4) == std::string("\x80\x00\xff\x40", 4));
+    CHECK(records.substr(2 * record - 4, 4) == std::string("\x00\xff\x00\x40", 4));
+    CHECK(differing_columns(points, read_points(folder / "a.ply")) == "");
+}
+
+TEST_CASE("attributes with the names of other programs' colours come back from .ply", "[io][ply]")
+{
+    const TemporaryFolder folder;
+    PointSet points;
+    points.append(2);
+    points.add({"Cd", Vec3f(0.5f, 0, 1)});
+    points.add({"Alpha", 0.25f});
+    points.add({"alpha", 0.75f});
+    points.add({"red", std::int32_t{7}});
+    points.add({"nx", 3.0f});
+
+    write_points(folder / "a.ply", points);
+
+    CHECK(differing_columns(points, read_points(folder / "a.ply")) == "");
 }
 
 TEST_CASE("an ascii PLY of another program is read, with its colours and normals", "[io][ply]")

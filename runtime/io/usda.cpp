@@ -3,9 +3,9 @@
 //
 //   point3f[] points.timeSamples = { 12: [(x, y, z), ...], }
 //
-// P is points, v is velocities, id is ids, pscale is half of widths, N is normals, Cd is primvars:displayColor, Alpha
-// is primvars:displayOpacity. Any other attribute is primvars:NAME, and a group is bool[] primvars:group_NAME. Floats
-// have 9 significant digits, which identify the float.
+// P is points, v is velocities, accel (Houdini's name) is accelerations, id is ids, pscale is half of widths, N is
+// normals, Cd is primvars:displayColor, Alpha is primvars:displayOpacity. Any other attribute is primvars:NAME, and a
+// group is bool[] primvars:group_NAME. Floats have 9 significant digits, which identify the float.
 //
 // Files of other programs are read in metres with the y axis up, by their metersPerUnit and upAxis, and where the
 // transforms of the prim and of those around it put it. Values of primvars go by their indices.
@@ -570,6 +570,7 @@ struct UsdName {
 };
 constexpr UsdName usd_names[] = {{"P", "points", "point3f"},
                                  {"v", "velocities", "vector3f"},
+                                 {"accel", "accelerations", "vector3f"},
                                  {"id", "ids", "int64"},
                                  {"pscale", "widths", "float"},
                                  {"N", "normals", "normal3f"},

@@ -27,6 +27,7 @@ TEST_CASE("a .usda is a prim of points with a sample at the frame's time code, b
     points.add({"Cd", Vec3f(1, 0, 0.5f)});
     points.add({"Alpha", 0.5f});
     points.add({"N", 0.25f});  // no normal
+    points.add({"accel", Vec3f(0, -9, 0)});
     points.add({"orient", Quatf(1, 0, 0, 0)});
     points.add({"pscale", 0.25f});
     points.group("hot").write()[1] = 1;
@@ -76,6 +77,9 @@ def Points "points"
     )
     float[] primvars:N.timeSamples = {
         12: [0.25, 0.25],
+    }
+    vector3f[] accelerations.timeSamples = {
+        12: [(0, -9, 0), (0, -9, 0)],
     }
     quatf[] primvars:orient (
         interpolation = "vertex"

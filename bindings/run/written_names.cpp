@@ -69,7 +69,10 @@ void WrittenNames::add(const FramePattern& pattern, std::string_view output, con
     const fs::path resolved = true_path(pattern.for_output(output));
     Writer writer{resolved.parent_path(), resolved.filename(), FramePattern(resolved.filename()), frames,
                   std::move(who)};
-    if (!writer.pattern->has_frame()) writer.pattern.reset();
+    if (!writer.pattern->has_frame()) {
+        writer.name = writer.pattern->name();  // without the backslashes of escapes
+        writer.pattern.reset();
+    }
     check(writer);
     writers_.push_back(std::move(writer));
 }

@@ -16,6 +16,7 @@ local refused = {
   { "--events a.csv --stats a.csv", "--events a.csv: --stats writes a.csv, " },
   { "--events x.0002.csv -o x.####.csv", "-o x.####.csv: --events writes x.0002.csv, " },
   { "-o x.####.csv -o ./x.####.csv", "-o ./x.####.csv: -o x.####.csv writes x.0001.csv, " },
+  { "-f 1 --events 'x#2.csv' -o 'x\\#2.csv'", "-o x\\#2.csv: --events writes x#2.csv, " },
   { "-o x.#.csv -o x.%04d.csv", "-o x.%04d.csv: -o x.#.csv writes x.0001.csv, " },
   { "-f 9998-10000 -o x.####.csv -o x.##.csv", "-o x.##.csv: -o x.####.csv writes x.9998.csv, " },
   { "-o link/../a/x.####.csv -o a/x.####.csv", "-o a/x.####.csv: -o link/../a/x.####.csv writes x.0001.csv, " },

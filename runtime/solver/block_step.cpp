@@ -193,14 +193,15 @@ void BlockStep::act(int substep)
     set_time(substep);
     kick_.assign(size, Vec3d::Zero());
     const std::span<std::uint8_t> dead(context_.dead.data() + block.indices.front(), size);
-    if (context_.options.log) dead_before_.assign(dead.begin(), dead.end());
+    if (context_.options.sinks.log) dead_before_.assign(dead.begin(), dead.end());
     const Chunk chunk{context_.points, block.indices.front(), block.P, block.v, block.dt, time_, substep};
     for (const StepAction& local : context_.scene.actions)
         at_node(*local.action, [&] { local.pass->act(chunk, kick_, dead); });
     for (std::size_t i = 0; i < size; ++i) {
         block.v[i] += block.dt[i] * acceleration_by(kick_[i], block.indices[i]);
         if (!dead[i]) continue;
-        if (context_.options.log && !dead_before_[i]) context_.options.log->kill(block.indices[i], time_[i]);
+        if (context_.options.sinks.log && !dead_before_[i])
+            context_.options.sinks.log->kill(block.indices[i], time_[i]);
         block.dt[i] = block.moved_dt[i] = half_[i] = 0;
     }
 }

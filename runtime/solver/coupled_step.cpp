@@ -116,7 +116,7 @@ void CoupledStep::begin_substeps()
     now_.start = start_;
     now_.inverse_mass = inverse_mass_;
     now_.dead = context_.dead;
-    now_.log = context_.options.log;
+    now_.log = context_.options.sinks.log;
     now_.dt = context_.options.h / context_.options.substeps;
     now_.iterations = context_.options.iterations;
     now_.acceleration = scene.uniform.a;

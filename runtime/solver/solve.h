@@ -23,18 +23,20 @@ class Refinement;
 class StepLog;
 struct ShapeLoads;
 
+// Where the solver writes what observers need from within the step. Each is null if nobody requests it.
+struct StepSinks {
+    std::uint8_t* met = nullptr;    // set to 1 for points that touch a shape, by index before the step
+    std::int32_t* taken = nullptr;  // with a tolerance: set to the substeps of each point's result, by the same index
+    StepLog* log = nullptr;         // receives contacts, breaks and deaths
+};
+
 struct SolveOptions {
     int substeps = 1;
     double time = 0;         // s since the start, at the end of the frame
     double h = 0;            // s, the frame's length
     std::int64_t frame = 0;  // number of the frame, for messages
     std::string group;       // only these points are advanced; all if empty
-    // Set to 1 for points that touch a shape, by their index before the step; null if not requested.
-    std::uint8_t* met = nullptr;
-    // If there is a tolerance, set to the number of substeps of each point's result, by its index before the step. Null
-    // if not requested.
-    std::int32_t* taken = nullptr;
-    StepLog* log = nullptr;    // receives contacts and deaths; null if not requested
+    StepSinks sinks;
     bool begins_frame = true;  // the first step of the frame: contacts are counted from 0
 
     // Neighbours act on each other at every substep (interaction.h); otherwise not within solve().

@@ -36,11 +36,11 @@ CollisionContext StepContext::collision_context()
 {
     return {hits_ ? &*hits_ : nullptr,
             dead,
-            options.met,
+            options.sinks.met,
             scene.mass,
             options.time,
             options.h,
-            options.log,
+            options.sinks.log,
             stuck_ ? &*stuck_ : nullptr,
             scene.actions.empty() ? 1 : 2};
 }
@@ -55,7 +55,7 @@ void StepContext::count(FrameFigures of_chunk, std::size_t first)
 void StepContext::remove_dead()
 {
     if (std::find(dead.begin(), dead.end(), 1) == dead.end()) return;
-    if (options.log) options.log->take_dead(points, dead);
+    if (options.sinks.log) options.sinks.log->take_dead(points, dead);
     for (std::uint8_t& killed : dead) killed = !killed;
     const std::size_t before = points.size();
     points.keep(dead);

@@ -54,7 +54,7 @@ public:
         record.before = entered;
         record.has_contacts = !step.tolerance;
         log_.reset();
-        if (record.has_contacts) step.options.log = &log_.emplace(entered.size());
+        if (record.has_contacts) step.options.sinks.log = &log_.emplace(entered.size());
     }
 
     void end(Step& step, const PointSet&) override
@@ -196,9 +196,7 @@ private:
         std::vector<double> errors = shadows_.advance(moved, [&](PointSet& shadows) {
             SolveOptions finer = step.options;
             finer.substeps *= 2;
-            finer.met = nullptr;
-            finer.taken = nullptr;
-            finer.log = nullptr;
+            finer.sinks = {};
             step.advance(shadows, step.finer, finer, 2);
         });
         append(step.now.figures.error.values, errors);
@@ -374,7 +372,7 @@ public:
         if (!step.tolerance) return;
         ids_ = entered.id();
         taken_.assign(entered.size(), substeps_);
-        step.options.taken = taken_.data();
+        step.options.sinks.taken = taken_.data();
     }
 
     void end(Step& step, const PointSet&) override

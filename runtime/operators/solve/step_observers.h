@@ -2,7 +2,7 @@
 //
 // Solve prepares a step, lets the observers begin, advances the points, lets the observers end, ages the points and
 // feeds them back. No observer is called per point or per substep. An observer that needs events within the step gives
-// the solver a place to write them (SolveOptions::met, taken and log) when it begins.
+// the solver a place to write them (SolveOptions::sinks) when it begins.
 #pragma once
 
 #include <cstdint>

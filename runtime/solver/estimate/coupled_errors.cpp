@@ -49,8 +49,7 @@ void CoupledErrors::begin(const PointSet& points, const Dynamics& dynamics, cons
     solved_ = shadows_ = PointSet();  // releases shared columns before the run writes them
     options_ = options;
     options_.substeps *= 2;
-    options_.met = nullptr;
-    options_.log = nullptr;
+    options_.sinks = {};
     options_.interacts = !dynamics.interactions().empty();
     options_.loads = &loads_;
     options_.sleep_records = &sleep_records_;

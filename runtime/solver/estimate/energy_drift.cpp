@@ -67,7 +67,7 @@ void EnergyDrift::begin(const PointSet& points, const Shadows& shadows, const Dy
     // Other entries are not read.
     met_.resize(points.size());
     for (const std::uint32_t i : indices_) met_[i] = 0;
-    options.met = met_.data();
+    options.sinks.met = met_.data();
     collides_ = true;
 }
 

@@ -17,7 +17,7 @@ namespace rapid {
 
 class EnergyDrift {
 public:
-    // Call before Solve, after Shadows::begin(). Sets options.met if contacts must be recorded.
+    // Call before Solve, after Shadows::begin(). Sets options.sinks.met if contacts must be recorded.
     void begin(const PointSet& points, const Shadows& shadows, const Dynamics& dynamics, SolveOptions& options);
 
     // Call after Solve and Shadows::advance(). Returns the drift of each point with a shadow, in order of id, J/kg;

@@ -20,8 +20,8 @@ public:
                                                                            options.substeps,
                                                                            max_substeps,
                                                                            options.h,
-                                                                           options.met,
-                                                                           options.taken,
+                                                                           options.sinks.met,
+                                                                           options.sinks.taken,
                                                                            !writes_more(dynamics)}
     {
         done_.substeps = options.substeps;
@@ -99,11 +99,11 @@ private:
         std::iota(part.indices.begin(), part.indices.end(), 0u);
         part.extrapolation = std::move(extrapolation);
         PointSet end = start;
-        std::vector<std::uint8_t> met(options_.met ? size : 0);
+        std::vector<std::uint8_t> met(options_.sinks.met ? size : 0);
         StepDoublingLimits limits = limits_;
-        limits.met = options_.met ? met.data() : nullptr;
-        std::vector<std::int32_t> taken(options_.taken ? size : 0);
-        limits.taken = options_.taken ? taken.data() : nullptr;
+        limits.met = options_.sinks.met ? met.data() : nullptr;
+        std::vector<std::int32_t> taken(options_.sinks.taken ? size : 0);
+        limits.taken = options_.sinks.taken ? taken.data() : nullptr;
         StepDoubling run(limits, substeps, end.P().write(), end.v().write(), &part);
         solve_once(end, substeps, run);
 
@@ -116,8 +116,8 @@ private:
         std::vector<std::uint32_t> from, to;
         for (std::uint32_t i = 0; i < size; ++i) {
             if (is_done[i]) from.push_back(i), to.push_back(indices[i]);
-            if (options_.met && met[i]) options_.met[indices[i]] = 1;
-            if (options_.taken && taken[i] > 0) options_.taken[indices[i]] = taken[i];
+            if (options_.sinks.met && met[i]) options_.sinks.met[indices[i]] = 1;
+            if (options_.sinks.taken && taken[i] > 0) options_.sinks.taken[indices[i]] = taken[i];
         }
         points_.put(to, end.select(from));
 
@@ -131,8 +131,7 @@ private:
     {
         SolveOptions options = options_;
         options.substeps = substeps;
-        options.met = nullptr;  // path kinds give that information
-        options.taken = nullptr;
+        options.sinks = {};  // path kinds give that information
         const FrameFigures figures = solve(set, dynamics_, options, run);
         if (limits_.is_first(substeps))
             done_.add(figures);

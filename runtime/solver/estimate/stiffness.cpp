@@ -270,7 +270,7 @@ double largest_distance(const PointSet& a, const PointSet& b)
 Stiffness::Improvement improvement_of(const PointSet& points, const Dynamics& pulls, SolveOptions options, int substeps)
 {
     options.loads = nullptr;
-    options.log = nullptr;
+    options.sinks = {};
     options.interacts = false;
     const auto solved = [&](int steps) {
         PointSet set = points;

@@ -14,8 +14,7 @@ double fraction_beyond(PointSet finer, const PointSet& solved, const Dynamics& d
                        double tolerance, int max_substeps)
 {
     options.substeps *= 3;
-    options.met = nullptr;
-    options.taken = nullptr;
+    options.sinks = {};
     solve_within(finer, dynamics, options, tolerance / 4, max_substeps);
     const IdIndex indices(solved.id());
     std::size_t compared = 0, beyond_tolerance = 0;

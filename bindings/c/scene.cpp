@@ -3,7 +3,7 @@
 #include <map>
 
 #include "bindings/c/interface.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 namespace {

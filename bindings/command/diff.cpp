@@ -9,7 +9,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/untrusted.h"
 #include "include/rapid/scene.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/threads.h"
 
 namespace rapid {

@@ -8,7 +8,7 @@
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/threads.h"
 
 namespace rapid {

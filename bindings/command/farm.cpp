@@ -12,7 +12,7 @@
 
 #include "bindings/command/processes.h"
 #include "bindings/command_line/programs.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/files/input_file.h"
 #include "runtime/files/start_program.h"
 

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "runtime/base/error.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/files/input_file.h"
 
 namespace rapid {

@@ -10,7 +10,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/scene/installation.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/files/output_file.h"
 
 namespace rapid {

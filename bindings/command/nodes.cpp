@@ -5,7 +5,7 @@
 
 #include "bindings/command_line/command.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 namespace {

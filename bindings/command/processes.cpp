@@ -19,7 +19,7 @@
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/programs.h"
 #include "bindings/command_line/signals.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/files/file_error.h"
 #include "runtime/files/start_program.h"
 

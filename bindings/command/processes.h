@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

@@ -28,7 +28,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/host/graph_parameter.h"
 #include "bindings/run/study_scene.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/base/threads.h"
 #include "runtime/files/input_file.h"

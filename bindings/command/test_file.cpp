@@ -14,7 +14,7 @@
 #include <cstring>
 
 #include "bindings/command_line/command.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

@@ -24,7 +24,7 @@
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/picture_sheet.h"
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/frame_pattern.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "bindings/host/param_facts.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bindings/run/setting_entries.h"
 #include "runtime/base/error.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/setting_names.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/input_file.h"

@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/report/frame_profile.h"
 #include "runtime/report/memory.h"
 #include "runtime/solver/estimate/stiffness.h"
@@ -98,7 +98,9 @@ ProfileFile::ProfileFile(std::string path) : path_(std::move(path))
     } catch (const Error& error) {
         error_ = error;
     }
-    append(R"({"name":"process_name","ph":"M","pid":1,"args":{"name":"rapid"}})");
+    JsonText process;
+    process.object("name", "process_name", "ph", "M", "pid", 1, "args", [&] { process.object("name", "rapid"); });
+    append(process.text());
     append(row_name(frames_row, "frames"));
     append(row_name(passes_row, "nodes"));
 }

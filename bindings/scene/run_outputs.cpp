@@ -13,7 +13,7 @@
 #include "bindings/host/kernel.h"
 #include "bindings/run/races.h"
 #include "bindings/scene/scene_impl.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/io/format.h"
 #include "runtime/report/explanation_text.h"
 #include "runtime/report/statistics.h"

@@ -6,7 +6,7 @@
 #include "bindings/scene/scene_data.h"
 #include "bindings/scene/scene_inside.h"
 #include "bindings/scene/state_file_io.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/report/number_text.h"
 

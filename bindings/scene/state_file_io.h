@@ -22,7 +22,7 @@ auto with_file_name(const std::string& path, const F& f) -> Result<decltype(f())
             return f();
         } catch (Error& error) {
             throw error.at({path, 0});
-        } catch (const nlohmann::json::exception&) {
+        } catch (const CheckedJson::exception&) {
             throw Error("its header was not written by Rapid").at({path, 0});
         }
     } catch (...) {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "runtime/base/error.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/picture/tone.h"
 
 namespace rapid {

@@ -12,7 +12,7 @@
 
 #include "bindings/view/points.h"
 #include "include/rapid/shapes.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

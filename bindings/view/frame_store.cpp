@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "bindings/view/frame_message.h"
 #include "include/rapid/scene.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

@@ -11,7 +11,7 @@
 
 #include "bindings/scene/scene_inside.h"
 #include "bindings/view/request_fields.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/solver/figure_table.h"
 
 namespace rapid {
@@ -33,7 +33,7 @@ const std::string& charts()
     if (*chart) list.push_back({{"key", #name}, {"title", chart}, {"unit", unit}});
         RAPID_FIGURES(RAPID_FIGURE)
 #undef RAPID_FIGURE
-        return list.dump();
+        return json_text(list);
     }();
     return text;
 }
@@ -524,9 +524,16 @@ void ViewRequests::send_figures(const Json& json, const PendingRequest& request)
     const std::uint64_t run = simulation_.status().run;
     const std::vector<std::string> all = simulation_.store().statistics(run, after, max_figures);
     // The texts are forwarded unchanged: parsing and writing them again took ten times as long.
-    request.answer(fmt::format(R"({{"re": {}, "run": {}, "figures": [{}], "more": {}, "charts": {}}})", request.re, run,
-                               fmt::join(all, ","), all.size() == max_figures, charts()),
-                   false);
+    JsonText answer;
+    answer.object(
+        "re", request.re, "run", run, "figures",
+        [&] {
+            answer.begin_list();
+            for (const std::string& figures : all) answer.written(figures);
+            answer.end();
+        },
+        "more", all.size() == max_figures, "charts", [&] { answer.written(charts()); });
+    request.answer(answer.text(), false);
 }
 
 void ViewRequests::send_arguments(const Json& json, const PendingRequest& request)

@@ -13,7 +13,7 @@
 #include "bindings/view/frame_message.h"
 #include "bindings/view/server.h"
 #include "bindings/view/simulation.h"
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

@@ -23,6 +23,7 @@
 #include <thread>
 
 #include "runtime/base/error.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 
 namespace rapid {
@@ -184,7 +185,12 @@ private:
     enum class Token { None, Lasting, Once };
 
     // Returns the message for a page opened with the one-time token, so that it can connect again.
-    std::string lasting_token() const { return fmt::format(R"({{"re": 0, "token": "{}"}})", token_); }
+    std::string lasting_token() const
+    {
+        JsonText json;
+        json.object("re", 0, "token", token_);
+        return json.text();
+    }
 
     // Returns the token among the subprotocols. That of the address to open is valid once.
     Token token_of(const Request& request)

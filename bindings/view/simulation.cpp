@@ -9,6 +9,7 @@
 #include "bindings/scene/scene_inside.h"
 #include "bindings/view/points.h"
 #include "bindings/view/run.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 namespace {
@@ -185,7 +186,9 @@ ViewFramePtr ViewSimulation::read_file(std::int64_t number)
     if (file == options_.files.end()) return nullptr;
     const SceneFrame points = SceneFrame::read(file->second).value();
     auto frame = std::make_shared<ViewFrame>(ViewFrame{number, ++file_uses_, points, ""});  // older ones make room
-    frame->statistics = fmt::format("{{\"frame\": {}, \"points\": {}}}", number, points.size());
+    JsonText statistics;
+    statistics.object("frame", number, "points", points.size());
+    frame->statistics = statistics.text();
     frame->bytes = bytes_of(*frame);
     store_.put(frame);
     {

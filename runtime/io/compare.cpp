@@ -10,7 +10,7 @@
 #include <set>
 #include <tuple>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/parallel.h"
 #include "runtime/base/printable.h"
 #include "runtime/io/attribute_names.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/text_table.h"

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "runtime/base/error.h"
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/per_thread.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/files/output_file.h"

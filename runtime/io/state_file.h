@@ -18,7 +18,7 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/base/checked_json.h"
+#include "runtime/base/json.h"
 #include "runtime/files/input_file.h"
 #include "runtime/points/saved_state.h"
 

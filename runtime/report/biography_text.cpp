@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/graph/evaluation.h"
 #include "runtime/report/biography.h"
 

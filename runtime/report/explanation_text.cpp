@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/base/setting_names.h"
 

@@ -1,6 +1,6 @@
 #include "runtime/report/frame_profile.h"
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 
 namespace rapid {
 

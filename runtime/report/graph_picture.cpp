@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/graph/explain.h"
 #include "runtime/graph/node_handle.h"

@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/report/error_budget.h"
 #include "runtime/solver/estimate/stiffness.h"
 
 namespace rapid {
-
-using nlohmann::ordered_json;
 
 FrameFigures statistics_of(const FrameResult& result)
 {
@@ -167,9 +164,7 @@ std::string to_json(const FrameFigures& frame, const ErrorSources* errors)
 
 std::string json_head(const RunStatistics& run)
 {
-    // A file name need not be UTF-8.
-    const std::string graph = ordered_json(run.graph).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-    return fmt::format("{{ \"graph\": {}, \"threads\": {},\n  \"frames\": [", graph, run.threads);
+    return fmt::format("{{ \"graph\": {}, \"threads\": {},\n  \"frames\": [", json_text(run.graph), run.threads);
 }
 
 std::string json_line(const FrameFigures& frame, bool first, const ErrorSources* errors)
@@ -185,8 +180,7 @@ std::string json_end(const RunStatistics& run)
         write(stiff, run.stiff);
         text += fmt::format("  \"stiff\": {},\n", stiff.text());
     }
-    return text +
-           fmt::format("  \"peak_bytes\": {}, \"seconds\": {} }}\n", run.peak_bytes, ordered_json(run.seconds).dump());
+    return text + fmt::format("  \"peak_bytes\": {}, \"seconds\": {} }}\n", run.peak_bytes, json_text(run.seconds));
 }
 
 }  // namespace rapid

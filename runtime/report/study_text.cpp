@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "runtime/base/json_text.h"
+#include "runtime/base/json.h"
 #include "runtime/report/number_text.h"
 #include "runtime/report/study.h"
 

@@ -8,8 +8,8 @@
 #include <set>
 #include <span>
 
-#include "runtime/base/checked_json.h"
 #include "runtime/base/error.h"
+#include "runtime/base/json.h"
 #include "runtime/base/memory_budget.h"
 #include "runtime/files/base64.h"
 #include "runtime/files/input_file.h"

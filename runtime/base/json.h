@@ -1,3 +1,76 @@
+// JSON as Rapid reads and writes it: CheckedJson and SortedCheckedJson for parsed values, JsonText for strings.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <ranges>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+namespace rapid {
+
+// Converts JSON to numbers, with checks. With nlohmann's own types, a number that is too large for the requested type
+// becomes an arbitrary one: 4294967297 becomes the int 1, and 1e30 is undefined.
+template <class T, class = void>
+struct CheckedNumber : nlohmann::adl_serializer<T> {
+};
+
+// Integers, including enumerations. Throws json::type_error if the value is not a number, has a fraction, or is out of
+// T's range.
+template <class T>
+struct CheckedNumber<T, std::enable_if_t<(std::is_integral_v<T> && !std::is_same_v<T, bool>) || std::is_enum_v<T>>> {
+    template <class Json>
+    static void to_json(Json& json, T value)
+    {
+        nlohmann::to_json(json, value);
+    }
+
+    template <class Json>
+    static void from_json(const Json& json, T& value)
+    {
+        if constexpr (std::is_enum_v<T>) {
+            value = static_cast<T>(json.template get<std::underlying_type_t<T>>());
+        } else {
+            const auto refuse = [&](const std::string& what) {
+                throw nlohmann::json::type_error::create(302, what + json.dump(), &json);
+            };
+            // Every integer of T lies in [-2^digits, 2^digits), whose ends a double can represent.
+            const double beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
+            const double least = std::is_signed_v<T> ? -beyond : 0.0;
+            if (json.is_number_unsigned()) {
+                const auto number = json.template get_ref<const typename Json::number_unsigned_t&>();
+                if (!std::in_range<T>(number)) refuse("an integer is out of range: ");
+                value = static_cast<T>(number);
+            } else if (json.is_number_integer()) {
+                const auto number = json.template get_ref<const typename Json::number_integer_t&>();
+                if (!std::in_range<T>(number)) refuse("an integer is out of range: ");
+                value = static_cast<T>(number);
+            } else if (json.is_number_float()) {
+                const double number = json.template get_ref<const typename Json::number_float_t&>();
+                if (!(number >= least && number < beyond)) refuse("an integer is out of range: ");
+                if (number != std::trunc(number)) refuse("must be an integer: ");
+                value = static_cast<T>(number);
+            } else {
+                throw nlohmann::json::type_error::create(302, std::string("must be a number, is ") + json.type_name(),
+                                                         &json);
+            }
+        }
+    }
+};
+
+// JSON whose members keep their order.
+using CheckedJson = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool, std::int64_t,
+                                         std::uint64_t, double, std::allocator, CheckedNumber>;
+// JSON with members sorted by name, for files from elsewhere: finding a member of an object of n takes log n.
+using SortedCheckedJson = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t, std::uint64_t,
+                                               double, std::allocator, CheckedNumber>;
+
 // Builds JSON as a string, one value at a time. All of Rapid writes JSON through it.
 //
 //   JsonText json;
@@ -5,19 +78,6 @@
 //
 // It builds no tree of values, because memory may run out: nlohmann's destructor of a list or an object allocates, and
 // terminates the program if that fails. That library formats single values.
-#pragma once
-
-#include <concepts>
-#include <optional>
-#include <ranges>
-#include <string>
-#include <string_view>
-#include <variant>
-
-#include "runtime/base/checked_json.h"
-
-namespace rapid {
-
 class JsonText {
 public:
     // indent: spaces per level. If it is not 0, each member and element gets its own line.
@@ -67,6 +127,13 @@ public:
         } else {
             add(nlohmann::json(value));
         }
+    }
+
+    // Writes a value that is JSON already.
+    void written(std::string_view json)
+    {
+        separate();
+        text_ += json;
     }
 
     // Writes members of the open object. The arguments alternate between names and values.

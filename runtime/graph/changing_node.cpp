@@ -10,7 +10,6 @@
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/step_shape.h"
 #include "runtime/solver/changing.h"
-#include "runtime/solver/placed_constraint.h"
 
 namespace rapid {
 namespace {

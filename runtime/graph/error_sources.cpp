@@ -22,7 +22,7 @@
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/solver/collision/hits.h"
-#include "runtime/solver/step_scene.h"
+#include "runtime/solver/step_context.h"
 
 namespace rapid {
 namespace {

@@ -9,12 +9,12 @@
 #include "runtime/points/members.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/mesh_surface.h"
+#include "runtime/solver/changing.h"
 #include "runtime/solver/constraints/energy_bound.h"
 #include "runtime/solver/constraints/holding.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/twin.h"
-#include "runtime/solver/placed_constraint.h"
 
 #include <map>
 

@@ -16,7 +16,7 @@
 #include "runtime/operators/solve/aging.h"
 #include "runtime/operators/solve/step_dynamics.h"
 #include "runtime/operators/solve/step_observers.h"
-#include "runtime/solver/collision/stuck_columns.h"
+#include "runtime/solver/collision/collision_block.h"
 #include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/interaction.h"
 

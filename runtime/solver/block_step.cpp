@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "runtime/base/cancellation.h"
-#include "runtime/solver/timed_force.h"
+#include "runtime/solver/changing.h"
 
 namespace rapid {
 namespace {

@@ -4,10 +4,12 @@
 // (operators/solve/step_dynamics.h). Called on the thread that evaluates nodes.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -82,6 +84,45 @@ public:
     ChangingCollider(const Collider& end, AtPart<Collider> given) : Collider(end), at(std::move(given)) {}
 
     const AtPart<Collider> at;
+};
+
+// The type of a parameter that gives positions, which are interpolated if it is a function of the frame.
+constexpr std::string_view place_type = "vec3, attribute or moving shape";
+
+// An interface of a Constraint whose node has such a parameter.
+class Placed {
+public:
+    virtual ~Placed() = default;
+
+    // Parts of the step at which positions are given.
+    static constexpr std::array<double, 4> parts = {0, 1.0 / 3, 2.0 / 3, 1};
+    using AtParts = std::array<std::shared_ptr<const Constraint>, parts.size()>;
+
+    // Returns the constraint in its state at the end of the step, with positions on the cubic through those at
+    // `parts`. Returns null if these are not numbers.
+    virtual std::shared_ptr<const Constraint> through(const AtParts& at) const = 0;
+};
+
+// A force that changes within the step, given at evenly spaced times. Each substep uses the one nearest to its middle.
+class TimedForce : public Force {
+public:
+    // forces: at k h / (n - 1) after `begin` (s), k = 0 ... n - 1. less: an acceleration that is applied separately,
+    // m/s².
+    TimedForce(std::vector<std::shared_ptr<const Force>> forces, double begin, double h, const Vec3d& less);
+
+    void contribute(const Chunk& chunk, Forces& forces) const override;
+    bool add_potential(const Chunk&, std::span<double>) const override { return false; }
+
+    // Returns the whole force at a time, s; nothing if it differs between points.
+    std::optional<Uniform> uniform_at(double time) const;
+
+private:
+    std::size_t nearest(double time) const;
+    void contribute(std::size_t k, const Chunk& chunk, Forces& forces) const;
+
+    std::vector<std::shared_ptr<const Force>> forces_;
+    double begin_, h_;  // s
+    Vec3d less_;
 };
 
 }  // namespace rapid

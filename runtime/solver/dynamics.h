@@ -112,7 +112,7 @@ public:
     // points that stick. viscosity: 1/s, the rate at which the surface slows sliding points.
     std::optional<PerPoint<float>> adhesion;
     PerPoint<float> viscosity{0.0f};
-    // Radius of the points; see collision_radii.h if not given.
+    // Radius of the points; see step_context.h if not given.
     std::optional<PerPoint<float>> radius;
 };
 

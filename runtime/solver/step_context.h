@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -9,14 +10,74 @@
 #include <vector>
 
 #include "runtime/base/parallel.h"
+#include "runtime/points/point_set.h"
 #include "runtime/solver/collision/collisions.h"
+#include "runtime/solver/collision/obstacle.h"
+#include "runtime/solver/constraints/projection.h"
+#include "runtime/solver/dynamics.h"
 #include "runtime/solver/figures.h"
 #include "runtime/solver/motion/ballistic_batch.h"
 #include "runtime/solver/point_errors.h"
 #include "runtime/solver/solve.h"
-#include "runtime/solver/step_scene.h"
 
 namespace rapid {
+
+// The radii at which points collide with shapes, m: those of the collider; otherwise the attribute pscale; if that is
+// 0 or missing, the radius from a constraint. Points that keep each other at a distance thus have the same size for
+// shapes.
+class CollisionRadii {
+public:
+    // Throws Error, with the node, if a constraint's attribute is missing.
+    CollisionRadii(const Dynamics& dynamics, const PointSet& points);
+
+    // Valid while this object, the collider and the points' columns exist.
+    Strided<float> of(const Collider& collider) const;
+
+private:
+    const PointSet* points_;
+    std::vector<float> by_constraint_;  // pscale, or from constraints; empty if these give nothing
+};
+
+// The dynamics of a chain, resolved for one set of points and one step: uniform forces summed, parameters and groups
+// looked up as columns.
+
+// A force that varies between points, or acts only on a group.
+struct StepForce {
+    const Force* force;
+    std::optional<Uniform> uniform;
+    Strided<std::uint8_t> members;
+    bool all;
+};
+
+struct StepAction {
+    const Action* action;
+    std::unique_ptr<ActionPass> pass;
+};
+
+struct StepScene {
+    // Throws Error, with the node, for the first dynamic in the chain that does not fit the points.
+    StepScene(PointSet& points, const Dynamics& dynamics, double h);
+
+    std::vector<StepAction> actions;
+    Uniform uniform;  // the sum of all uniform forces on all points
+    std::vector<StepForce> forces;
+    std::optional<CollisionRadii> radii;  // of the obstacles
+    std::vector<Obstacle> obstacles;
+    std::vector<LocalConstraint> constraints;
+    bool kills = false, records = false;   // some collider kills, or records hits
+    const Column<Vec3f>* force = nullptr;  // the column `force`; null if it is zero
+    Strided<float> mass;                   // kg
+
+    bool is_uniform() const { return forces.empty() && !force; }
+    // Returns true if points far from shapes have a path in closed form for the whole frame.
+    bool is_ballistic() const;
+};
+
+// Returns true if motion under a constant acceleration and these linear forces has a closed form for the whole frame.
+inline bool has_closed_form(const Linear& linear) { return linear.w2 == 0 && linear.c == 0; }
+
+// Returns the column `force`; null if it is missing or zero everywhere.
+const Column<Vec3f>* nonzero_forces_of(const PointSet& points);
 
 // Number of points that go through their substeps together: their state, paths and contacts stay in the first and
 // second-level caches. A chunk, the unit of work of a thread, has several blocks.

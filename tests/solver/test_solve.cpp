@@ -1,5 +1,5 @@
-// The step without constraints: closed forms at any number of substeps; determinism; wrong input. Covers step_scene,
-// step_context, point_errors, point_block, block_step and uncoupled_step; coupled_step is covered by constraints/.
+// The step without constraints: closed forms at any number of substeps; determinism; wrong input. Covers solve,
+// step_context, point_errors, point_block and block_step; coupled_step is covered by constraints/.
 #include "runtime/solver/solve.h"
 
 #include <tbb/global_control.h>

@@ -14,10 +14,8 @@
 #include "runtime/shapes/motion/level_set_sequence.h"
 #include "runtime/shapes/motion/moving.h"
 #include "runtime/solver/changing.h"
-#include "runtime/solver/collision/stuck_columns.h"
-#include "runtime/solver/collision_radii.h"
-#include "runtime/solver/placed_constraint.h"
-#include "runtime/solver/timed_force.h"
+#include "runtime/solver/collision/collision_block.h"
+#include "runtime/solver/step_context.h"
 
 namespace rapid {
 namespace {

@@ -14,10 +14,10 @@
 #include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/estimate/coupled_errors.h"
 #include "runtime/solver/estimate/energy_drift.h"
+#include "runtime/solver/estimate/error_control.h"
 #include "runtime/solver/estimate/resolution.h"
 #include "runtime/solver/estimate/shadow.h"
 #include "runtime/solver/estimate/stiffness.h"
-#include "runtime/solver/estimate/tolerance_check.h"
 #include "runtime/solver/interaction.h"
 
 namespace rapid {

@@ -11,6 +11,7 @@
 // positions there. PenetrationCorrection and PositionRounding follow at the end of the frame.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,13 +26,81 @@
 #include "runtime/solver/collision/first_contacts.h"
 #include "runtime/solver/collision/free_motion.h"
 #include "runtime/solver/collision/obstacle.h"
-#include "runtime/solver/collision/penetration_correction.h"
 #include "runtime/solver/collision/plane_contacts.h"
-#include "runtime/solver/collision/position_rounding.h"
 #include "runtime/solver/collision/stuck_points.h"
 #include "runtime/solver/collision/touched_points.h"
 
 namespace rapid {
+
+// The final penetration correction, and the penetration that remains.
+//
+// Parts of a body that meet, or two bodies, leave no space for a point between them. At the end of the frame the point
+// is moved out of both and keeps its velocity: along the shortest way or, if that only leads from one side of a closed
+// gap to the other, to the nearest free position.
+class PenetrationCorrection {
+public:
+    PenetrationCorrection(const CollisionBlock& block, const TouchedPoints& touched, ContactAudit& audit)
+        : block_(block), touched_(touched), audit_(audit)
+    {
+    }
+
+    // P: at the end of the frame. lost: points that found no way out of a shape in their substeps.
+    void run(std::span<Vec3d> P, const std::vector<std::uint32_t>& lost);
+    // The displacements, in order.
+    std::span<const Ejection::Displacement> displacements() const { return displacements_; }
+
+    // Returns the largest penetration of a touched point, m, given the rounded positions.
+    double deepest(std::span<const Vec3f> P);
+
+private:
+    void move_out(const Obstacle& obstacle, std::span<Vec3d> P, bool to_free_position);
+
+    const CollisionBlock& block_;
+    const TouchedPoints& touched_;
+    ContactAudit& audit_;
+    std::vector<std::uint32_t> inside_, still_inside_;
+    std::vector<Ejection::Displacement> displacements_;
+    DistanceQuery query_;
+};
+
+// Rounds positions to single precision at the end of a frame, on the outer side of the surfaces that points are on.
+//
+// Rounding to nearest may put a point on the inner side of its surface, by up to half an ulp per axis. The coordinate
+// with the largest effect is then moved by the least amount that brings the point out again. A point that has not
+// moved keeps its bits, so that nothing creeps.
+class PositionRounding {
+public:
+    PositionRounding(const CollisionBlock& block, const TouchedPoints& touched) : block_(block), touched_(touched) {}
+
+    // Starts a new block.
+    void begin()
+    {
+        initial_P_.resize(block_.size());
+        for (auto& side : moved_on_) side.resize(block_.obstacles.size());
+    }
+
+    // Is called before rounding. Moves points that have moved on surfaces onto them, to double precision, to remove
+    // the error of their paths. initial: positions at the beginning of the frame.
+    void snap(std::span<Vec3d> P, std::span<const Vec3f> initial);
+    // Is called after rounding. Lifts those points to the outer sides of their surfaces.
+    void lift(std::span<Vec3f> rounded);
+
+private:
+    void find_moved(std::span<const Vec3d> P, std::span<const Vec3f> initial);
+    template <class Position, class Use>
+    void query_surfaces(const Position& position, const Use& use);
+    double tolerance(std::size_t i, const Vec3d& P, const Obstacle& obstacle) const;
+
+    const CollisionBlock& block_;
+    const TouchedPoints& touched_;
+    std::vector<Vec3f> initial_P_;
+
+    // Points of the block that have moved on a surface in the frame, by the surface's side of an edge and obstacle,
+    // and those that can have touched only one plane.
+    std::array<std::vector<std::vector<std::uint32_t>>, 2> moved_on_;
+    std::vector<std::uint32_t> moved_on_plane_;
+    DistanceQuery query_;
+};
 
 // The paper's methods, `backtrack` (§4.2) and `project` (§4.1): points inside a shape at the end of a substep are
 // moved out of it (numerics.md, Collision).

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/solver/collision/response.h"
+#include "runtime/solver/collision/obstacle.h"
 
 namespace rapid {
 namespace {

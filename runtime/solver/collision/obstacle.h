@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "runtime/math/vec.h"
 #include "runtime/points/column.h"
 #include "runtime/shapes/first_contact.h"
 #include "runtime/shapes/motion/moving_body.h"
@@ -73,5 +74,12 @@ private:
 // precision. points: indices in the set; all spans have shape [n].
 void keep_outside(std::span<const Obstacle> obstacles, std::span<const std::uint32_t> points, std::span<const Vec3d> P,
                   std::span<std::uint8_t> marks);
+
+// Returns the velocity after a contact, given the velocities of the point (v) and of the surface (vc) at the contact,
+// m/s, and the unit normal n out of the surface. Paper eq. (4), which is frictionless, follows for friction = 0.
+// bounce (ε) in [0, 1], friction (μ) >= 0. Separating pairs keep their velocity.
+//
+// Uses double precision, because in single precision the speed of a point that bounces forever drifts.
+Vec3d contact_response(const Vec3d& v, const Vec3d& vc, const Vec3d& n, double bounce, double friction);
 
 }  // namespace rapid

@@ -155,7 +155,7 @@ public:
     virtual std::shared_ptr<Coupling> begin(const PointSet& points, double frame_length) const = 0;
 
     // Returns the radius, m, that it gives its points if that is not the attribute pscale. Shapes keep the points at
-    // that distance, too (collision_radii.h).
+    // that distance, too (step_context.h).
     virtual std::optional<PerPoint<float>> radius() const { return std::nullopt; }
 
     // Returns the number of substeps, with one iteration each, that its points need to hold each other through a frame

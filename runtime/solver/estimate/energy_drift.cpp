@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "runtime/points/members.h"
-#include "runtime/solver/step_scene.h"
+#include "runtime/solver/step_context.h"
 
 namespace rapid {
 namespace {

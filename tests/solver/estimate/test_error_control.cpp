@@ -1,5 +1,5 @@
 // The check of a tolerance: errors that doubling does not find, its timing, and its cost.
-#include "runtime/solver/estimate/tolerance_check.h"
+#include "runtime/solver/estimate/error_control.h"
 
 #include <atomic>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "runtime/solver/timed_force.h"
+#include "runtime/solver/changing.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "runtime/solver/collision/stuck_columns.h"
+#include "runtime/solver/collision/collision_block.h"
 
 #include <algorithm>
 

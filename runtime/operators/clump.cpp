@@ -8,9 +8,9 @@
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
-#include "runtime/solver/constraints/twin.h"
 
 #include <fmt/format.h>
 

@@ -4,12 +4,12 @@
 // of many grids against that of wide cells (Algorithm 1; solver/constraints/contact_search.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_state.h"
 #include "runtime/solver/constraints/contacts.h"
 #include "runtime/solver/constraints/pile_substeps.h"
 #include "runtime/solver/constraints/spin.h"
-#include "runtime/solver/constraints/twin.h"
 
 namespace rapid {
 namespace {

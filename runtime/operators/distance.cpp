@@ -2,13 +2,13 @@
 //
 //   C = |P_i - P_j| - rest >= and <= 0        compliance in m/N: 0 for a rod, 1 / stiffness for a spring
 //
-// Chains and trees of pairs are solved directly at any length (solver/constraints/tree_motion.h).
+// Chains and trees of pairs are solved directly at any length (solver/constraints/system_motion.h).
 #include "runtime/graph/node.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/members.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contact_search.h"
 #include "runtime/solver/constraints/rows.h"
-#include "runtime/solver/constraints/twin.h"
 
 #include <fmt/format.h>
 

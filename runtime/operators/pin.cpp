@@ -10,11 +10,10 @@
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/mesh_surface.h"
 #include "runtime/solver/changing.h"
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
-#include "runtime/solver/constraints/holding.h"
 #include "runtime/solver/constraints/rows.h"
 #include "runtime/solver/constraints/sleep.h"
-#include "runtime/solver/constraints/twin.h"
 
 #include <map>
 

@@ -31,6 +31,7 @@
 #include <vector>
 
 #include "runtime/points/point_set.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/projected_point.h"
 #include "runtime/solver/dynamics.h"
 #include "runtime/solver/forces.h"
@@ -169,6 +170,62 @@ public:
     // continues that of `before`, the twin of the previous frame, or copies that of this constraint if `before` is
     // null. Returns null if no twin exists; the error of its points is then not estimated.
     virtual std::shared_ptr<const Constraint> twin(const Constraint*) const { return nullptr; }
+};
+
+// Constraints that hold single points by isotropic springs.
+//
+// Under an impulse p from contacts, shapes or rods, a spring of softness s (Row::keep) yields by
+//
+//   w p dt / (1 + w/s)      like a point of inverse mass 1/(1/w + 1/s)
+//
+// and its point has that mass while these act, so they account for the spring's support at once. Row by row, a heavy
+// point on a light one that is held would take iterations in proportion to the mass ratio.
+
+// An interface that such a Coupling also implements.
+class Holding {
+public:
+    virtual ~Holding() = default;
+
+    // Is called before detect(). Makes the points count as heavier from here on.
+    virtual void hold(Substep& step) = 0;
+    // Is called after project(). Updates the springs' forces with the result.
+    virtual void settle(Substep& step) = 0;
+    // Is called after solve_velocities(). Restores the points' masses.
+    virtual void release(Substep& step) = 0;
+};
+
+// Returns a copy of `constraint` that continues the `memory` of `before`, or a copy of its own memory if `before` is
+// null.
+template <class C, class Memory>
+std::shared_ptr<const Constraint> twin_of(const C& constraint, std::shared_ptr<Memory> C::*memory,
+                                          const Constraint* before)
+{
+    auto twin = std::make_shared<C>(constraint);
+    const auto* known = dynamic_cast<const C*>(before);
+    twin.get()->*memory = known ? known->*memory : std::make_shared<Memory>(*(constraint.*memory));
+    return twin;
+}
+
+// Interface of a constraint that saves and loads its memory.
+class Remembering {
+public:
+    virtual ~Remembering() = default;
+    virtual void save(StateWriter& to) const = 0;
+    virtual void load(StateReader& from) const = 0;
+};
+
+// Base of a constraint C whose memory belongs to its node.
+template <class C, class Memory>
+class RememberingConstraint : public Constraint, public Remembering {
+public:
+    std::shared_ptr<Memory> memory;
+
+    std::shared_ptr<const Constraint> twin(const Constraint* before) const override
+    {
+        return twin_of<C, Memory>(static_cast<const C&>(*this), &C::memory, before);
+    }
+    void save(StateWriter& to) const override { to(*memory); }
+    void load(StateReader& from) const override { from(*memory); }
 };
 
 }  // namespace rapid

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "runtime/base/parallel.h"
 #include "runtime/base/per_thread.h"
@@ -565,6 +566,159 @@ void Contacts::close(Substep& step, FrameFigures& figures)
     grids.error = grids_.error;
     grids.excess = grids_.excess;
     grids.search_seconds = search_seconds_;
+}
+
+namespace {
+
+// The change of a neighbour's impulse that wakes a sleeper, relative to its burden.
+constexpr double disturbing = 0.1;
+
+// The largest overlap at which two points may fall asleep, relative to the smaller radius.
+constexpr double too_deep_to_sleep = 0.05;
+
+// Returns the impulse on i, N s.
+Vec3f impulse_of(const PairContact& contact, const PairImpulses& impulses)
+{
+    return impulses.normal[contact.pair] * contact.n.cast<float>() + impulses.tangential[contact.pair];
+}
+
+}  // namespace
+
+bool ContactSleep::wake_by_impact(const ContactPacks& packs, const PairImpulses& impulses,
+                                  const ContactMaterial& material, Substep& step)
+{
+    if (!any()) return false;
+    const double at_rest = resting_speed(step);
+    shock_.clear();
+    packs.for_each([&](const PairContact& contact) {
+        const auto [i, j] = std::pair(contact.i, contact.j);
+        const bool first = asleep(i);
+        if (first == asleep(j)) return;
+        const double closing = -contact.n.dot(step.v[i] - step.v[j]);
+        if (closing < at_rest || contact.n.dot(step.points[i].P - step.points[j].P) > contact.reach) return;
+        if (shock_.empty()) shock_.assign(step.size(), 0);
+        const std::uint32_t hit = first ? i : j, by = first ? j : i;
+        shock_[hit] = std::max(shock_[hit], closing / step.points[by].w);
+    });
+    if (shock_.empty()) return false;
+    const auto moves = [&](std::size_t i) { return shock_[i] * sleep_->inverse_mass(i) >= at_rest; };
+    for (bool spreads = true; spreads;) {
+        spreads = false;
+        for (const auto& [i, j] : impulses.pairs) {
+            for (const auto& [from, to] : {std::pair(i, j), std::pair(j, i)}) {
+                if (!(0.5 * shock_[from] > shock_[to]) || !moves(from) || !asleep(to)) continue;
+                const double reach = near_contact * material.reach(i, j);
+                if ((step.points[i].P - step.points[j].P).squaredNorm() > reach * reach) continue;
+                shock_[to] = 0.5 * shock_[from];
+                spreads |= moves(to);
+            }
+        }
+    }
+    bool woken = false;
+    for (std::size_t i = 0; i < step.size(); ++i) {
+        if (!asleep(i) || !moves(i)) continue;
+        woken = true;
+        sleep_->wake_now(i, step);
+    }
+    sleep_->wake_islands_now(step);
+    return woken;
+}
+
+void ContactSleep::wake_by_load(const PairContact& contact, const PairImpulses& impulses, const Substep& step) const
+{
+    const bool first = asleep(contact.i);
+    if (first == asleep(contact.j)) return;
+    const std::uint32_t sleeper = first ? contact.i : contact.j;
+    Vec3f change = impulse_of(contact, impulses);
+    if (!impulses.resting.empty()) change -= impulses.resting[contact.pair];
+    if (change.norm() > disturbing * step.dt * sleep_->burden(sleeper)) sleep_->wake(sleeper);
+}
+
+void ContactSleep::report(const ContactPacks& packs, PairImpulses& impulses, const ContactMaterial& material,
+                          const Substep& step) const
+{
+    if (impulses.resting.empty()) impulses.resting.assign(impulses.pairs.size(), Vec3f::Zero());
+    const double per_dt = 1 / step.dt;
+    std::vector<std::uint8_t> deep;
+    packs.for_each([&](const PairContact& contact) {
+        const auto [i, j] = std::pair(contact.i, contact.j);
+        if (both_asleep(i, j)) return;
+        const double overlap = contact.reach - (step.points[i].P - step.points[j].P).norm();
+        const Vec3f impulse = impulse_of(contact, impulses);
+        for (const std::uint32_t k : {i, j}) sleep_->add_load(k, impulse.norm() * per_dt);
+        if (overlap > too_deep_to_sleep * std::min(material.radius[i], material.radius[j])) {
+            deep.resize(step.size());
+            deep[i] = deep[j] = 1;
+        }
+        if (!asleep(i) && !asleep(j)) impulses.resting[contact.pair] = impulse;
+    });
+    if (deep.empty()) return;
+    packs.for_each([&](const PairContact& contact) {
+        if (!deep[contact.i] && !deep[contact.j]) return;
+        for (const std::uint32_t i : {contact.i, contact.j}) sleep_->keep_awake(i);
+    });
+}
+
+namespace {
+
+// Overlap above which a contact is corrected, relative to the smaller radius.
+constexpr double too_deep = 0.05;
+
+// An overlap is stuck if a substep leaves more than this fraction of it; four fifths should have been recovered.
+constexpr double stuck = 0.9;
+
+// Mass ratio above which the iterations do not suffice.
+constexpr double uneven = 2;
+
+void pass_on(Substep& step, std::uint32_t from, std::uint32_t to)
+{
+    if (step.support[from] <= step.next_support[to] + 1) return;
+    step.next_support[to] = step.support[from] - 1;
+    if (!step.support_v.empty()) step.next_support_v[to] = step.support_v[from];
+}
+
+}  // namespace
+
+void HeavyContacts::begin(const Substep& step)
+{
+    double most = 0, least = std::numeric_limits<double>::infinity();
+    for (const ProjectedPoint& at : step.points)
+        if (at.w > 0) most = std::max(most, at.w), least = std::min(least, at.w);
+    any_ = most > uneven * least;
+}
+
+void HeavyContacts::pass_on_support(const ContactPack& pack, Substep& step)
+{
+    for (std::uint32_t l = 0; l < pack.count; ++l) {
+        if (!(pack.normal_impulse[l] > 0)) continue;
+        const std::uint32_t i = pack.i[l], j = pack.j[l];
+        pass_on(step, i, j);
+        pass_on(step, j, i);
+    }
+}
+
+// The lighter point is a wall if it is better supported, or if the heavy one wedges it against its support. The heavy
+// point also loses its velocity into the lighter one: at most its own velocity relative to the lighter one's support,
+// or the resting speed. A light point that is squeezed out or thrown thus gives it no more, and a shape that lifts both
+// still takes away the speed due to weight.
+void HeavyContacts::correct(const PairContact& contact, const ContactMaterial& material, Substep& step)
+{
+    const bool first = step.points[contact.i].w < step.points[contact.j].w;  // is the heavier
+    const std::uint32_t heavy = first ? contact.i : contact.j, light = first ? contact.j : contact.i;
+    if (!(step.points[heavy].w > 0) || step.support[light] == 0) return;
+    const Vec3d d = step.points[heavy].P - step.points[light].P;
+    const double distance = d.norm(), overlap = contact.reach - distance;
+    const double allowed = too_deep * std::min(material.radius[contact.i], material.radius[contact.j]);
+    const double depth = overlap - allowed;
+    if (!(depth > 0) || !(distance > 0)) return;
+    const bool wedged = -contact.initial_gap > allowed && overlap > stuck * -contact.initial_gap &&
+                        step.points[light].w > uneven * step.points[heavy].w;
+    if (step.support[light] <= step.support[heavy] && !wedged) return;
+    const Vec3d n = d / distance;
+    step.points[heavy].P += depth * n;
+    const Vec3d support = step.support_v.empty() ? Vec3d(Vec3d::Zero()) : step.support_v[light];
+    const double own = -n.dot(step.v[heavy] - support), closing = n.dot(step.v[light] - step.v[heavy]);
+    step.v[heavy] += std::clamp(closing, 0.0, std::max(own, resting_speed(step))) * n;
 }
 
 }  // namespace rapid

@@ -8,7 +8,6 @@
 
 #include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/energy_bound.h"
-#include "runtime/solver/constraints/holding.h"
 #include "runtime/solver/constraints/pair_impulses.h"
 #include "runtime/solver/constraints/shape_contacts.h"
 #include "runtime/solver/ledger.h"

@@ -3,8 +3,8 @@
 //   Δv = w ∇C p
 //
 // with w their inverse masses. Two-sided rows apply their own force over a substep first, without adding or removing
-// energy (tree_motion.h, system_motion.h). The code here then accounts for contacts, shapes and other constraints that
-// pushed their points since. One-sided rows do all of their work here, like contacts.
+// energy (system_motion.h, system_motion.h). The code here then accounts for contacts, shapes and other constraints
+// that pushed their points since. One-sided rows do all of their work here, like contacts.
 #pragma once
 
 #include <algorithm>
@@ -120,7 +120,7 @@ struct Row {
         first = function.residual(P, gradient);
     }
     // Makes the row keep its points at their current positions. Changes by others affect its force throughout the
-    // substep, as the force follows C: α ΔF = -θ ΔC (tree_motion.h). Half of the impulse ΔF dt moves positions.
+    // substep, as the force follows C: α ΔF = -θ ΔC (system_motion.h). Half of the impulse ΔF dt moves positions.
     void keep(const Substep& step)
     {
         Vectors gradient;
@@ -129,7 +129,7 @@ struct Row {
         is_resolved = !is_stiff(inverse_mass(step, gradient), step.dt);
         softness = softness_of(compliance, is_resolved, step.dt);
     }
-    // Updates the force of a row whose points held against others by their mass (holding.h).
+    // Updates the force of a row whose points held against others by their mass (constraint.h).
     void settle(Substep& step)
     {
         Vectors gradient;

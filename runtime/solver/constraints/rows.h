@@ -18,7 +18,7 @@
 //   };
 //
 // Two-sided rows first apply their forces as part of the points' free motion: rows over two points that form trees are
-// solved directly (tree_motion.h), all others by conjugate gradients (system_motion.h). They then take part in the
+// solved directly (system_motion.h), all others by conjugate gradients (system_motion.h). They then take part in the
 // projection alongside contacts and shapes, by Gauss-Seidel in colours (row_schedule.h). One-sided rows act only in
 // the projection.
 #pragma once
@@ -39,7 +39,6 @@
 #include "runtime/solver/constraints/row_schedule.h"
 #include "runtime/solver/constraints/sleep.h"
 #include "runtime/solver/constraints/system_motion.h"
-#include "runtime/solver/constraints/tree_motion.h"
 #include "runtime/solver/figures.h"
 #include "runtime/solver/step_log.h"
 
@@ -323,7 +322,7 @@ public:
         schedule_.for_each_coloured([&](std::uint32_t r) { rows_[schedule_.others()[r]].project(step); });
     }
 
-    // Is called for rows that hold points (holding.h).
+    // Is called for rows that hold points (constraint.h).
     void settle(Substep& step)
     {
         for (Row& row : rows_)

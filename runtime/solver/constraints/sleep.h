@@ -4,7 +4,7 @@
 // error, a fraction of the motion that accelerations cause in a substep. It then has infinite mass for the others and
 // costs nothing. It wakes, with effect from the next substep unless stated otherwise,
 //
-//   when another point hits it: immediately, and with it those that the shock reaches (contact_sleep.h);
+//   when another point hits it: immediately, and with it those that the shock reaches (contacts.h);
 //   when its load, or the acceleration on it, differs from the one with which it fell asleep;
 //   when a shape that touches it is added, removed or moved (shape_contacts.h);
 //   when a node moves it, gives it a velocity, or changes its properties;

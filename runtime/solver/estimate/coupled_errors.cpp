@@ -9,7 +9,7 @@
 
 #include "runtime/points/id_index.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/solver/constraints/twin.h"
+#include "runtime/solver/constraints/constraint.h"
 
 namespace rapid {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <memory>
 
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/contacts.h"
 #include "runtime/solver/constraints/shape_contacts.h"
-#include "runtime/solver/constraints/twin.h"
 #include "tests/solver/scene.h"
 
 namespace rapid::test {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/solver/constraints/constraint.h"
 #include "runtime/solver/constraints/rows.h"
-#include "runtime/solver/constraints/twin.h"
 
 namespace rapid::test {
 

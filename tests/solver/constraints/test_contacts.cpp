@@ -13,7 +13,6 @@
 #include <set>
 
 #include "runtime/shapes/motion/moving.h"
-#include "runtime/solver/constraints/heavy_contacts.h"
 #include "tests/solver/constraints/granular.h"
 
 namespace rapid {

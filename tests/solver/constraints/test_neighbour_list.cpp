@@ -4,7 +4,6 @@
 
 #include <random>
 
-#include "runtime/solver/constraints/stray_pairs.h"
 #include "tests/test.h"
 
 namespace rapid {

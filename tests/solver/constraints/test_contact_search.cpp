@@ -1,4 +1,4 @@
-#include "runtime/solver/constraints/pair_estimate.h"
+#include "runtime/solver/constraints/contact_search.h"
 
 #include <numeric>
 #include <random>

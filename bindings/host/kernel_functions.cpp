@@ -9,7 +9,7 @@
 #include "runtime/math/noise.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/vector_grid.h"
-#include "runtime/shapes/motion/value_on_mesh.h"
+#include "runtime/shapes/motion/mesh_surface.h"
 
 namespace rapid {
 namespace {

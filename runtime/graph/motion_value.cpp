@@ -3,7 +3,7 @@
 
 #include "runtime/graph/located.h"
 #include "runtime/graph/param.h"
-#include "runtime/shapes/motion/turns.h"
+#include "runtime/shapes/motion/motion.h"
 
 namespace rapid {
 namespace {

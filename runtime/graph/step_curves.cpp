@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "runtime/shapes/motion/cubic_part.h"
+#include "runtime/shapes/motion/body_path.h"
 
 namespace rapid {
 

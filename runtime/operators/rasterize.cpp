@@ -11,7 +11,7 @@
 #include "runtime/graph/coupling.h"
 #include "runtime/operators/written_points.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
-#include "runtime/shapes/level_set/min_voxel.h"
+#include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {

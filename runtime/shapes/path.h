@@ -89,4 +89,12 @@ inline bool may_reach(const Path& path, const Box3d& bounds)
     return may_reach(path.P, path.at(path.duration), path.a, path.duration, path.radius, bounds);
 }
 
+// Returns true if a point with speed vn out of the plane, m/s, and acceleration g into it, m/s², rises by less than
+// rounding (`flush`, m) and is back within the time T. A point that is still off the plane after T leaves it, because
+// the cause of its rise may act again before it has fallen back.
+inline bool stays_on_plane(double vn, double g, double flush, double T)
+{
+    return g > 0 && vn * vn <= 2 * g * flush && 2 * vn <= g * T;
+}
+
 }  // namespace rapid

@@ -9,7 +9,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/shapes/level_set/grid_message.h"
+#include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"

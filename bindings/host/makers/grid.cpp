@@ -5,7 +5,7 @@
 #include "bindings/host/makers/grid_files.h"
 #include "bindings/host/makers/points_of_grid.h"
 #include "bindings/host/makers/written_vdb.h"
-#include "runtime/shapes/level_set/min_voxel.h"
+#include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/write_grids.h"
 
 namespace rapid {

@@ -13,7 +13,6 @@
 #include "bindings/host/makers/written_vdb.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/level_set_tools.h"
-#include "runtime/shapes/level_set/min_voxel.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"
 

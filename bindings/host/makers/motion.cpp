@@ -9,7 +9,6 @@
 #include "runtime/shapes/level_set/placed.h"
 #include "runtime/shapes/motion/curves.h"
 #include "runtime/shapes/motion/deforming.h"
-#include "runtime/shapes/motion/turns.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 #include "bindings/host/maker.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/grid_of_points.h"
-#include "runtime/shapes/level_set/min_voxel.h"
+#include "runtime/shapes/level_set/level_set.h"
 
 namespace rapid {
 

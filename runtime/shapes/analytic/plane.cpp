@@ -5,7 +5,7 @@
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/analytic/shape_type.h"
 #include "runtime/shapes/first_contact.h"
-#include "runtime/shapes/plane_rest.h"
+#include "runtime/shapes/path.h"
 
 namespace rapid {
 namespace {

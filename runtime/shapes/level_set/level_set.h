@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "runtime/base/deferred.h"
@@ -55,5 +56,16 @@ LevelSetPtr level_set_torus(double radius, double tube, const Vec3d& center, con
 // no such grid (the message lists those it has), or if the grid is empty, is not a float level set, or has a map other
 // than a uniform scale and translation.
 RAPID_DEFERRED(read_level_set, LevelSetPtr(const std::filesystem::path& path, const std::string& grid));
+
+// Throws Error if the voxel size or the half width is out of range.
+void require_legal(const LevelSetOptions& options);
+
+// Throws Error, before anything is built, if a level set of a surface of this area (m²) in these bounds would have over
+// 2^31 voxels, too large an index, or need more memory than the machine has. what: its name in the message, `mesh
+// "bunny.obj"`.
+void require_buildable(std::string_view what, double area, const Box3d& bounds, const LevelSetOptions& options);
+
+// The smallest voxel edge of a grid. OpenVDB refuses a map whose determinant is below 1e-15 m³.
+constexpr double min_voxel = 2e-5;  // m
 
 }  // namespace rapid

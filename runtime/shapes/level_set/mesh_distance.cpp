@@ -18,7 +18,6 @@
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/mesh_blocks.h"
 #include "runtime/shapes/level_set/openvdb_meshes.h"
-#include "runtime/shapes/level_set/prism.h"
 #include "runtime/shapes/mesh/nearest_on_triangle.h"
 #include "runtime/shapes/mesh/ray_crossings.h"
 

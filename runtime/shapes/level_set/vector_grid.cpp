@@ -8,7 +8,6 @@
 
 #include "runtime/base/error.h"
 #include "runtime/shapes/level_set/grid_file.h"
-#include "runtime/shapes/level_set/grid_message.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"
 #include "runtime/shapes/level_set/vdb_file.h"

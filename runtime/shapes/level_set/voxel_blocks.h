@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -74,5 +75,28 @@ private:
 // Bakes a copy for queries. Beyond the band, inside or outside follows from the preceding blocks along z, as signs
 // change only within the band.
 BakedGrid bake(const VoxelBlocks& blocks);
+
+// The values of a block, shape [8, 8, 8], z fastest, m; or the one value shared by the whole block.
+struct BlockValues {
+    const float* values = nullptr;
+    float constant = 0;
+
+    float at(int i, int j, int k) const
+    {
+        return values ? values[(i * BakedGrid::block + j) * BakedGrid::block + k] : constant;
+    }
+};
+
+struct BlockTable {
+    using BlockCoord = Eigen::Vector3i;  // in blocks
+    using Reader = std::function<BlockValues(const BlockCoord& coord)>;
+
+    Eigen::AlignedBox3i with_values;                // range of the blocks with values; empty if there are none
+    double voxel, background;                       // m
+    std::function<Vec3d(const Vec3d& P)> to_world;  // position in m of a point in voxels
+    std::function<Reader()> reader;                 // creates a reader for any block; one per thread
+};
+
+BakedGrid bake(const BlockTable& blocks);
 
 }  // namespace rapid

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include "runtime/base/error.h"
+#include "runtime/shapes/level_set/grid_file.h"
 #include "runtime/shapes/level_set/level_set_grid.h"
 #include "runtime/shapes/level_set/open_grids.h"
-#include "runtime/shapes/level_set/vdb_archive.h"
 
 namespace rapid {
 namespace {

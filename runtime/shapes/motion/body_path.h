@@ -145,4 +145,11 @@ FramePath path_of(const Motion& motion, const Box3d& rest, const FrameClock& clo
                   const PathOptions& options);
 FramePath path_of(const AnimatedShape& shape, const FrameClock& clock, std::int64_t frame, const PathOptions& options);
 
+// Reparametrises the section of a cubic between two times to the range 0 to 1.
+inline Cubic<Vec3d> cubic_part(const Cubic<Vec3d>& curve, double from, double to)
+{
+    const double d = to - from;
+    return {curve.at(from), d * curve.derivative(from), d * d * (curve.c2 + 3 * from * curve.c3), d * d * d * curve.c3};
+}
+
 }  // namespace rapid

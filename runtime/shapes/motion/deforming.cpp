@@ -5,7 +5,7 @@
 
 #include "runtime/base/error.h"
 #include "runtime/shapes/level_set/baked_level_set.h"
-#include "runtime/shapes/motion/cubic_part.h"
+#include "runtime/shapes/motion/body_path.h"
 #include "runtime/shapes/motion/deforming_shape.h"
 
 namespace rapid {

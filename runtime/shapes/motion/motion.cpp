@@ -7,7 +7,6 @@
 
 #include "runtime/base/error.h"
 #include "runtime/math/elementary.h"
-#include "runtime/shapes/motion/turns.h"
 
 namespace rapid {
 namespace {

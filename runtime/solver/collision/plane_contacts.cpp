@@ -5,7 +5,7 @@
 
 #include "runtime/math/path_extent.h"
 #include "runtime/shapes/first_contact.h"
-#include "runtime/shapes/plane_rest.h"
+#include "runtime/shapes/path.h"
 #include "runtime/solver/collision/obstacle.h"
 
 namespace rapid {

@@ -8,7 +8,6 @@
 #include "runtime/shapes/analytic/analytic.h"
 #include "runtime/shapes/level_set/level_set.h"
 #include "runtime/shapes/level_set/placed.h"
-#include "runtime/shapes/motion/turns.h"
 #include "tests/test.h"
 
 using namespace rapid;

@@ -1,5 +1,5 @@
 // Compares the voxels near a mesh with a search over all triangles.
-#include "runtime/shapes/level_set/mesh_band.h"
+#include "runtime/shapes/level_set/mesh_blocks.h"
 
 #include <rapidcheck.h>
 #include <tbb/global_control.h>

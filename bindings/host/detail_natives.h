@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "runtime/graph/step_record.h"
+#include "runtime/graph/simulation.h"
 #include "runtime/points/neighbours.h"
 #include "runtime/points/point_set.h"
 

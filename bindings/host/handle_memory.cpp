@@ -6,7 +6,7 @@
 #include <lua.hpp>
 
 #include "runtime/base/memory_budget.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/level_set.h"

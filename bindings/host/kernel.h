@@ -11,12 +11,9 @@
 
 #include "bindings/host/kernel_analysis.h"
 #include "bindings/host/kernel_layout.h"
-#include "runtime/graph/attribute_locations.h"
 #include "runtime/graph/point_edit.h"
-#include "runtime/graph/point_editor.h"
 #include "runtime/graph/point_function.h"
 #include "runtime/graph/step_shape.h"
-#include "runtime/graph/step_shape_user.h"
 
 namespace rapid {
 

@@ -8,7 +8,7 @@
 #include "bindings/host/lua_text.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {

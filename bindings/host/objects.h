@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 
 namespace rapid {
 

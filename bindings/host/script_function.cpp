@@ -10,7 +10,7 @@
 #include "bindings/host/script_location.h"
 #include "bindings/host/state.h"
 #include "bindings/host/values.h"
-#include "runtime/graph/located.h"
+#include "runtime/graph/point_function.h"
 
 namespace rapid {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "runtime/base/library_folder.h"
 #include "runtime/graph/abi.h"
-#include "runtime/graph/library_abi.h"
+#include "runtime/graph/plugin.h"
 
 namespace rapid {
 namespace {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <span>
@@ -15,9 +16,27 @@
 
 #include "runtime/base/stopwatch.h"
 #include "runtime/graph/plan.h"
-#include "runtime/graph/snapshot.h"
+#include "runtime/points/saved_state.h"
 
 namespace rapid {
+
+// The state of a run between two frames: another evaluator of the same graph continues from it with bit-identical
+// results.
+struct Snapshot {
+    std::int64_t frame = 0;                         // the last computed frame
+    std::map<std::string, SavedState> simulations;  // by the name of the Create
+    std::map<std::string, SavedState> nodes;        // of stateful nodes, by name
+    std::map<std::string, SavedState> constants;    // points of merges whose result never changes, by name
+
+    std::size_t size() const;  // bytes
+    bool operator==(const Snapshot&) const = default;
+
+    template <class Archive>
+    void serialize(Archive& keep)
+    {
+        keep(frame, simulations, nodes, constants);
+    }
+};
 
 class ChangingNode;
 
@@ -52,7 +71,7 @@ public:
     ~Evaluator();
 
     // Enables the checked mode: each node finds poison in everything that it has not declared, and processes the
-    // points by itself. Slower, for tests (undeclared_columns.h). advance() then throws Error if a node's declaration
+    // points by itself. Slower, for tests (attribute_uses.h). advance() then throws Error if a node's declaration
     // is incomplete.
     void check_declarations() { checks_declarations_ = true; }
 

@@ -1,8 +1,8 @@
 // Reads a motion from a graph's value: an object, a function of the frame, or keys.
 #include <fmt/format.h>
 
-#include "runtime/graph/located.h"
 #include "runtime/graph/param.h"
+#include "runtime/graph/point_function.h"
 #include "runtime/shapes/motion/motion.h"
 
 namespace rapid {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/base/object.h"
 #include "runtime/graph/evaluation.h"
 #include "runtime/graph/param.h"
 #include "runtime/graph/simulation.h"
@@ -30,7 +31,7 @@ struct Uses {
     std::vector<std::string> joins_groups;  // the part of makes_groups that the node writes point by point
     bool reads_all = false;                 // may read every attribute that is made
 
-    // For points of the nodes among its arguments (node_handle.h): attributes read, and attributes read if they are
+    // For points of the nodes among its arguments: attributes read, and attributes read if they are
     // made.
     std::vector<std::string> reads_of_source, takes_of_source, reads_groups_of_source;
 
@@ -107,5 +108,15 @@ struct Node {
 };
 
 using NodePtr = std::shared_ptr<const Node>;
+
+// A node as a value: in graph code, and as an argument of a node that reads its points (spawn's `from`).
+class NodeHandle : public Object {
+public:
+    static constexpr std::string_view param_type = "node";
+    explicit NodeHandle(NodePtr held) : node(std::move(held)) {}
+    std::string_view kind() const override { return "node"; }
+
+    const NodePtr node;
+};
 
 }  // namespace rapid

@@ -7,7 +7,7 @@
 
 #include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 
 #include "runtime/points/attribute_like.h"
 #include "runtime/points/point_names.h"
@@ -341,6 +342,18 @@ void assign_arguments(const std::vector<Param>& params, const std::map<std::stri
             throw Error(fmt::format("{} is missing: {}", param.name, param.doc));
         else if (!param.fallback.is_nil())
             param.assign(param, fields, param.fallback);
+    }
+}
+
+void read_value(const Param& param, const Value& value, FrameSet& field)
+{
+    std::vector<double> numbers;
+    read_value(param, value, numbers);
+    field.frames.clear();
+    for (const double number : numbers) {
+        if (number != std::floor(number))
+            throw Error(fmt::format("{} has the frame {}; frames must be whole numbers", param.name, number));
+        field.frames.insert(static_cast<std::int64_t>(number));
     }
 }
 

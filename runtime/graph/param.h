@@ -2,10 +2,12 @@
 // `rapid nodes` and the annotations for editors.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -168,5 +170,14 @@ Param param_of(F T::*field, std::string name, Value fallback, Range range, std::
         };
     return p;
 }
+
+// Frames by number: {12, 48}.
+struct FrameSet {
+    static constexpr std::string_view param_type = "list of frames";
+    std::set<std::int64_t> frames;
+};
+
+// Throws Error if a frame is not an integer.
+void read_value(const Param& param, const Value& value, FrameSet& field);
 
 }  // namespace rapid

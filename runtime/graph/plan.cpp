@@ -12,7 +12,7 @@
 #include "runtime/base/at_node.h"
 #include "runtime/graph/arguments.h"
 #include "runtime/graph/attribute_uses.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_function.h"
 #include "runtime/graph/points_object.h"

@@ -10,6 +10,7 @@
 
 #include "runtime/base/path_list.h"
 #include "runtime/files/input_file.h"
+#include "runtime/graph/abi.h"
 #include "runtime/graph/registry.h"
 
 namespace rapid {
@@ -82,5 +83,7 @@ void load_plugins(const std::string& path)
         for (const std::string& file : files) load_plugin(file);
     }
 }
+
+const char* library_abi() { return RAPID_ABI; }
 
 }  // namespace rapid

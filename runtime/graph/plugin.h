@@ -73,4 +73,8 @@ std::shared_ptr<const Action> act(const Evaluation& now, F edit)
     return dynamic_of<Made>(now, {}, std::move(edit));
 }
 
+// Returns the library's RAPID_ABI (abi.h). A program compares it with its own: with libraries for several processor
+// levels, the loader may find one from another build.
+const char* library_abi();
+
 }  // namespace rapid

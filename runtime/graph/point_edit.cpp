@@ -1,14 +1,17 @@
 #include "runtime/graph/point_edit.h"
 
 #include <algorithm>
+#include <cstring>
 #include <functional>
 
 #include "runtime/base/at_node.h"
 #include "runtime/base/first_error.h"
 #include "runtime/base/stopwatch.h"
 #include "runtime/points/buffer.h"
+#include "runtime/points/members.h"
 
 namespace rapid {
+
 std::vector<std::uint8_t> Stretch::choose(Strided<std::uint8_t> members) const
 {
     std::vector<std::uint8_t> chosen(size(), members[begin]);
@@ -78,6 +81,27 @@ void edit_together(std::span<const PointEdit* const> edits, std::span<const Eval
     run_passes(passes, points, before.removals);
     if (std::any_of(passes.begin(), passes.end(), [](const auto& pass) { return pass->is_script(); }))
         now.front()->figures.seconds.script += stopwatch.seconds();
+}
+
+Selection::Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
+                     const Before& before)
+    : points_(points), group_(std::move(group)), before_(before), test_(where ? where->test_of(points, now) : nullptr)
+{
+}
+
+void Selection::begin()
+{
+    members_ = members_of(points_, group_);
+    const bool all = members_.stride == 0 && members_[0] && !before_.removals;
+    if (test_) test_->begin(all);
+}
+
+std::vector<std::uint8_t> Selection::of(const Stretch& stretch) const
+{
+    std::vector<std::uint8_t> selected = stretch.choose(members_);
+    const bool any = std::memchr(selected.data(), 1, selected.size()) != nullptr;
+    if (test_ && any) test_->test(stretch.begin, selected);
+    return selected;
 }
 
 }  // namespace rapid

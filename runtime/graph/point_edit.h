@@ -2,12 +2,15 @@
 // each chunk goes through all of them while it is in cache. The result equals that of separate passes.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "runtime/base/parallel.h"
 #include "runtime/graph/node.h"
+#include "runtime/graph/point_function.h"
 #include "runtime/points/column.h"
 
 namespace rapid {
@@ -110,5 +113,29 @@ private:
 // Applies fused edits in order; now: the context of each. The result is bit-identical to applying one edit after the
 // other. Throws Error as run_passes() does.
 void edit_together(std::span<const PointEdit* const> edits, std::span<const Evaluation* const> now, PointSet& points);
+
+// The points on which a node acts: those of its group for which its `where` is true.
+class Selection {
+public:
+    // Selects the points of `group` (all if empty) for which `where` is true (all if null). `where` is evaluated only
+    // for points of the group. The set and `now` must outlive it.
+    Selection(const PointSet& points, std::string group, const PointFunction* where, const Evaluation& now,
+              const Before& before);
+
+    // The same as in EditPass.
+    void begin();
+    std::size_t chunk() const { return test_ ? test_->chunk() : chunk_size; }
+    bool is_script() const { return test_ != nullptr; }
+
+    // Returns 1 for selected points that are alive, else 0; shape [size].
+    std::vector<std::uint8_t> of(const Stretch& stretch) const;
+
+private:
+    const PointSet& points_;
+    const std::string group_;
+    const Before before_;
+    std::unique_ptr<PointTest> test_;
+    Strided<std::uint8_t> members_{nullptr, 0};
+};
 
 }  // namespace rapid

@@ -13,7 +13,7 @@
 #include <memory>
 #include <span>
 
-#include "runtime/graph/operator_of.h"
+#include "runtime/graph/node.h"
 #include "runtime/points/state_archive.h"
 
 namespace rapid {

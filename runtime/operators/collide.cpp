@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "runtime/graph/coupling.h"
-#include "runtime/graph/frame_set.h"
 #include "runtime/graph/node.h"
+#include "runtime/graph/param.h"
 #include "runtime/shapes/mesh/open_mesh.h"
 #include "runtime/shapes/motion/deforming.h"
 #include "runtime/shapes/motion/level_set_sequence.h"

@@ -17,7 +17,7 @@
 #include "runtime/graph/curve_value.h"
 #include "runtime/graph/node.h"
 #include "runtime/graph/points_object.h"
-#include "runtime/graph/step_curves.h"
+#include "runtime/graph/step_shape.h"
 
 namespace rapid {
 namespace {

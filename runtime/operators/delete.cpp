@@ -1,5 +1,5 @@
 // delete: removes the points of a group for which `where` is true; either may be omitted.
-#include "runtime/graph/selection.h"
+#include "runtime/graph/point_edit.h"
 
 namespace rapid {
 namespace {

@@ -2,7 +2,7 @@
 //
 // The members are the points for which `where` is true; with `group`, only those that are in that group too. A point
 // that no longer qualifies leaves the group.
-#include "runtime/graph/selection.h"
+#include "runtime/graph/point_edit.h"
 
 #include <algorithm>
 

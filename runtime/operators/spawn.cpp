@@ -14,7 +14,7 @@
 #include "runtime/base/memory_budget.h"
 #include "runtime/graph/coupling.h"
 #include "runtime/graph/error_sources.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/operators/spawn/offspring.h"
 #include "runtime/points/id_index.h"

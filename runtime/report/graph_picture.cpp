@@ -7,7 +7,7 @@
 #include "runtime/base/json.h"
 #include "runtime/base/printable.h"
 #include "runtime/graph/explain.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 
 namespace rapid {
 namespace {

@@ -11,7 +11,7 @@
 #include <fstream>
 
 #include "runtime/graph/arguments.h"
-#include "runtime/graph/node_handle.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/shapes/mesh/mesh_sequence.h"

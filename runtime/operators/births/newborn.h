@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "runtime/graph/node.h"
-#include "runtime/graph/point_editor.h"
 #include "runtime/graph/point_function.h"
 #include "runtime/operators/births/birth_values.h"
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/graph/step_record.h"
+#include "runtime/graph/simulation.h"
 
 namespace rapid {
 

@@ -1,4 +1,4 @@
-#include "runtime/graph/undeclared_columns.h"
+#include "runtime/graph/attribute_uses.h"
 
 #include <cmath>
 

@@ -11,7 +11,7 @@
 //   privileges  of root's only those that open files of other users, and no new ones
 //   limits      no core file; no more private memory than the machine has, and no shared memory
 //   descriptors inherited ones are closed, except standard output, standard error and a viewer's socket
-//   files       formats whose libraries trust their input are read by a process started before (reader_process.h),
+//   files       formats whose libraries trust their input are read by a process started before (read_sandboxed.h),
 //               in the same sandbox: each file in a copy of it, which may start nothing
 //
 // It is not promised that the process ends (see --script-timeout), that it leaves the processor to others, or that it

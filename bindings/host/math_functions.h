@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "runtime/lanes/lane_program.h"
-#include "runtime/math/arc_functions.h"
 #include "runtime/math/hyperbolic.h"
 #include "runtime/math/power.h"
 

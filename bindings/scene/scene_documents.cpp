@@ -10,7 +10,7 @@
 #include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"
 #include "runtime/graph/plugin.h"
-#include "runtime/points/spare_pages.h"
+#include "runtime/points/buffer.h"
 
 namespace rapid {
 namespace {

@@ -10,7 +10,6 @@
 #include "bindings/scene/state_file_io.h"
 #include "runtime/files/skipped_contents.h"
 #include "runtime/io/compare.h"
-#include "runtime/io/describe.h"
 #include "runtime/io/format.h"
 #include "runtime/points/id_index.h"
 #include "runtime/report/frame_profile.h"

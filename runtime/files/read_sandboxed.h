@@ -4,7 +4,7 @@
 // The process is a copy of this one (fork). Its limits of memory and time depend on the file's size, and memory also on
 // the rest of the --memory budget. The result is returned in shared memory and checked. A file that this process wrote
 // is read directly. If this process may not start others (--untrusted), the reader process forks the copy
-// (reader_process.h).
+//.
 //
 // The overhead is a few milliseconds and a copy of the result.
 #pragma once
@@ -15,9 +15,29 @@
 
 #include "runtime/files/message.h"
 #include "runtime/files/output_file.h"
-#include "runtime/files/reader_process.h"
 
 namespace rapid {
+
+// A process that reads files on behalf of one that may not start others.
+//
+// It is forked before that process gives up its rights, is confined too, and waits for requests: the names of a reader,
+// a file and a part of it. For each request it forks a copy that reads the file (read_sandboxed.h), and returns the
+// copy's result or error. It ends with the process that it serves.
+struct ReadRequest {
+    std::string reader, path, what;
+};
+
+// Readers are identified by name, since requests come from another process.
+using NamedReader = std::function<void(const ReadRequest& request, MessageWriter& message)>;
+void define_reader(const std::string& name, NamedReader reader);
+
+// Starts the process, which calls `confine` before it serves. Call this once, while this process has one thread. Throws
+// Error if it can't be started or `confine` throws.
+void start_reader_process(const std::function<void()>& confine);
+
+// Reads in the reader process if there is one, otherwise in a copy of this process. Thread-safe. Throws Error if the
+// reader does or ends unexpectedly.
+void read_by_name(const ReadRequest& request, const std::function<void(MessageReader&)>& receive);
 
 // Returns the bytes of this process's budget (memory_budget.h) that a copy may use. The message that it sends back may
 // use as many again, as both are in memory at the same time. At least 64 MiB; unlimited if no budget has been set.

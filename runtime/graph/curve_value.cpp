@@ -9,7 +9,6 @@
 
 #include "runtime/graph/points_object.h"
 #include "runtime/graph/value.h"
-#include "runtime/points/point_lines.h"
 #include "runtime/points/trail.h"
 
 namespace rapid {

@@ -16,7 +16,6 @@
 #include "runtime/graph/simulation.h"
 #include "runtime/graph/stateful.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/points/state_checks.h"
 
 namespace rapid {
 

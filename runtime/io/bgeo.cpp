@@ -6,7 +6,7 @@
 //   for each attribute: int16 length, name, int16 size, int32 type (0 float, 1 int, 5 vector), default values;
 //       for strings type 4, int32 count, and for each string int16 length, text
 //   for each point: float x y z 1, then the attributes; for a string its index, int32
-//   for each line (points/point_lines.h): int32 1, vertices, ':', then the index of each (int16 below 65536 points)
+//   for each line (points/trail.h): int32 1, vertices, ':', then the index of each (int16 below 65536 points)
 //   for each group: int16 length, name, int32 points, and a bit per point in int32 words, lowest bit first
 //   0x00 0xff: the (empty) extra section
 //
@@ -25,7 +25,7 @@
 #include "runtime/io/point_file.h"
 #include "runtime/io/records.h"
 #include "runtime/io/text_table.h"
-#include "runtime/points/point_lines.h"
+#include "runtime/points/trail.h"
 
 namespace rapid {
 namespace {
@@ -120,12 +120,12 @@ constexpr std::uint32_t run_of_primitives = 0xffffffff;
 constexpr char closed_mark = '<', open_mark = ':';
 
 // Returns the bytes of a point index in a primitive.
-constexpr std::size_t number_bytes(std::size_t points) { return points < 65536 ? 2 : 4; }
+constexpr std::size_t index_bytes(std::size_t points) { return points < 65536 ? 2 : 4; }
 
 std::string line_section(const PointLines& lines)
 {
     BigEndianText section;
-    const bool is_short = number_bytes(lines.points.size()) == 2;
+    const bool is_short = index_bytes(lines.points.size()) == 2;
     std::size_t next = 0;
     for (const std::uint32_t size : lines.sizes) {
         section.int32(polygon);
@@ -376,7 +376,7 @@ std::size_t stride_of_unread(BigEndianReader& reader, std::uint32_t count)
 bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t vertex_bytes, std::size_t polygon_bytes,
                 PointLines& lines)
 {
-    const std::size_t number = number_bytes(lines.points.size());
+    const std::size_t number = index_bytes(lines.points.size());
     std::uint32_t closed = 0;
     for (std::uint32_t left = primitives; left > 0;) {
         std::uint32_t type = reader.integer(4), count = 1;
@@ -403,7 +403,7 @@ bool read_lines(BigEndianReader& reader, std::uint32_t primitives, std::size_t v
     return true;
 }
 
-Column<Token> strings_of(const PointSet& points, const std::string& name, const std::vector<Token>& strings)
+Column<Token> dictionary_strings(const PointSet& points, const std::string& name, const std::vector<Token>& strings)
 {
     const auto* indices = points.find<std::int32_t>(name);
     if (!indices) throw Error(fmt::format("the attribute \"{}\" is a string; it must be a number", name));
@@ -458,7 +458,7 @@ PointSet read_bgeo(const std::filesystem::path& path)
         read_records({reader.take(n * dictionary.stride), n, dictionary.stride, ByteOrder::Big}, dictionary.attributes);
     for (std::size_t a = 0; a < dictionary.defaults.size(); ++a)  // P, the first attribute, has none
         set_default(points, dictionary.attributes[a + 1].name, dictionary.defaults[a]);
-    for (const auto& [name, strings] : dictionary.strings) points.set(name, strings_of(points, name, strings));
+    for (const auto& [name, strings] : dictionary.strings) points.set(name, dictionary_strings(points, name, strings));
     PointLines lines{std::move(points), {}, {}};
     reader.enter("primitives");
     const std::size_t vertex_bytes = stride_of_unread(reader, of_vertices);

@@ -37,20 +37,20 @@ namespace {
 constexpr std::string_view group_column = "group:";
 constexpr std::size_t number_chars = 24;  // the longest is an int64 of 20; a float of 9 digits has 15
 
-char* put(char* to, float value)
+char* put_number(char* to, float value)
 {
     return std::to_chars(to, to + number_chars, value, std::chars_format::general, 9).ptr;
 }
 
 template <class Integer>
-char* put(char* to, Integer value)
+char* put_number(char* to, Integer value)
 {
     return std::to_chars(to, to + number_chars, value).ptr;
 }
 
-char* put_value(char* to, float value) { return put(to, value); }
-char* put_value(char* to, std::int32_t value) { return put(to, value); }
-char* put_value(char* to, std::int64_t value) { return put(to, value); }
+char* put_value(char* to, float value) { return put_number(to, value); }
+char* put_value(char* to, std::int32_t value) { return put_number(to, value); }
+char* put_value(char* to, std::int64_t value) { return put_number(to, value); }
 
 char* put_value(char* to, Token value)
 {
@@ -68,7 +68,7 @@ char* put_numbers(char* to, const Vector& numbers, int count)
 {
     for (int c = 0; c < count; ++c) {
         if (c > 0) *to++ = ',';
-        to = put(to, numbers[c]);
+        to = put_number(to, numbers[c]);
     }
     return to;
 }

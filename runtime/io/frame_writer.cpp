@@ -1,10 +1,12 @@
 #include "runtime/io/frame_writer.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
 #include "runtime/base/stopwatch.h"
-#include "runtime/io/selected_attributes.h"
 #include "runtime/picture/frame_picture.h"
 
 namespace rapid {
@@ -184,6 +186,26 @@ void FrameWriter::write_file(const Target& target, const Job& job, std::shared_p
     written_.push_back({job.frame.number, path, spent, bytes, std::chrono::steady_clock::now(), target.film,
                         std::move(fit), job.points.size()});
     if (--due_[job.frame.number] == 0) due_.erase(job.frame.number);
+}
+
+PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names)
+{
+    for (const std::string& name : names)
+        if (!points.has(name) && !points.find_group(name)) {
+            std::vector<std::string> known = points.column_names();
+            for (const std::string& group : points.group_names()) known.push_back(group);
+            throw Error(
+                fmt::format("there is no attribute or group \"{}\" to write{}", name, did_you_mean(name, known)));
+        }
+    const auto is_requested = [&](const std::string& name) {
+        return name == "P" || name == "v" || name == "id" || std::find(names.begin(), names.end(), name) != names.end();
+    };
+    PointSet selected = points;
+    for (const std::string& name : points.column_names())
+        if (!is_requested(name)) selected.remove(name);
+    for (const std::string& name : points.group_names())
+        if (!is_requested(name)) selected.remove_group(name);
+    return selected;
 }
 
 }  // namespace rapid

@@ -21,6 +21,7 @@
 #include "runtime/io/film.h"
 #include "runtime/io/format.h"
 #include "runtime/picture/picture_fit.h"
+#include "runtime/points/point_set.h"
 
 namespace rapid {
 
@@ -111,5 +112,9 @@ private:
     std::map<int, std::size_t> due_;  // unwritten files per frame
     std::thread thread_;              // must be the last member, because it uses the others
 };
+
+// Returns the points with only P, v, id and the named attributes and groups. Throws Error if a name is unknown,
+// suggesting the nearest.
+PointSet select_attributes(const PointSet& points, const std::vector<std::string>& names);
 
 }  // namespace rapid

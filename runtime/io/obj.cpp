@@ -2,7 +2,7 @@
 //
 //   v x y z       each point, followed by the positions of trails
 //   p 1 2 ...     points on no line, if there are lines
-//   l 1 7 8 ...   a line: a trail, from the point itself backwards, or a curve (points/point_lines.h)
+//   l 1 7 8 ...   a line: a trail, from the point itself backwards, or a curve (points/trail.h)
 //
 // It stores only positions, without velocities, attributes and groups. From any .obj file, the vertices of its lines
 // are read as points in line order, with the index of the line as the attribute `curve`, from 0; then its points, with
@@ -16,7 +16,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/ordered_chunks.h"
 #include "runtime/io/records.h"
-#include "runtime/points/point_lines.h"
+#include "runtime/points/trail.h"
 
 namespace rapid {
 namespace {

@@ -2,7 +2,7 @@
 //
 // P is x y z, v is vx vy vz, N is nx ny nz (the names that other programs know), any other vec3 NAMEx NAMEy NAMEz, and
 // a quaternion also NAMEw. Integers are int (an int64 that does not fit is refused). A group is uchar group_NAME. Lines
-// (points/point_lines.h) are elements "edge" with vertex1 and vertex2. Cd is also uchar red green blue, and Alpha also
+// (points/trail.h) are elements "edge" with vertex1 and vertex2. Cd is also uchar red green blue, and Alpha also
 // uchar alpha: other programs show only these.
 //
 // Reads any PLY (files/ply_file.h). Without Cd red green blue become Cd, and without Alpha alpha becomes Alpha. Lists
@@ -21,7 +21,7 @@
 #include "runtime/io/attribute_names.h"
 #include "runtime/io/format.h"
 #include "runtime/io/records.h"
-#include "runtime/points/point_lines.h"
+#include "runtime/points/trail.h"
 
 namespace rapid {
 namespace {

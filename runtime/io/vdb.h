@@ -15,10 +15,15 @@
 
 #include "runtime/base/deferred.h"
 #include "runtime/io/format.h"
+#include "runtime/points/point_set.h"
 
 namespace rapid {
 
 RAPID_DEFERRED(vdb_writer, void(OutputFile& file, const PointSet& points, const FrameInfo& frame));
 RAPID_DEFERRED(vdb_reader, PointSet(const std::filesystem::path& path));
+
+// Returns the exponent e of a voxel size 2^e m at which an occupied leaf has about 2,000 points. Throws Error if a
+// position is not finite.
+int voxel_exponent(const PointSet& points);
 
 }  // namespace rapid

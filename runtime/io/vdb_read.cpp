@@ -18,7 +18,6 @@
 #include "runtime/io/id_order.h"
 #include "runtime/io/text_table.h"
 #include "runtime/io/vdb.h"
-#include "runtime/io/vdb_points.h"
 #include "runtime/io/vdb_types.h"
 #include "runtime/points/point_set.h"
 #include "runtime/shapes/level_set/vdb_file.h"

@@ -1,11 +1,19 @@
 // Conversions between Rapid's attribute types and OpenVDB's.
 #pragma once
 
+#include <openvdb/points/PointDataGrid.h>
+
 #include <type_traits>
 
 #include "runtime/base/openvdb_grids.h"
 #include "runtime/math/vec.h"
 #include "runtime/points/token.h"
+
+// Declares OpenVDB's point grids as extern templates, like the value grids in runtime/base/openvdb_grids.h.
+#ifdef RAPID_OPENVDB_IN_LIBRARY
+extern template class openvdb::tree::Tree<openvdb::points::PointDataTree::RootNodeType>;
+extern template class openvdb::Grid<openvdb::points::PointDataTree>;
+#endif
 
 namespace rapid {
 

@@ -17,13 +17,11 @@
 #include <functional>
 #include <limits>
 
-#include "runtime/files/output_stream.h"
+#include "runtime/files/output_file.h"
 #include "runtime/io/text_table.h"
 #include "runtime/io/vdb.h"
 #include "runtime/io/vdb_order.h"
-#include "runtime/io/vdb_points.h"
 #include "runtime/io/vdb_types.h"
-#include "runtime/io/vdb_voxel.h"
 #include "runtime/points/column_files.h"
 
 namespace rapid {

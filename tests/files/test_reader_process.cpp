@@ -1,4 +1,4 @@
-#include "runtime/files/reader_process.h"
+#include "runtime/files/read_sandboxed.h"
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "runtime/base/memory_budget.h"
-#include "runtime/files/read_sandboxed.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 

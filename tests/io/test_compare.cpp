@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "runtime/io/describe.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
 

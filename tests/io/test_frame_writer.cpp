@@ -1,5 +1,4 @@
 #include "runtime/io/frame_writer.h"
-
 #include "tests/files/other_circumstances.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
@@ -201,4 +200,19 @@ TEST_CASE("a writer that is dropped writes no half frame and leaves nothing hidd
         CHECK(name[0] == 'a');
         CHECK(read_points(folder / name).size() == 50000);
     }
+}
+
+using namespace rapid;
+using namespace rapid::test;
+
+TEST_CASE("selected attributes are P, v, id and the named ones, groups too", "[io][selected]")
+{
+    const PointSet points = random_points({.size = 5});
+
+    const PointSet selected = select_attributes(points, {"age", "hot"});
+
+    CHECK(selected.column_names() == std::vector<std::string>{"P", "age", "id", "v"});
+    CHECK(selected.group_names() == std::vector<std::string>{"hot"});
+    CHECK(error_of([&] { select_attributes(points, {"agee"}); }) ==
+          "there is no attribute or group \"agee\" to write; did you mean \"age\"?");
 }

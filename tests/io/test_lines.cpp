@@ -5,7 +5,6 @@
 
 #include "runtime/files/skipped_contents.h"
 #include "runtime/io/format.h"
-#include "runtime/points/point_lines.h"
 #include "runtime/points/trail.h"
 #include "tests/io/points_with_trails.h"
 #include "tests/test.h"

@@ -14,8 +14,8 @@
 
 #include "runtime/base/openvdb_grids.h"
 #include "runtime/io/format.h"
+#include "runtime/io/vdb.h"
 #include "runtime/io/vdb_types.h"
-#include "runtime/io/vdb_voxel.h"
 #include "runtime/points/column_files.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"

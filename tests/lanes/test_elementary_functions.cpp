@@ -5,7 +5,6 @@
 #include <limits>
 #include <random>
 
-#include "runtime/math/arc_functions.h"
 #include "runtime/math/hyperbolic.h"
 #include "runtime/math/power.h"
 #include "tests/amount.h"

@@ -5,7 +5,7 @@
 #include <variant>
 
 #include "runtime/files/skipped_contents.h"
-#include "runtime/io/describe.h"
+#include "runtime/io/compare.h"
 #include "runtime/io/format.h"
 #include "runtime/io/state_file.h"
 #include "runtime/points/state_archive.h"

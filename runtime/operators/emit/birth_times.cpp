@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/points/state_checks.h"
+#include "runtime/points/state_archive.h"
 
 namespace rapid {
 namespace {

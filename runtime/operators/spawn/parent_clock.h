@@ -18,7 +18,6 @@
 #include "runtime/math/random.h"
 #include "runtime/operators/spawn/parent_paths.h"
 #include "runtime/points/state_archive.h"
-#include "runtime/points/state_checks.h"
 
 namespace rapid {
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "runtime/base/error.h"
-#include "runtime/files/output_stream.h"
+#include "runtime/files/output_file.h"
 
 namespace rapid {
 

@@ -13,8 +13,7 @@
 #include "runtime/base/memory_budget.h"
 #include "runtime/base/parallel.h"
 #include "runtime/math/vec.h"
-#include "runtime/points/near_spheres.h"
-#include "runtime/points/sort_few.h"
+#include "runtime/points/neighbours.h"
 
 namespace rapid {
 

@@ -12,7 +12,7 @@
 #include "runtime/base/per_thread.h"
 #include "runtime/base/stopwatch.h"
 #include "runtime/points/id_index.h"
-#include "runtime/points/state_checks.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/contact_forces.h"
 #include "runtime/solver/constraints/contact_solver.h"
 #include "runtime/solver/constraints/energy_bound.h"

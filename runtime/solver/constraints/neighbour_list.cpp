@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "runtime/base/parallel.h"
-#include "runtime/points/state_checks.h"
+#include "runtime/points/state_archive.h"
 #include "runtime/solver/constraints/impact.h"
 
 namespace rapid {

@@ -5,7 +5,7 @@
 
 #include "runtime/base/parallel.h"
 #include "runtime/base/per_thread.h"
-#include "runtime/points/state_checks.h"
+#include "runtime/points/state_archive.h"
 
 namespace rapid {
 namespace {

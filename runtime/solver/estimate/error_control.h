@@ -18,7 +18,6 @@
 #include <span>
 
 #include "runtime/points/state_archive.h"
-#include "runtime/points/state_checks.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {

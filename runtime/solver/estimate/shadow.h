@@ -22,7 +22,6 @@
 #include <vector>
 
 #include "runtime/points/state_archive.h"
-#include "runtime/points/state_checks.h"
 #include "runtime/solver/solve.h"
 
 namespace rapid {

@@ -1,4 +1,4 @@
-#include "runtime/io/vdb_voxel.h"
+#include "runtime/io/vdb.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,16 @@
 #include "runtime/points/column_files.h"
 
 namespace rapid {
+
+// Registers .vdb. Its writer and reader (vdb_write.cpp, vdb_read.cpp) are loaded on demand.
+
 namespace {
+
+void write_vdb(OutputFile& file, const PointSet& points, const FrameInfo& frame) { vdb_writer(file, points, frame); }
+
+PointSet read_vdb(const std::filesystem::path& path) { return vdb_reader(path); }
+
+RAPID_FORMAT(Format{".vdb", "OpenVDB points, read by Houdini; keeps every bit", write_vdb, read_vdb});
 
 // Target number of points per leaf (8³ voxels). Fewer make leaves costly (each has 2 KiB of offsets and an array per
 // attribute). More make spatial queries slow and leave the threads nothing to share.

@@ -12,7 +12,7 @@
 #include "runtime/io/format.h"
 #include "runtime/io/text_table.h"
 #include "runtime/operators/rasterize.h"
-#include "runtime/picture/picture_memory.h"
+#include "runtime/picture/frame_picture.h"
 
 namespace rapid {
 namespace {

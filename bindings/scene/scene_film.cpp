@@ -12,7 +12,7 @@
 #include "runtime/files/frame_pattern.h"
 #include "runtime/io/film.h"
 #include "runtime/io/frame_writer.h"
-#include "runtime/picture/picture_memory.h"
+#include "runtime/picture/frame_picture.h"
 
 namespace rapid {
 

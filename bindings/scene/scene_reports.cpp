@@ -9,7 +9,6 @@
 #include "runtime/report/biography.h"
 #include "runtime/report/explanation_text.h"
 #include "runtime/report/graph_picture.h"
-#include "runtime/report/graphviz.h"
 
 namespace rapid {
 

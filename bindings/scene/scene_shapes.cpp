@@ -12,7 +12,6 @@
 #include "bindings/scene/state_file_io.h"
 #include "runtime/picture/frame_picture.h"
 #include "runtime/picture/picture_fit.h"
-#include "runtime/picture/picture_memory.h"
 #include "runtime/picture/png_file.h"
 
 namespace rapid {

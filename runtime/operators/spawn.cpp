@@ -1,7 +1,7 @@
 // spawn: emits children from the points of another node, their parents, at times and positions on the parents' paths.
 //
 // Each parent emits along its path through the frame (spawn/parent_paths.h), by its rate and count, or at an event
-// (spawn/parent_clock.h). Parents of another simulation, which is evaluated first, have their path in this frame.
+// (spawn/offspring.h). Parents of another simulation, which is evaluated first, have their path in this frame.
 // Parents of the same simulation move later in the frame, and emit along their path of the previous frame.
 //
 // A birth's random numbers depend on the seed, on the name of this node and on the birth's number among those of its

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "runtime/picture/lens.h"
+#include "runtime/picture/screen_mesh.h"
 #include "runtime/points/point_set.h"
 
 namespace rapid {

@@ -44,4 +44,8 @@ std::string to_dot(const GraphPicture& picture, Tips tips = Tips::Kept);
 // paths of edges in points (1/72 inch) from the upper left corner; empty: without positions.
 std::string to_json(const GraphPicture& picture, const std::string& laid_out);
 
+// Returns the output of `dot -T<format>` for a graph. Throws Error with the name of the package if dot is not on the
+// PATH, or with dot's own message.
+std::string lay_out(const std::string& graph, const std::string& format);
+
 }  // namespace rapid

@@ -1,5 +1,5 @@
 // The sizes of pictures at their limits.
-#include "runtime/picture/picture_memory.h"
+#include "runtime/picture/frame_picture.h"
 
 #include "tests/test.h"
 

@@ -1,4 +1,4 @@
-#include "runtime/operators/goal/free_positions.h"
+#include "runtime/operators/goal/goal_target.h"
 
 #include <limits>
 #include <random>

@@ -71,7 +71,7 @@ local function operation(op)
   end
 end
 
--- Returns a translation of a function of bindings/host/math_functions.h that takes one number or two.
+-- Returns a translation of a function of bindings/host/kernel_functions.h that takes one number or two.
 local function of_host(name, count)
   return function(program, _, args)
     numbers(args, count)

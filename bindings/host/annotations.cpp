@@ -11,7 +11,7 @@
 
 #include "bindings/host/maker.h"
 #include "bindings/host/modules.h"
-#include "bindings/host/param_facts.h"
+#include "bindings/host/node_page.h"
 #include "runtime/points/point_names.h"
 
 namespace rapid {

@@ -6,8 +6,8 @@
 
 #include "bindings/host/lua_text.h"
 #include "bindings/host/maker.h"
-#include "bindings/host/objects.h"
-#include "bindings/host/offers.h"
+#include "bindings/host/session.h"
+#include "bindings/host/values.h"
 
 namespace rapid {
 namespace {

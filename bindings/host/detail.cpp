@@ -5,11 +5,14 @@
 #include <lua.hpp>
 #include <numeric>
 
-#include "bindings/host/detail_natives.h"
 #include "bindings/host/kernel.h"
 #include "bindings/host/kernel_pass.h"
+#include "bindings/host/lua_text.h"
+#include "bindings/host/script_error.h"
 #include "bindings/host/script_host.h"
+#include "bindings/host/state.h"
 #include "bindings/host/values.h"
+#include "runtime/points/attribute_like.h"
 
 namespace rapid {
 namespace {
@@ -94,6 +97,208 @@ void run_detail(const Kernel& function, Flow& flow, const Evaluation& now, const
     number_newborn(flow, before);
     now.figures.born += flow.points.size() - before;
     now.figures.died += remove_killed(flow.points, state.lua(), killed);
+}
+
+namespace {
+
+constexpr char run_in_registry[] = "rapid.detail";  // registry key of the current run
+
+DetailRun& detail_run_of(State& state)
+{
+    lua_State* L = state.lua();
+    lua_getfield(L, LUA_REGISTRYINDEX, run_in_registry);
+    auto* run = static_cast<DetailRun*>(lua_touserdata(L, -1));
+    lua_pop(L, 1);
+    if (!run) throw Error("points can't be used outside the :detail function that received them");
+    return *run;
+}
+
+// native.column(name, writable): returns pointer, stride in scalars, type.
+int column(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const std::string name = text_at(state.lua(), 1);
+    AnyColumn* any = lua_type(L, 1) == LUA_TSTRING ? detail.points.find(name) : nullptr;
+    if (!any) throw Error(no_attribute(name, detail.points.column_names()));
+    const bool writable = lua_toboolean(L, 2) != 0;
+    std::visit(
+        [&]<class T>(Column<T>& values) {
+            if (writable) values.write();
+            const Strided<T> memory = std::as_const(values).read();
+            lua_pushlightuserdata(L, const_cast<T*>(memory.data));
+            lua_pushnumber(L, static_cast<double>(components_of<T> * memory.stride));
+        },
+        *any);
+    push_text(L, type_name(type_of(*any)));
+    return 3;
+}
+
+// native.has(name): returns true if the set has the attribute.
+int has(State& state)
+{
+    lua_pushboolean(state.lua(), detail_run_of(state).points.has(text_at(state.lua(), 1)));
+    return 1;
+}
+
+// native.group(name, writable): returns pointer and stride, or nothing if the group does not exist and is only read.
+int group(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const std::string name = text_at(state.lua(), 1);
+    if (lua_toboolean(L, 2)) detail.points.group(name).write();
+    const Column<std::uint8_t>* members = detail.points.find_group(name);
+    if (!members) return 0;
+    const Strided<std::uint8_t> memory = members->read();
+    lua_pushlightuserdata(L, const_cast<std::uint8_t*>(memory.data));
+    lua_pushnumber(L, static_cast<double>(memory.stride));
+    return 2;
+}
+
+// native.append(n, dt): appends n points. If dt is given, makes the column dt, with the frame's length as default.
+int append(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    if (!lua_isnoneornil(L, 2)) detail.points.add({"dt", static_cast<float>(lua_tonumber(L, 2))});
+    detail.points.append(static_cast<std::size_t>(lua_tonumber(L, 1)));
+    detail.changed();
+    return 0;
+}
+
+// native.neighbours(index, radius): returns the indices, from 1, of the others.
+int neighbours(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    const auto index = static_cast<std::uint32_t>(lua_tonumber(L, 1));
+    const double radius = lua_tonumber(L, 2);
+    const Strided<Vec3f> P = std::as_const(detail.points).P().read();
+    auto grid = detail.neighbours.find(radius);
+    if (grid == detail.neighbours.end()) {
+        std::vector<Vec3f> positions(detail.points.size());
+        for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = P[i];
+        grid = detail.neighbours.try_emplace(radius, positions, radius).first;
+    }
+    std::vector<std::uint32_t> found;
+    grid->second.find(P[index].cast<double>(), found);
+    lua_createtable(L, static_cast<int>(found.size()), 0);
+    int n = 0;
+    for (const std::uint32_t i : found) {
+        if (i == index) continue;
+        lua_pushnumber(L, i + 1.0);
+        lua_rawseti(L, -2, ++n);
+    }
+    return 1;
+}
+
+// native.reorder(indices from 1): reorders the points.
+int reorder(State& state)
+{
+    lua_State* L = state.lua();
+    DetailRun& detail = detail_run_of(state);
+    std::vector<std::uint32_t> order(detail.points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        lua_rawgeti(L, 1, static_cast<int>(i) + 1);
+        order[i] = static_cast<std::uint32_t>(lua_tonumber(L, -1)) - 1;
+        lua_pop(L, 1);
+    }
+    detail.points.reorder(order);
+    detail.changed();
+    return 0;
+}
+
+using Entry = std::map<std::string, Value>;
+
+Value list_of(std::vector<Value> entries)
+{
+    auto list = std::make_shared<Table>();
+    list->list = std::move(entries);
+    return Value(std::shared_ptr<const Table>(std::move(list)));
+}
+Value entry_of(Entry values)
+{
+    auto entry = std::make_shared<Table>();
+    entry->named = std::move(values);
+    return Value(std::shared_ptr<const Table>(std::move(entry)));
+}
+Value vector_of(const Vec3f& v) { return Value(Vec3d(v.cast<double>())); }
+
+std::vector<Value> deaths_in(const PointSet& dead, const std::vector<double>& times)
+{
+    std::vector<Value> deaths;
+    for (std::size_t i = 0; i < dead.size(); ++i)
+        deaths.push_back(entry_of({{"id", static_cast<double>(dead.id()[i])},
+                                   {"P", vector_of(dead.P()[i])},
+                                   {"v", vector_of(dead.v()[i])},
+                                   {"time", times[i]}}));
+    return deaths;
+}
+
+// native.events(): returns the last step's events, { hits = {...}, deaths = {...}, births = {...} }.
+int events(State& state)
+{
+    const StepRecord* record = detail_run_of(state).record;
+    if (!record) throw Error("points.events needs a :solve at the end of the chain; end it with :solve {}");
+    const PointSet& before = record->before;
+    std::vector<Value> hits, births;
+    for (const LoggedHit& hit : record->hits)
+        hits.push_back(entry_of({{"id", static_cast<double>(before.id()[hit.point])},
+                                 {"P", vector_of(hit.P)},
+                                 {"N", vector_of(hit.n)},
+                                 {"v", vector_of(hit.v1)},
+                                 {"time", hit.time},
+                                 {"speed", static_cast<double>(hit.speed)},
+                                 {"impulse", static_cast<double>(hit.impulse)}}));
+    const Column<float>* dt = before.find<float>("dt");
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        if (before.id()[i] < record->first_new) continue;
+        births.push_back(entry_of({{"id", static_cast<double>(before.id()[i])},
+                                   {"P", vector_of(before.P()[i])},
+                                   {"v", vector_of(before.v()[i])},
+                                   {"time", record->time - (dt ? static_cast<double>((*dt)[i]) : record->h)}}));
+    }
+    std::vector<Value> deaths = deaths_in(record->killed, record->killed_at);
+    for (Value& old : deaths_in(record->old, record->old_at)) deaths.push_back(std::move(old));
+    push(state, entry_of({{"hits", list_of(std::move(hits))},
+                          {"deaths", list_of(std::move(deaths))},
+                          {"births", list_of(std::move(births))}}));
+    return 1;
+}
+
+}  // namespace
+
+DetailRun::DetailRun(State& state, PointSet& of, const StepRecord* of_step)
+    : points(of), record(of_step), state_(state), top_(lua_gettop(state.lua()))
+{
+    ++state_.detail_serial;
+    lua_pushlightuserdata(state_.lua(), this);
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, run_in_registry);
+}
+
+DetailRun::~DetailRun()
+{
+    ++state_.detail_serial;
+    lua_settop(state_.lua(), top_);
+    lua_pushnil(state_.lua());
+    lua_setfield(state_.lua(), LUA_REGISTRYINDEX, run_in_registry);
+}
+
+void push_detail_natives(State& state)
+{
+    lua_State* L = state.lua();
+    constexpr luaL_Reg functions[] = {{"column", native<column>},         {"has", native<has>},
+                                      {"group", native<group>},           {"append", native<append>},
+                                      {"neighbours", native<neighbours>}, {"reorder", native<reorder>},
+                                      {"events", native<events>}};
+    lua_newtable(L);
+    for (const luaL_Reg& f : functions) {
+        lua_pushcfunction(L, f.func);
+        lua_setfield(L, -2, f.name);
+    }
+    lua_pushlightuserdata(L, &state.detail_serial);
+    lua_setfield(L, -2, "serial");
 }
 
 }  // namespace rapid

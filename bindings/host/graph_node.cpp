@@ -6,9 +6,9 @@
 
 #include "bindings/host/construct.h"
 #include "bindings/host/lua_text.h"
-#include "bindings/host/objects.h"
-#include "bindings/host/script_location.h"
+#include "bindings/host/script_error.h"
 #include "bindings/host/script_type.h"
+#include "bindings/host/values.h"
 #include "runtime/base/at_node.h"
 #include "runtime/graph/registry.h"
 

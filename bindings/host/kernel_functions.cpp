@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <lua.hpp>
 
-#include "bindings/host/kernel_moment.h"
-#include "bindings/host/math_functions.h"
 #include "runtime/lanes/kernel_random.h"
 #include "runtime/math/noise.h"
 #include "runtime/shapes/level_set/density_grid.h"
@@ -116,6 +114,32 @@ void set_kernel_functions(lua_State* L)
     };
     set_all("math_functions1", math_functions1);
     set_all("math_functions2", math_functions2);
+}
+
+namespace {
+
+thread_local const KernelMoment* moment_of_thread = nullptr;
+
+}  // namespace
+
+KernelMoment::KernelMoment(const double* times, const std::int32_t* at)
+    : times_(times), at_(at), outer_(moment_of_thread)
+{
+    moment_of_thread = this;
+}
+
+KernelMoment::~KernelMoment() { moment_of_thread = outer_; }
+
+std::optional<double> KernelMoment::time()
+{
+    if (!moment_of_thread || !moment_of_thread->times_ || *moment_of_thread->at_ < 0) return std::nullopt;
+    return moment_of_thread->times_[*moment_of_thread->at_];
+}
+
+double KernelMoment::since_begin(const StepShape& shape)
+{
+    const std::optional<double> now = time();
+    return now ? *now - shape.begin() : shape.duration();
 }
 
 }  // namespace rapid

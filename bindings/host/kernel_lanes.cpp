@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "bindings/host/kernel_functions.h"
 #include "bindings/host/lua_text.h"
-#include "bindings/host/math_functions.h"
 #include "bindings/host/script_host.h"
 
 namespace rapid {

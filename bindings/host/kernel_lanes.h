@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bindings/host/chunk.h"
-#include "bindings/host/kernel_layout.h"
+#include "bindings/host/kernel.h"
 #include "bindings/host/state.h"
 #include "runtime/base/error.h"
 #include "runtime/lanes/lane_program.h"

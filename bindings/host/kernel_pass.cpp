@@ -9,8 +9,8 @@
 
 #include "bindings/host/detail.h"
 #include "bindings/host/kernel.h"
+#include "bindings/host/kernel_functions.h"
 #include "bindings/host/kernel_lanes.h"
-#include "bindings/host/kernel_moment.h"
 #include "bindings/host/script_host.h"
 #include "bindings/host/values.h"
 #include "runtime/points/point_text.h"

@@ -8,7 +8,6 @@
 
 #include "bindings/host/chunk.h"
 #include "bindings/host/kernel.h"
-#include "bindings/host/kernel_layout.h"
 #include "runtime/graph/node.h"
 
 namespace rapid {

@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <lua.hpp>
+#include <set>
 
-#include "bindings/host/param_facts.h"
+#include "bindings/host/lua_text.h"
+#include "bindings/host/modules.h"
+#include "bindings/host/script_host.h"
 #include "runtime/base/json.h"
 
 namespace rapid {
@@ -95,6 +100,65 @@ std::string page_of(const NodeType& type)
     names("makes", made_by(type));
     if (text.back() != '\n') text += '\n';
     return text;
+}
+
+std::string facts_of(const Param& param)
+{
+    std::vector<std::string> facts = {param.type};
+    if (!param.unit.empty()) facts.push_back(param.unit);
+    if (param.range.bounded()) facts.push_back(param.range.text());
+    if (!param.choices.empty()) facts.push_back(fmt::format("one of {}", fmt::join(param.choices, ", ")));
+    if (param.required)
+        facts.push_back("required");
+    else if (!param.fallback.is_nil())
+        facts.push_back("default " + describe(param.fallback));
+    if (param.per_point) facts.push_back("takes rapid.attr");
+    if (!param.of_the_frame && param.type.find("function") == std::string::npos) facts.push_back("constant");
+    return fmt::format("[{}]", fmt::join(facts, ", "));
+}
+
+namespace {
+
+// Returns true if a file defines a node: scenes and modules may lie next to it.
+bool defines_node(const std::filesystem::path& file)
+{
+    std::error_code none;
+    if (file.extension() != ".lua" || !std::filesystem::is_regular_file(file, none)) return false;
+    const std::optional<std::string> text = read_lua_file(file);
+    return text && text->find("rapid.node") != std::string::npos;
+}
+
+std::set<std::string> own_nodes()
+{
+    std::vector<std::filesystem::path> folders = rapid_path();
+    folders.insert(folders.begin(), ".");
+    std::set<std::string> names;
+    for (const std::filesystem::path& folder : folders) {
+        std::error_code unreadable;
+        for (const auto& entry : std::filesystem::directory_iterator(folder, unreadable))
+            if (defines_node(entry.path())) names.insert(entry.path().stem().string());
+    }
+    return names;
+}
+
+}  // namespace
+
+NodeTypes with_own_nodes()
+{
+    ScriptHost host({}, SessionOptions{});
+    host.load_shipped_nodes();
+    NodeTypes types;
+    for (const std::string& name : own_nodes()) {
+        host.main().push_entry("load_node");
+        push_text(host.main().lua(), name);
+        try {
+            host.main().call(1, 0);
+        } catch (const Error& error) {
+            types.faults.push_back(error.what());
+        }
+    }
+    types.registry = host.registry;
+    return types;
 }
 
 }  // namespace rapid

@@ -14,11 +14,10 @@
 
 #include "bindings/host/interruption.h"
 #include "bindings/host/kernel.h"
-#include "bindings/host/maker_cache.h"
+#include "bindings/host/maker.h"
 #include "bindings/host/modules.h"
 #include "bindings/host/session.h"
 #include "bindings/host/state.h"
-#include "bindings/host/watchdog.h"
 
 namespace rapid {
 

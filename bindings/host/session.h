@@ -4,6 +4,8 @@
 // when they first run a kernel. A session is used from one thread; its kernels run on all threads.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -15,11 +17,42 @@
 #include <vector>
 
 #include "bindings/host/interruption.h"
+#include "runtime/base/error.h"
+#include "runtime/graph/node_type.h"
 #include "runtime/graph/plan.h"
 #include "runtime/graph/registry.h"
 #include "runtime/report/study.h"
 
 namespace rapid {
+
+// Objects and node types that an embedding program offers to a scene, which takes the objects as rapid.host "NAME".
+struct Offers {
+    // Change only between frames, on the scene's thread.
+    std::map<std::string, ObjectPtr> objects;
+    std::map<std::string, ObjectPtr> in_motion;  // replace them in functions of the frame
+    std::vector<NodeType> node_types;
+
+    // Returns the object for a function of the frame, which may be the state of a moving one (StateInMotion). Throws
+    // Error as object() does.
+    const ObjectPtr& object_of_frame(const std::string& name) const
+    {
+        const auto found = in_motion.find(name);
+        return found != in_motion.end() ? found->second : object(name);
+    }
+
+    // Returns the object at rest. Throws Error if there is none of this name, and lists the existing names.
+    const ObjectPtr& object(const std::string& name) const
+    {
+        if (const auto found = objects.find(name); found != objects.end()) return found->second;
+        std::vector<std::string> names;
+        for (const auto& entry : objects) names.push_back(entry.first);
+        if (names.empty())
+            throw Error(fmt::format("rapid.host \"{}\": the program that opened the scene offers no objects", name));
+        const std::string nearest = did_you_mean(name, names);
+        throw Error(fmt::format("rapid.host \"{}\": the program offers no such object{}", name,
+                                nearest.empty() ? fmt::format("; it offers {}", fmt::join(names, ", ")) : nearest));
+    }
+};
 
 // The sequence in which kernels visit the points. Sequences other than Forward are for `rapid check --races`, on one
 // thread.
@@ -32,8 +65,6 @@ struct KernelOrder {
     Sequence sequence = Forward;
     std::string node;  // if not empty, only this node's kernel
 };
-
-struct Offers;  // offers.h
 
 struct SessionOptions {
     std::map<std::string, std::string> set;            // NAME or NODE.PARAM, and the value

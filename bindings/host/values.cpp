@@ -1,18 +1,119 @@
 #include "bindings/host/values.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <lua.hpp>
+#include <utility>
 
-#include "bindings/host/handle_memory.h"
+#include "bindings/host/kernel_analysis.h"
 #include "bindings/host/lua_text.h"
-#include "bindings/host/objects.h"
-#include "bindings/host/ramp.h"
 #include "bindings/host/script_error.h"
-#include "bindings/host/script_function.h"
+#include "bindings/host/script_host.h"
 #include "bindings/host/state.h"
+#include "runtime/base/memory_budget.h"
+#include "runtime/base/object.h"
+#include "runtime/graph/node_type.h"
+#include "runtime/graph/point_function.h"
+#include "runtime/graph/points_object.h"
+#include "runtime/shapes/level_set/density_grid.h"
+#include "runtime/shapes/level_set/level_set.h"
+#include "runtime/shapes/level_set/placed.h"
+#include "runtime/shapes/level_set/vector_grid.h"
+#include "runtime/shapes/mesh/mesh.h"
+#include "runtime/shapes/shape.h"
+
+struct lua_State;
 
 namespace rapid {
+
+// Accounts for the memory of objects that handles hold: level sets, meshes and points, whose bytes Lua's collector does
+// not see. The collector runs when they have doubled, so that a script that makes a new one in each frame retains a
+// few, not all. Small objects, graph nodes included, count too: beyond the budget the next one is an error.
+void release(lua_State* L, const Object& object);
+
+namespace {
+
+constexpr char counts_field[] = "rapid.handle_memory";  // in the registry
+
+constexpr std::size_t min_held = std::size_t{16} << 20;  // bytes below which a collection is not worthwhile
+
+constexpr std::size_t piece = std::size_t{64} << 20;  // bytes per request
+
+struct Counts {
+    std::size_t held = 0, most = min_held;
+    std::size_t left = piece;  // bytes left of the last request; the first piece is not requested
+};
+
+Counts& counts_of(lua_State* L)
+{
+    lua_getfield(L, LUA_REGISTRYINDEX, counts_field);
+    Counts& counts = *static_cast<Counts*>(lua_touserdata(L, -1));
+    lua_pop(L, 1);
+    return counts;
+}
+
+// OpenVDB's nodes above the leaves: each of the two upper kinds has a pointer for every possible child, 32^3 and 16^3
+// of them, and an object at the origin spans eight nodes of each kind.
+constexpr std::size_t bytes_of_upper_nodes = 8 * (32 * 32 * 32 + 16 * 16 * 16) * sizeof(void*);
+
+// Returns the approximate bytes of an object's arrays.
+std::size_t weight_of(const Object& object)
+{
+    constexpr std::size_t bytes_of_node = 1024;  // of a graph node
+    if (dynamic_cast<const NodeHandle*>(&object)) return bytes_of_node;
+    // A level set is two grids of floats: one for queries, whose blocks are about half full, and OpenVDB's, which some
+    // get later but all are charged for.
+    constexpr std::size_t bytes_per_voxel = 2 * 2 * sizeof(float);
+    constexpr std::size_t bytes_of_leaves = std::size_t{2} << 20;  // for grids that do not report their size
+    if (dynamic_cast<const PlacedLevelSet*>(&object)) return 0;    // the level set's owner is charged
+    if (const auto* level_set = dynamic_cast<const LevelSet*>(&object))
+        return bytes_of_upper_nodes + static_cast<std::size_t>(level_set->active_voxels()) * bytes_per_voxel;
+    if (const auto* mesh = dynamic_cast<const Mesh*>(&object))
+        return mesh->positions.size() * sizeof(Vec3f) + mesh->triangles.size() * sizeof(Mesh::Triangle);
+    if (const auto* points = dynamic_cast<const PointsObject*>(&object)) return points->points.bytes();
+    if (dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const DensityGrid*>(&object))
+        return bytes_of_upper_nodes + bytes_of_leaves;
+    // A shape offered by an embedding program uses that program's memory, whose size is unknown.
+    constexpr std::size_t bytes_of_shape = std::size_t{64} << 10;
+    return dynamic_cast<const Shape*>(&object) ? bytes_of_shape : 0;
+}
+
+}  // namespace
+
+// Stores the counts of a new state in its registry.
+void count_handles(lua_State* L)
+{
+    new (lua_newuserdata(L, sizeof(Counts))) Counts;
+    lua_setfield(L, LUA_REGISTRYINDEX, counts_field);
+}
+
+// Counts an object that a handle holds or releases. hold() may run the collector. Throws Error if the memory is
+// full.
+void hold(lua_State* L, const Object& object)
+{
+    const std::size_t bytes = weight_of(object);
+    if (bytes == 0) return;
+    Counts& counts = counts_of(L);
+    counts.held += bytes;
+    const bool asks = counts.left < bytes, full = asks && !fits_in_memory(piece);
+    counts.left = asks ? piece : counts.left - bytes;
+    if (!full && counts.held <= counts.most) return;
+    lua_gc(L, LUA_GCCOLLECT, 0);
+    counts.most = std::max(min_held, 2 * counts.held);
+    if (!full) return;
+    malloc_trim(0);  // memory released by the collector
+    if (!fits_in_memory(piece))
+        throw memory_exceeded("a further 64 MiB of nodes, level sets, meshes and points", piece, "make fewer of them");
+}
+
+void release(lua_State* L, const Object& object)
+{
+    if (const std::size_t bytes = weight_of(object)) counts_of(L).held -= bytes;
+}
+
 namespace {
 
 constexpr char object_metatable[] = "rapid.object";
@@ -245,6 +346,114 @@ int set_object_methods(State& state)
     });
     lua_setfield(L, -2, "__tostring");
     return 0;
+}
+
+std::shared_ptr<const Ramp> read_ramp(const Param& param, const Value& value)
+{
+    const auto refuse = [&](const std::string& what) {
+        throw Error(
+            fmt::format("{} {}; it must be a list of keys with increasing positions and values of one type, such as {{ "
+                        "{{0, 1}}, {{0.5, 4}} }} or {{ {{0, {{1, 0, 0}}}} }}",
+                        param.name, what));
+    };
+    const Table* table = value.table();
+    if (!table || table->list.empty() || !table->named.empty() || !table->numbered.empty())
+        refuse("= " + describe(value));
+
+    auto ramp = std::make_shared<Ramp>();
+    for (const Value& key : table->list) {
+        const Table* pair = key.table();
+        const double* position = pair && pair->list.size() == 2 ? pair->list[0].get<double>() : nullptr;
+        if (!position || !std::isfinite(*position)) refuse("has the key " + describe(key));
+        if (!ramp->keys.empty() && !(*position > ramp->keys.back().first))
+            refuse(fmt::format("has the position {:g} after {:g}", *position, ramp->keys.back().first));
+        Value kept;
+        if (pair->list[1].get<double>()) {
+            double number = 0;
+            read_value(param, pair->list[1], number);
+            kept = Value(number);
+        } else {
+            Vec3d vector;
+            read_value(param, pair->list[1], vector);
+            kept = Value(vector);
+        }
+        if (!ramp->keys.empty() && ramp->keys.back().second.index() != kept.index())
+            refuse("has both numbers and vec3s as values");
+        ramp->keys.emplace_back(*position, std::move(kept));
+    }
+    return ramp;
+}
+
+namespace {
+
+class ScriptFunction : public FrameFunction, public Located {
+public:
+    ScriptFunction(State& state, int index) : state_(state), location_(location_of_function(state.lua(), index))
+    {
+        if (location_.file.empty()) location_ = {};
+        lua_pushvalue(state.lua(), index);
+        reference_ = luaL_ref(state.lua(), LUA_REGISTRYINDEX);
+    }
+
+    Value call(const Frame& frame) const override
+    {
+        lua_State* L = state_.lua();
+        const Watchdog::Section section(state_.host().watchdog,
+                                        fmt::format("{}:{}: a parameter's function", location_.file, location_.line));
+        const MakerCache::Call remembered(cache_, state_.host().maker_cache);
+        state_.push_entry("call");
+        lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
+        lua_pushnumber(L, frame.number);
+        lua_pushnumber(L, frame.time);
+        lua_pushnumber(L, frame.dt);
+        try {
+            state_.call(4, 1);
+        } catch (Error& error) {
+            error.at(location_);
+            throw;
+        }
+        Value result = to_value(state_, -1);
+        lua_pop(L, 1);
+        return result;
+    }
+
+    Location location() const override { return location_; }
+
+    void refuse_memory() const
+    {
+        lua_State* L = state_.lua();
+        state_.push_entry("remembers");
+        lua_rawgeti(L, LUA_REGISTRYINDEX, reference_);
+        state_.call(1, 1);
+        const StoreOutside found(L);
+        lua_pop(L, 1);
+        found.refuse();
+    }
+
+private:
+    State& state_;
+    Location location_;
+    int reference_ = 0;
+    mutable MakerCache cache_;  // used on one thread
+};
+
+}  // namespace
+
+std::shared_ptr<const FrameFunction> script_function(State& state, int index)
+{
+    auto function = std::make_shared<ScriptFunction>(state, index);
+    if (ScriptHost& host = state.host(); host.options().keeps_state && state.is_main()) {
+        if (state.is_loaded())
+            function->refuse_memory();
+        else
+            host.frame_functions.push_back(function);
+    }
+    return function;
+}
+
+void refuse_memory(const FrameFunction& function)
+{
+    if (const auto* script = dynamic_cast<const ScriptFunction*>(&function)) script->refuse_memory();
 }
 
 }  // namespace rapid

@@ -25,20 +25,20 @@ struct Difference {
     std::string what, here, there;  // "heat of point id 3", "1", "2"
 };
 
-std::string shown(float value) { return fmt::format("{:.9g}", value); }
-std::string shown(double value) { return fmt::format("{:.17g}", value); }
-std::string shown(std::int32_t value) { return fmt::format("{}", value); }
-std::string shown(std::int64_t value) { return fmt::format("{}", value); }
-std::string shown(const Vec3f& v) { return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z()); }
-std::string shown(const Vec3d& v) { return fmt::format("vec3({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
-std::string shown(const Quatf& q)
+std::string value_text(float value) { return fmt::format("{:.9g}", value); }
+std::string value_text(double value) { return fmt::format("{:.17g}", value); }
+std::string value_text(std::int32_t value) { return fmt::format("{}", value); }
+std::string value_text(std::int64_t value) { return fmt::format("{}", value); }
+std::string value_text(const Vec3f& v) { return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z()); }
+std::string value_text(const Vec3d& v) { return fmt::format("vec3({:.17g}, {:.17g}, {:.17g})", v.x(), v.y(), v.z()); }
+std::string value_text(const Quatf& q)
 {
     return fmt::format("quat({:.9g}, {:.9g}, {:.9g}, {:.9g})", q.x(), q.y(), q.z(), q.w());
 }
-std::string shown(Token text) { return fmt::format("\"{}\"", text.text()); }
-std::string shown(const DetailValue& value)
+std::string value_text(Token text) { return fmt::format("\"{}\"", text.text()); }
+std::string value_text(const DetailValue& value)
 {
-    return std::visit([](const auto& v) { return shown(v); }, value);
+    return std::visit([](const auto& v) { return value_text(v); }, value);
 }
 
 template <class T>
@@ -62,8 +62,8 @@ std::optional<Difference> compare_columns(const PointSet& a, const PointSet& b)
                 const auto& there = std::get<Column<T>>(*other);
                 const std::optional<std::size_t> i = first_unequal(here, there);
                 if (!i) return std::nullopt;
-                return Difference{nullptr, fmt::format("{} of point id {}", name, a.id()[*i]), shown(here[*i]),
-                                  shown(there[*i])};
+                return Difference{nullptr, fmt::format("{} of point id {}", name, a.id()[*i]), value_text(here[*i]),
+                                  value_text(there[*i])};
             },
             column);
         if (found) return found;
@@ -88,9 +88,9 @@ std::optional<Difference> compare_details(const PointSet& a, const PointSet& b)
 {
     for (const auto& [name, value] : a.details) {
         const auto other = b.details.find(name);
-        const std::string there = other == b.details.end() ? "missing" : shown(other->second);
-        if (shown(value) != there)
-            return Difference{nullptr, fmt::format("the detail value {}", name), shown(value), there};
+        const std::string there = other == b.details.end() ? "missing" : value_text(other->second);
+        if (value_text(value) != there)
+            return Difference{nullptr, fmt::format("the detail value {}", name), value_text(value), there};
     }
     return std::nullopt;
 }
@@ -101,7 +101,8 @@ std::optional<Difference> compare(const PointSet& a, const PointSet& b)
     // If ids differ, because points were killed or sorted, their values are irrelevant.
     for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         if (a.id()[i] != b.id()[i])
-            return Difference{nullptr, fmt::format("the id at index {}", i + 1), shown(a.id()[i]), shown(b.id()[i])};
+            return Difference{nullptr, fmt::format("the id at index {}", i + 1), value_text(a.id()[i]),
+                              value_text(b.id()[i])};
     if (a.size() != b.size())
         return Difference{nullptr, "the number of points", fmt::format("{}", a.size()), fmt::format("{}", b.size())};
     if (auto found = compare_columns(a, b)) return found;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bindings/host/offers.h"
+#include "bindings/host/session.h"
 #include "runtime/points/state_archive.h"
 #include "runtime/shapes/mesh/mesh_sequence.h"
 #include "runtime/shapes/motion/animated.h"

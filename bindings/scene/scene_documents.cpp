@@ -5,7 +5,6 @@
 
 #include "bindings/host/annotations.h"
 #include "bindings/host/node_page.h"
-#include "bindings/host/own_nodes.h"
 #include "bindings/scene/scene_error.h"
 #include "bindings/scene/scene_inside.h"
 #include "include/rapid/scene.h"

@@ -15,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/host/offers.h"
 #include "bindings/host/picture_scene.h"
 #include "bindings/host/session.h"
 #include "bindings/run/fingerprint.h"

@@ -36,7 +36,7 @@ void require_positive_edges(const ShapeParam& param, const ShapeValue& value)
         throw Error(fmt::format("{} = {}: each edge must be above 0", param.name, describe(Value(*edges))));
 }
 
-Maker maker_of(const ShapeType& type)
+Maker shape_maker(const ShapeType& type)
 {
     Maker maker;
     maker.name = "shape." + type.name;
@@ -54,7 +54,7 @@ Maker maker_of(const ShapeType& type)
 std::vector<Maker> shape_makers()
 {
     std::vector<Maker> makers;
-    for (const ShapeType& type : shape_types()) makers.push_back(maker_of(type));
+    for (const ShapeType& type : shape_types()) makers.push_back(shape_maker(type));
     return makers;
 }
 RAPID_MAKERS(shape_makers);

@@ -1,4 +1,4 @@
-#include "bindings/host/compiled_code.h"
+#include "bindings/host/state.h"
 
 #include <cstdlib>
 #include <lua.hpp>

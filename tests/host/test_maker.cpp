@@ -1,5 +1,5 @@
 // Functions of the frame that return an object do not rebuild it for equal arguments.
-#include "bindings/host/maker_cache.h"
+#include "bindings/host/maker.h"
 
 #include <cstdlib>
 #include <filesystem>

@@ -2,7 +2,7 @@
 // with --races, runs frames to find kernels that keep state from point to point.
 #include <fmt/format.h>
 
-#include "bindings/command/file_options.h"
+#include "bindings/command/run_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"

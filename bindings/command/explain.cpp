@@ -2,7 +2,7 @@
 // one.
 #include <fmt/format.h>
 
-#include "bindings/command/file_options.h"
+#include "bindings/command/run_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"

@@ -171,11 +171,11 @@ void require_free(const FarmJob& job)
 // rapid farm: reports the state of a job that --farm submitted.
 
 // Lost: neither queued nor ended, for example because it was cancelled before it ran.
-enum class Stage { Done, Failed, Running, Waiting, Lost };
+enum class JobStage { Done, Failed, Running, Waiting, Lost };
 constexpr std::string_view state_names[] = {"done", "failed", "running", "waiting", "lost"};
 
 struct TaskState {
-    Stage state;
+    JobStage state;
     std::string why;  // of Failed and Waiting
 };
 
@@ -183,13 +183,13 @@ TaskState state_of(const Queue& queue, std::int64_t job, std::size_t number, con
 {
     if (const auto found = queue.find({job, number}); found != queue.end()) {
         const auto& [state, reason] = found->second;
-        if (state == "RUNNING" || state == "COMPLETING") return {Stage::Running, ""};
-        return {Stage::Waiting, reason};
+        if (state == "RUNNING" || state == "COMPLETING") return {JobStage::Running, ""};
+        return {JobStage::Waiting, reason};
     }
     const std::optional<int> code = read_status(status);
-    if (!code) return {Stage::Lost, ""};
-    if (*code == 0) return {Stage::Done, ""};
-    return {Stage::Failed, *code > 128 ? fmt::format("signal {}", *code - 128) : fmt::format("status {}", *code)};
+    if (!code) return {JobStage::Lost, ""};
+    if (*code == 0) return {JobStage::Done, ""};
+    return {JobStage::Failed, *code > 128 ? fmt::format("signal {}", *code - 128) : fmt::format("status {}", *code)};
 }
 
 class Farm : public Command {
@@ -234,14 +234,17 @@ private:
         return states;
     }
 
-    static bool is_open(const TaskState& task) { return task.state == Stage::Running || task.state == Stage::Waiting; }
+    static bool is_open(const TaskState& task)
+    {
+        return task.state == JobStage::Running || task.state == JobStage::Waiting;
+    }
 
     // Returns status 1 if a task has failed or is lost.
     int report(const SubmittedJob& submitted, const std::vector<TaskState>& states) const
     {
         const FarmJob& job = submitted.job;
         const std::size_t count = job.tasks.size() + !job.last.empty();
-        std::map<Stage, std::size_t> counts;
+        std::map<JobStage, std::size_t> counts;
         JsonText json(2);
         json.begin_object();
         json.member("name", job.name);
@@ -258,7 +261,7 @@ private:
             ++counts[task.state];
             const std::string_view state = state_names[static_cast<std::size_t>(task.state)];
             json.object("name", name, "job", id, "state", state, "why", task.why, "log", log);
-            if (task.state == Stage::Failed || task.state == Stage::Lost)
+            if (task.state == JobStage::Failed || task.state == JobStage::Lost)
                 lines += fmt::format("{}: {}{}{}, {}\n", name, state, task.why.empty() ? "" : ", ", task.why, log);
         }
         std::vector<std::string> summary;
@@ -270,7 +273,7 @@ private:
             print(json.text() + '\n');
         else
             print(fmt::format("{}: {} tasks: {}\n{}", job.name, count, fmt::join(summary, ", "), lines));
-        return counts[Stage::Failed] + counts[Stage::Lost] > 0 ? status_failed : status_done;
+        return counts[JobStage::Failed] + counts[JobStage::Lost] > 0 ? status_failed : status_done;
     }
 
     static int cancel_all(const SubmittedJob& submitted, const std::vector<TaskState>& states)
@@ -284,10 +287,10 @@ private:
     {
         std::vector<std::size_t> again;
         for (std::size_t k = 0; k < submitted.arrays.size(); ++k)
-            if (states[k].state == Stage::Failed || states[k].state == Stage::Lost) again.push_back(k + 1);
+            if (states[k].state == JobStage::Failed || states[k].state == JobStage::Lost) again.push_back(k + 1);
         const bool has_last = !submitted.job.last.empty();
         const TaskState& last = states.back();
-        if (again.empty() && (!has_last || is_open(last) || last.state == Stage::Done)) {
+        if (again.empty() && (!has_last || is_open(last) || last.state == JobStage::Done)) {
             print("nothing has failed\n");
             return status_done;
         }

@@ -3,28 +3,264 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
 #include <csignal>
+#include <cstdint>
+#include <functional>
+#include <mutex>
 #include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
-#include "bindings/command/cache_options.h"
 #include "bindings/command/farm.h"
-#include "bindings/command/file_options.h"
-#include "bindings/command/graceful_end.h"
-#include "bindings/command/part_options.h"
-#include "bindings/command/run_terminal.h"
+#include "bindings/command/run_options.h"
 #include "bindings/command/watch.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/memory_limit.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/signals.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/scene/scene_inside.h"
+#include "include/rapid/run.h"
 #include "runtime/base/threads.h"
 #include "runtime/files/frame_pattern.h"
 #include "runtime/files/output_file.h"
+#include "runtime/report/progress.h"
 
 namespace rapid {
+
+// Handles a signal that ends a run: with snapshots, the current frame may complete within a grace period.
+class GracefulEnd {
+public:
+    // end_now: called with the signal from another thread when the grace period is over; it must not return.
+    GracefulEnd(double grace, std::function<void(int signal)> end_now);
+    ~GracefulEnd();
+    GracefulEnd(const GracefulEnd&) = delete;
+    GracefulEnd& operator=(const GracefulEnd&) = delete;
+
+    // Allows a graceful end from now on: there is something to save.
+    void allow();
+    // Called from the signals' thread. Returns false for the second signal, and if there is nothing to save: the run
+    // must end now.
+    bool request(int signal);
+    // Returns the received signal; 0: none.
+    int signal() const;
+
+private:
+    void wait();
+
+    const double grace_;
+    const std::function<void(int signal)> end_now_;
+    mutable std::mutex mutex_;
+    std::condition_variable changed_;
+    bool is_allowed_ = false, is_over_ = false;
+    int signal_ = 0;
+    std::thread thread_;
+};
+
+// Options --part and --sample, which select some of the points.
+class PartOptions {
+public:
+    void declare(Options& options);
+
+    const std::optional<RunPart>& part() const { return part_; }
+    const std::optional<double>& sample() const { return sample_; }
+
+private:
+    std::optional<RunPart> part_;
+    std::optional<double> sample_;
+};
+
+// The output of `rapid run` on the terminal: frames, progress and summary go to standard output, warnings and errors to
+// standard error.
+class RunTerminal {
+public:
+    RunTerminal(bool quiet, bool verbose) : quiet_(quiet), verbose_(verbose) {}
+
+    // Returns the listener that prints a run's lines and warnings. begins: as in RunListener.
+    RunListener listener(std::function<void(bool keeps_snapshots)> begins);
+    // Starts the progress display, when the frames to compute are known.
+    void begin(std::int64_t first, std::int64_t last);
+    // Prints how the run ended. signal: the one that ended it; 0: none. Returns the exit status of the process.
+    int end(const RunOutcome& outcome, int signal);
+    // Ends the process from any thread, at any time: prints why, lets the run write its statistics, and removes
+    // unfinished files.
+    [[noreturn]] void abandon(SceneRun& run, int status, const std::string& why);
+
+private:
+    // Precondition: the lock is held.
+    void erase_progress();
+    void print_unwritten(const std::vector<std::string>& unwritten) const;
+
+    const bool quiet_, verbose_;
+    std::timed_mutex mutex_;
+    std::optional<Progress> progress_;
+};
+
+GracefulEnd::GracefulEnd(double grace, std::function<void(int signal)> end_now)
+    : grace_(grace), end_now_(std::move(end_now))
+{
+}
+
+GracefulEnd::~GracefulEnd()
+{
+    {
+        const std::lock_guard lock(mutex_);
+        is_over_ = true;
+        is_allowed_ = false;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+}
+
+void GracefulEnd::allow()
+{
+    const std::lock_guard lock(mutex_);
+    is_allowed_ = true;
+}
+
+bool GracefulEnd::request(int signal)
+{
+    const std::lock_guard lock(mutex_);
+    if (!is_allowed_ || signal_ != 0) return false;
+    signal_ = signal;
+    thread_ = std::thread([this] { wait(); });
+    return true;
+}
+
+int GracefulEnd::signal() const
+{
+    const std::lock_guard lock(mutex_);
+    return signal_;
+}
+
+void GracefulEnd::wait()
+{
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_for(lock, std::chrono::duration<double>(grace_), [&] { return is_over_; })) return;
+    const int signal = signal_;
+    lock.unlock();
+    end_now_(signal);
+}
+
+namespace {
+
+std::optional<int> parse_integer(std::string_view text)
+{
+    int number = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size()) return {};
+    return number;
+}
+
+RunPart read_part(const std::string& text)
+{
+    const std::size_t slash = text.find('/');
+    const std::optional<int> number = parse_integer(text.substr(0, slash));
+    const std::optional<int> count = slash == std::string::npos ? std::nullopt : parse_integer(text.substr(slash + 1));
+    if (!number || !count || *count < 1 || *count > max_parts || *number < 1 || *number > *count)
+        throw Error(
+            fmt::format("--part = \"{}\"; it must be K/N, with K from 1 to N, and N at most {}", text, max_parts));
+    return {*number, *count};
+}
+
+double read_sample(const std::string& text)
+{
+    const double fraction = read_positive("--sample", text);
+    if (fraction > 1)
+        throw Error(fmt::format("--sample = \"{}\"; it must be a fraction of all points, above 0 and at most 1", text));
+    return fraction;
+}
+
+}  // namespace
+
+void PartOptions::declare(Options& options)
+{
+    options
+        .add_option(
+            "--part", [this](const std::string& text) { part_ = read_part(text); },
+            "simulates one of N subsets of the points, which `rapid merge` joins; file names get _part03of16 before "
+            "the frame number, or 03of16 instead of {part}")
+        .type_name("K/N");
+    options
+        .add_option(
+            "--sample", [this](const std::string& text) { sample_ = read_sample(text); },
+            "simulates this fraction of the points, 0.01 for a hundredth: a preview with the same ids and paths")
+        .type_name("FRACTION");
+}
+
+RunListener RunTerminal::listener(std::function<void(bool keeps_snapshots)> begins)
+{
+    RunListener listener;
+    listener.frame = [this](const RunFrame& frame) {
+        const std::lock_guard lock(mutex_);
+        if (!frame.is_known) progress_->frame(frame.number, frame.points, frame.seconds);
+    };
+    listener.line = [this](const std::string& text) {
+        const std::lock_guard lock(mutex_);
+        progress_->line(text);
+    };
+    listener.warning = [this](const std::string& text) {
+        const std::lock_guard lock(mutex_);
+        erase_progress();
+        print_warning(text);
+    };
+    listener.begins = std::move(begins);
+    return listener;
+}
+
+void RunTerminal::begin(std::int64_t first, std::int64_t last)
+{
+    const std::lock_guard lock(mutex_);
+    progress_.emplace(stdout, quiet_ ? ProgressStyle::None : progress_style(stdout), first, last);
+}
+
+int RunTerminal::end(const RunOutcome& outcome, int signal)
+{
+    const std::lock_guard lock(mutex_);
+    erase_progress();
+    if (outcome.ending == RunOutcome::Complete) {
+        if (!quiet_) print(outcome.summary);
+        return status_done;
+    }
+    const bool has_failed = outcome.ending == RunOutcome::Failed;
+    if (has_failed)
+        print_error(*outcome.error, verbose_);
+    else
+        print_error(
+            Error(fmt::format("interrupted after frame {}; the same command continues from there", outcome.last_frame)),
+            verbose_);
+    print_unwritten(outcome.unwritten);
+    return has_failed ? status_failed : 128 + signal;
+}
+
+void RunTerminal::abandon(SceneRun& run, int status, const std::string& why)
+{
+    // The run's own thread holds the lock only briefly, unless its terminal is stopped; then proceed without it.
+    if (const auto abandoned = SceneInside::abandon(run); abandoned && mutex_.try_lock_for(std::chrono::seconds(1))) {
+        erase_progress();
+        for (const std::string& warning : abandoned->warnings) print_warning(warning);
+        print_error(Error(why), false);
+        print_unwritten(abandoned->unwritten);
+    }
+    remove_unfinished_files();
+    _exit(status);
+}
+
+void RunTerminal::erase_progress()
+{
+    if (progress_) progress_->finish();
+}
+
+void RunTerminal::print_unwritten(const std::vector<std::string>& unwritten) const
+{
+    for (const std::string& why : unwritten) print_error(Error(why), verbose_);
+}
+
 namespace {
 
 class Run : public Command, public Confined {
@@ -237,4 +473,5 @@ private:
 RAPID_COMMAND(Run);
 
 }  // namespace
+
 }  // namespace rapid

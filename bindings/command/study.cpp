@@ -20,10 +20,9 @@
 #include <thread>
 
 #include "bindings/command/processes.h"
-#include "bindings/command/swept_setting.h"
+#include "bindings/command/run_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
-#include "bindings/command_line/memory_limit.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
 #include "bindings/host/graph_parameter.h"

@@ -13,16 +13,14 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/command/cache_options.h"
 #include "bindings/command/farm.h"
-#include "bindings/command/file_options.h"
 #include "bindings/command/processes.h"
-#include "bindings/command/swept_setting.h"
+#include "bindings/command/run_options.h"
 #include "bindings/command_line/command.h"
 #include "bindings/command_line/frame_selection.h"
 #include "bindings/command_line/scene_arguments.h"
 #include "bindings/command_line/untrusted.h"
-#include "bindings/scene/picture_sheet.h"
+#include "bindings/scene/scene_film.h"
 #include "bindings/scene/scene_inside.h"
 #include "runtime/base/json.h"
 #include "runtime/base/printable.h"

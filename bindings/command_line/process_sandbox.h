@@ -5,7 +5,7 @@
 //
 //   Landlock    it reads only `readable` (recursively), Rapid's own files, RAPID_PATH and the system's libraries, and
 //               creates and changes files only below `writable`
-//   seccomp     it makes the system calls that Rapid needs (system_call_filter.h): it opens no socket, starts no
+//   seccomp     it makes the system calls that Rapid needs: it opens no socket, starts no
 //               process, reaches no other process, and changes no mode, owner, time or attribute of a file
 //   environment only the variables of the loader, the C library and Rapid
 //   privileges  of root's only those that open files of other users, and no new ones
@@ -21,9 +21,22 @@
 #include <filesystem>
 #include <vector>
 
-#include "bindings/command_line/system_call_filter.h"
-
 namespace rapid {
+
+// The allowlist of system calls for a sandboxed process (seccomp). All others fail with EPERM. A call by the numbers of
+// another architecture (32 bits, x32) ends the process with SIGSYS.
+enum class Processes {
+    None,    // threads only
+    Copies,  // may fork, and wait for the copies, which have the same filter; starts no other program
+};
+
+enum class Connections {
+    None,
+    Accepted,  // accepts on a socket that already listens; cannot create sockets
+};
+
+// Installs the filter on all threads and their children. Returns a seccomp status: 0, or a negative errno.
+int load_system_call_filter(Processes processes, Connections connections = Connections::None);
 
 struct SandboxAccess {
     std::vector<std::filesystem::path> readable, writable;  // files, or folders including everything below

@@ -4,7 +4,6 @@
 
 #include <utility>
 
-#include "bindings/command_line/memory_limit.h"
 #include "bindings/scene/scene_inside.h"
 #include "runtime/base/memory_budget.h"
 

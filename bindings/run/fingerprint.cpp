@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "bindings/host/modules.h"
-#include "bindings/run/setting_entries.h"
+#include "bindings/run/part_record.h"
 #include "runtime/base/setting_names.h"
 #include "runtime/files/content_hash.h"
 #include "runtime/graph/abi.h"

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <limits>
+#include <map>
 #include <vector>
 
-#include "bindings/run/setting_entries.h"
 #include "runtime/base/error.h"
 #include "runtime/base/json.h"
 #include "runtime/base/setting_names.h"
@@ -104,6 +104,16 @@ std::string difference(const PartRecord& there, const PartRecord& here)
 std::filesystem::path part_record_file(const std::string& pattern, std::string_view output)
 {
     return FramePattern(pattern).without_frame(output) + ".json";
+}
+
+std::string name_in_message(const std::string& name)
+{
+    static const std::map<std::string, Setting> settings = {{events_entry, Setting::Events},
+                                                            {part_entry, Setting::Part},
+                                                            {sample_entry, Setting::Sample},
+                                                            {seed_entry, Setting::Seed}};
+    const auto found = settings.find(name);
+    return found == settings.end() ? name : name_of(found->second);
 }
 
 }  // namespace rapid

@@ -46,4 +46,11 @@ std::string difference(const PartRecord& there, const PartRecord& here);
 // Returns the record's file for a sequence or a file, by its pattern with the part's name.
 std::filesystem::path part_record_file(const std::string& pattern, std::string_view output = "main");
 
+// Entries for settings, with the command's option names in the files of any program.
+constexpr char seed_entry[] = "--seed", part_entry[] = "--part", sample_entry[] = "--sample",
+               events_entry[] = "--events";
+
+// Returns the name of an entry in messages.
+std::string name_in_message(const std::string& name);
+
 }  // namespace rapid

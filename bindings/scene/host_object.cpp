@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "bindings/scene/host_parts.h"
 #include "runtime/base/error.h"
 #include "runtime/graph/points_object.h"
 #include "runtime/shapes/mesh/mesh.h"

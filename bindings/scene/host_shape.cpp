@@ -1,9 +1,7 @@
 // A shape whose distance is a callback of the program over arrays of positions.
 #include <fmt/format.h>
 
-#include "bindings/scene/guarded_array.h"
 #include "bindings/scene/host_object.h"
-#include "bindings/scene/host_parts.h"
 #include "bindings/scene/scene_error.h"
 #include "runtime/shapes/first_contact.h"
 

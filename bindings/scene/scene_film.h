@@ -7,9 +7,11 @@
 // Errors and units are those of rapid/scene.h. A film is used by one thread at a time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "include/rapid/scene.h"
 #include "include/rapid/shapes.h"
@@ -49,5 +51,18 @@ private:
     explicit SceneFilm(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
+
+// One of the pictures.
+struct SheetPicture {
+    std::string file;                // a .png; empty: none, and its place stays free
+    std::vector<std::string> label;  // lines of ASCII, truncated to fit
+};
+
+// Returns the bytes of a .png with these pictures from left to right and from the top, in about as many rows as
+// columns; at most 8,192 pixels wide. All are fitted into the shape of the first picture. `series` pictures each form a
+// series, which begins a row or lies in one, if possible. Callable from any thread. Fails if a series is empty, if
+// there are more than 4,096 pictures, if one is more than 16 times as high as wide, or if a file cannot be read or is
+// not a .png.
+Result<std::string> picture_sheet(const std::vector<SheetPicture>& pictures, std::size_t series = 1);
 
 }  // namespace rapid

@@ -7,9 +7,9 @@
 #include <mutex>
 
 #include "bindings/run/event_file.h"
+#include "bindings/run/part_record.h"
 #include "bindings/run/run_cache.h"
 #include "bindings/run/run_report.h"
-#include "bindings/run/setting_entries.h"
 #include "bindings/run/written_names.h"
 #include "bindings/scene/run_outputs.h"
 #include "bindings/scene/scene_impl.h"

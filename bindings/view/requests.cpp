@@ -6,15 +6,87 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <string>
+#include <vector>
 
 #include "bindings/scene/scene_inside.h"
-#include "bindings/view/request_fields.h"
+#include "bindings/view/frame_message.h"
+#include "include/rapid/scene.h"
+#include "runtime/base/error.h"
 #include "runtime/base/json.h"
 #include "runtime/solver/figure_table.h"
 
 namespace rapid {
+
+// Reads the fields of a page's request, each checked against its type and its range. All functions throw if a field has
+// another type, or a value that is refused; the error names a valid value.
+
+// colour, group, velocities, most.
+FrameOptions frame_options_of(const CheckedJson& request);
+
+namespace {
+
+constexpr int max_depth = 8;  // of lists: copying deeper ones would overflow the stack
+constexpr int min_edge = 16, max_edge = 16384;
+
+int edge_of(const CheckedJson& request, const char* name, int usual)
+{
+    const int edge = request.value(name, usual);
+    if (edge < min_edge || edge > max_edge)
+        throw Error(fmt::format("{} = {}; it must be from {} to {} pixels", name, edge, min_edge, max_edge));
+    return edge;
+}
+
+}  // namespace
+
+// Lists and objects nested deeper than eight levels are skipped. Throws Error unless the message is a JSON object.
+CheckedJson parse_request(const std::string& message)
+{
+    const auto is_shallow = [](int depth, CheckedJson::parse_event_t, CheckedJson&) { return depth <= max_depth; };
+    CheckedJson request = CheckedJson::parse(message, is_shallow, false);
+    if (!request.is_object()) throw Error("a request must be a JSON object");
+    return request;
+}
+
+// A frame that can be computed: one from first to last.
+std::int64_t frame_of(const CheckedJson& request, const char* name, std::int64_t first, std::int64_t last)
+{
+    const auto frame = request.at(name).get<std::int64_t>();
+    if (frame < first || frame > last)
+        throw Error(fmt::format("{} = {}; it must be a frame from {} to {}", name, frame, first, last));
+    return frame;
+}
+
+// width and height, from 16 to 16384 pixels.
+PictureSize size_of(const CheckedJson& request)
+{
+    return {edge_of(request, "width", 1280), edge_of(request, "height", 720)};
+}
+
+// camera: position, target, vertical angle in degrees. Without one, the camera is fitted.
+PictureCamera camera_of(const CheckedJson& request)
+{
+    if (!request.contains("camera")) return {};
+    const auto camera = request["camera"].get<std::vector<double>>();
+    if (camera.size() != 7)
+        throw Error(fmt::format("camera has {} numbers; it must have 7: position, target, angle", camera.size()));
+    return {std::array{camera[0], camera[1], camera[2]}, std::array{camera[3], camera[4], camera[5]}, camera[6]};
+}
+
+FrameOptions frame_options_of(const CheckedJson& request)
+{
+    FrameOptions frame_options;
+    frame_options.colour = request.value("colour", "");
+    frame_options.group = request.value("group", "");
+    frame_options.velocities = request.value("velocities", false);
+    frame_options.most = request.value("most", frame_options.most);
+    return frame_options;
+}
+
 namespace {
 
 using Json = CheckedJson;

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bindings/scene/scene_inside.h"
-#include "bindings/view/points.h"
+#include "bindings/view/frame_message.h"
 #include "bindings/view/run.h"
 #include "runtime/base/json.h"
 

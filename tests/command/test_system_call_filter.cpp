@@ -1,5 +1,5 @@
 // Operations that the sandbox forbids, each tried in a separate process.
-#include "bindings/command_line/system_call_filter.h"
+#include "bindings/command_line/process_sandbox.h"
 
 #include <fcntl.h>
 #include <linux/keyctl.h>

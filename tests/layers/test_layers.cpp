@@ -90,9 +90,8 @@ const std::set<std::string> small_tools = {
 
 // Internal headers of the library that only the command's files may include; other programs do not need them.
 const std::set<std::string> for_our_programs = {"bindings/host/graph_parameter.h", "bindings/run/study_scene.h",
-                                                "bindings/scene/installation.h",   "bindings/scene/picture_sheet.h",
-                                                "bindings/scene/scene_film.h",     "bindings/scene/scene_inside.h",
-                                                "bindings/scene/scene_tests.h"};
+                                                "bindings/scene/installation.h",   "bindings/scene/scene_film.h",
+                                                "bindings/scene/scene_inside.h",   "bindings/scene/scene_tests.h"};
 
 // Returns true for the folder of the command, or of a program that `rapid` executes.
 bool is_program(const std::string& folder)
@@ -256,7 +255,7 @@ TEST_CASE("a command is a program like others", "[layers]")
 TEST_CASE("the library does not speak of the command's options", "[layers]")
 {
     // Names of cache entries, and of arguments of ffmpeg.
-    const std::set<std::string> others = {"bindings/run/setting_entries.h", "runtime/io/film.cpp"};
+    const std::set<std::string> others = {"bindings/run/part_record.h", "runtime/io/film.cpp"};
     const std::regex text(R"re("((?:[^"\\]|\\.)*)")re"), option(R"re((^|[^-\w])(--[a-z]{2,}|-[ofj](?=[ :]|$)))re");
     const fs::path root = RAPID_SOURCE_DIR;
     for (const char* folder : {"runtime", "bindings/host", "bindings/run", "bindings/scene", "bindings/c"})

@@ -1,4 +1,4 @@
-#include "bindings/command/file_options.h"
+#include "bindings/command/run_options.h"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "bindings/scene/scene_inside.h"
+#include "include/rapid/run.h"
+#include "runtime/base/error.h"
 #include "runtime/files/frame_pattern.h"
 
 namespace rapid {
@@ -98,6 +100,43 @@ bool FileOptions::makes_films() const
 {
     return std::any_of(names().begin(), names().end(),
                        [](const std::string& text) { return SceneInside::output_format(text).value().is_film; });
+}
+
+void CacheOptions::declare(Options& options, const std::string& doc_of_folder, const std::string& doc_of_again)
+{
+    options.add_option("--cache", folder_, doc_of_folder).type_name("DIR");
+    options
+        .add_option(
+            "--cache-every", [this](const std::string& text) { every_ = read_whole("--cache-every", text, 0); },
+            fmt::format(
+                "with --cache: writes a snapshot after every Nth frame and after the last [default {}]; 0 writes none",
+                RunCacheOptions().every))
+        .type_name("N");
+    options.add_flag("--again", again_, doc_of_again);
+}
+
+void CacheOptions::check() const
+{
+    if (!requested() && every_) throw Error("--cache-every sets how often snapshots are written; it needs --cache DIR");
+}
+
+SweptSetting read_swept_setting(const std::string& option, const std::string& text, const std::string& names)
+{
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0)
+        throw Error(fmt::format("{} \"{}\"; it must be {}=VALUE,VALUE,...", option, text, names));
+    SweptSetting setting{text.substr(0, equals), {""}};
+    int depth = 0;
+    for (const char c : text.substr(equals + 1)) {
+        depth += (c == '{') - (c == '}');
+        if (c == ',' && depth == 0)
+            setting.values.emplace_back();
+        else
+            setting.values.back() += c;
+    }
+    for (const std::string& value : setting.values)
+        if (value.empty()) throw Error(fmt::format("{} {}: a value is missing", option, setting.name));
+    return setting;
 }
 
 }  // namespace rapid

@@ -517,6 +517,57 @@ int report(const Points<columns>& points)
     return 0;
 }
 
+// A point as it is born: its columns, and the part of the frame that it lives, s.
+template <int columns>
+struct Newborn {
+    float values[columns];
+    float time;
+};
+
+// The place of a birth in its frame.
+struct Birth {
+    int frame;
+    std::size_t before;     // births in all earlier frames
+    std::size_t i, births;  // this one's index, and the number of births in the frame
+};
+
+// Simulates the frames and reports the last one. due(frame): the births up to and including a frame. make(random,
+// birth): a Newborn. step(first, last, frame, time_of, dead): moves points. sorted: newborn points that are stepped
+// together get their times in ascending order.
+template <int columns, bool sorted = false, class Due, class Make, class Step>
+int run(Points<columns>& p, int frames, Due due, const Make& make, const Step& step)
+{
+    Dead dead;
+    std::size_t born = 0;
+    std::vector<float> own;
+    for (int frame = 2; frame <= frames; ++frame) {
+        const std::size_t births = due(frame) - born, old = p.append(births);
+        own.resize(births);
+        dead.begin(old + births + 2 * chunk);
+        in_parallel(old, [&](std::size_t begin, std::size_t end) {
+            step(
+                begin, end, frame, [](std::size_t) { return frame_time; }, dead.of(begin));
+        });
+        in_parallel(births, [&](std::size_t begin, std::size_t end) {
+            Random random(born + begin);
+            for (std::size_t i = begin; i < end; ++i) {
+                const Newborn<columns> point = make(random, Birth{frame, born, i, births});
+                for (int k = 0; k < columns; ++k) p[k][old + i] = point.values[k];
+                own[i] = point.time;
+            }
+            if constexpr (sorted)
+                std::sort(own.begin() + static_cast<std::ptrdiff_t>(begin),
+                          own.begin() + static_cast<std::ptrdiff_t>(end));
+            step(
+                old + begin, old + end, frame, [&](std::size_t i) { return own[i - old]; },
+                dead.of(old + chunk + begin));
+        });
+        born += births;
+        p.remove(dead.all());
+    }
+    return report(p);
+}
+
 struct Arguments {
     double rate;
     int frames;

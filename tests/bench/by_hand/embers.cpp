@@ -41,44 +41,16 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 6) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    std::vector<float> own;
-    for (int frame = 2; frame <= frames; ++frame) {
-        const float now = static_cast<float>(frame - 1) / 24;
-        const auto due = static_cast<std::size_t>(rate * (frame - 1) / 24);
-        const std::size_t births = due - born, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, now, [](std::size_t) { return frame_time; }, dead.of(begin));
+    return run(
+        p, frames, [rate = rate](int frame) { return static_cast<std::size_t>(rate * (frame - 1) / 24); },
+        [](Random& random, const Birth&) {
+            const V v = turned({0, 0.4f, 0}, 1.0471976f, random);
+            const float px = 1.6f * random.next() - 0.8f, py = 0.15f * random.next(), pz = 0.5f * random.next() - 0.25f;
+            return Newborn<columns>{{px, py, pz, v.x, v.y, v.z, 1, 1.5f + 2.5f * random.next(), 6.2832f * random.next(),
+                                     1 / (0.8f + 2 * random.next())},
+                                    frame_time * random.next()};
+        },
+        [&](std::size_t first, std::size_t last, int frame, const auto& time_of, auto& dead) {
+            step(p, first, last, static_cast<float>(frame - 1) / 24, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                const V v = turned({0, 0.4f, 0}, 1.0471976f, random);
-                const float px = 1.6f * random.next() - 0.8f, py = 0.15f * random.next(),
-                            pz = 0.5f * random.next() - 0.25f;
-                const float values[columns] = {px,
-                                               py,
-                                               pz,
-                                               v.x,
-                                               v.y,
-                                               v.z,
-                                               1,
-                                               1.5f + 2.5f * random.next(),
-                                               6.2832f * random.next(),
-                                               1 / (0.8f + 2 * random.next())};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = frame_time * random.next();
-            }
-            step(
-                p, old + begin, old + end, now, [&](std::size_t i) { return own[i - old]; },
-                dead.of(old + chunk + begin));
-        });
-        born = due;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

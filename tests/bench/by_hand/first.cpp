@@ -73,34 +73,17 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 3.5) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    std::vector<float> own;
     const TorusMesh ring(0.35f, 0.06f, {0, 2.2f, 0});
     torus();
-    for (int frame = 2; frame <= frames; ++frame) {
-        const auto due = static_cast<std::size_t>(rate * (frame - 1) / 24);
-        const std::size_t births = due - born, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, [](std::size_t) { return frame_time; }, dead.of(begin));
+    return run(
+        p, frames, [rate = rate](int frame) { return static_cast<std::size_t>(rate * (frame - 1) / 24); },
+        [&](Random& random, const Birth&) {
+            const V P = ring.place(random).P;
+            const V v = turned({0, -0.5f, 0}, 0.2617994f, random);
+            return Newborn<columns>{{P.x, P.y, P.z, v.x, v.y, v.z, 0, 2.5f + random.next(), 0.25f, 0.6f, 1},
+                                    frame_time * random.next()};
+        },
+        [&](std::size_t first, std::size_t last, int, const auto& time_of, auto& dead) {
+            step(p, first, last, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                const V P = ring.place(random).P;
-                const V v = turned({0, -0.5f, 0}, 0.2617994f, random);
-                const float values[columns] = {P.x, P.y, P.z, v.x, v.y, v.z, 0, 2.5f + random.next(), 0.25f, 0.6f, 1};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = frame_time * random.next();
-            }
-            step(
-                p, old + begin, old + end, [&](std::size_t i) { return own[i - old]; }, dead.of(old + chunk + begin));
-        });
-        born = due;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

@@ -53,44 +53,20 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(2 * rate * 2.1) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    std::vector<float> own;
-    for (int frame = 2; frame <= frames; ++frame) {
-        const double due = rate * (frame - 1) / 24;
-        const std::size_t each = static_cast<std::size_t>(due) - born, births = 2 * each, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, frame, [](std::size_t) { return frame_time; }, dead.of(begin));
+    const auto due = [rate = rate](int frame) { return rate * (frame - 1) / 24; };  // from each of the two rings
+    return run(
+        p, frames, [&](int frame) { return 2 * static_cast<std::size_t>(due(frame)); },
+        [&, rate = rate](Random& random, const Birth& birth) {
+            const std::size_t each = birth.births / 2;
+            const bool upper = birth.i >= each;
+            const float angle = std::floor(12 * random.next()) * 0.5235988f, radius = upper ? 0.35f : 0.7f;
+            const double passed = due(birth.frame) - static_cast<double>(birth.before / 2 + birth.i % each + 1);
+            return Newborn<columns>{
+                {radius * std::cos(angle), upper ? 2.3f : 0.1f, radius * std::sin(angle), 0, upper ? -1.1f : 1.1f, 0, 0,
+                 1.2f + 0.8f * random.next(), upper ? 1 : 0.35f, upper ? 0.4f : 0.55f, upper ? 0.8f : 1, 0},
+                static_cast<float>(passed / rate)};
+        },
+        [&](std::size_t first, std::size_t last, int frame, const auto& time_of, auto& dead) {
+            step(p, first, last, frame, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(2 * born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                const bool upper = i >= each;
-                const float angle = std::floor(12 * random.next()) * 0.5235988f, radius = upper ? 0.35f : 0.7f;
-                const float values[columns] = {radius * std::cos(angle),
-                                               upper ? 2.3f : 0.1f,
-                                               radius * std::sin(angle),
-                                               0,
-                                               upper ? -1.1f : 1.1f,
-                                               0,
-                                               0,
-                                               1.2f + 0.8f * random.next(),
-                                               upper ? 1 : 0.35f,
-                                               upper ? 0.4f : 0.55f,
-                                               upper ? 0.8f : 1,
-                                               0};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = static_cast<float>((due - static_cast<double>(born + i % each + 1)) / rate);
-            }
-            step(
-                p, old + begin, old + end, frame, [&](std::size_t i) { return own[i - old]; },
-                dead.of(old + chunk + begin));
-        });
-        born += each;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

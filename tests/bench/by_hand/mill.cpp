@@ -205,49 +205,20 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 3.1) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    std::vector<float> own;
     cross();
-    for (int frame = 2; frame <= frames; ++frame) {
-        const float now = static_cast<float>(frame - 1) / 24;
-        const auto due = static_cast<std::size_t>(rate * (frame - 1) / 24);
-        const std::size_t births = due - born, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, now, [](std::size_t) { return frame_time; }, dead.of(begin));
+    return run<columns, true>(
+        p, frames, [rate = rate](int frame) { return static_cast<std::size_t>(rate * (frame - 1) / 24); },
+        [](Random& random, const Birth&) {
+            // The box's faces by area: top and bottom, front and back, left and right.
+            const float u = random.next() - 0.5f, v = random.next() - 0.5f, face = random.next() * 0.82f;
+            const float side = random.next() < 0.5f ? -0.5f : 0.5f;
+            const V at = face < 0.7f ? V{u, side, v} : face < 0.77f ? V{u, v, side} : V{side, u, v};
+            const V velocity = turned({0, -1, 0}, 0.1396263f, random);
+            return Newborn<columns>{{0.25f + 0.7f * at.x, 2.4f + 0.05f * at.y, 0.5f * at.z, velocity.x, velocity.y,
+                                     velocity.z, 0, 0.95f, 0.8f, 0.35f},
+                                    frame_time * random.next()};
+        },
+        [&](std::size_t first, std::size_t last, int frame, const auto& time_of, auto& dead) {
+            step(p, first, last, static_cast<float>(frame - 1) / 24, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                // The box's faces by area: top and bottom, front and back, left and right.
-                const float u = random.next() - 0.5f, v = random.next() - 0.5f, face = random.next() * 0.82f;
-                const float side = random.next() < 0.5f ? -0.5f : 0.5f;
-                const V at = face < 0.7f ? V{u, side, v} : face < 0.77f ? V{u, v, side} : V{side, u, v};
-                const V velocity = turned({0, -1, 0}, 0.1396263f, random);
-                const float values[columns] = {0.25f + 0.7f * at.x,
-                                               2.4f + 0.05f * at.y,
-                                               0.5f * at.z,
-                                               velocity.x,
-                                               velocity.y,
-                                               velocity.z,
-                                               0,
-                                               0.95f,
-                                               0.8f,
-                                               0.35f};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = frame_time * random.next();
-            }
-            // Sorts the births of a block together.
-            std::sort(own.begin() + static_cast<std::ptrdiff_t>(begin), own.begin() + static_cast<std::ptrdiff_t>(end));
-            step(
-                p, old + begin, old + end, now, [&](std::size_t i) { return own[i - old]; },
-                dead.of(old + chunk + begin));
-        });
-        born = due;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

@@ -53,33 +53,18 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 1.7) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    std::vector<float> own;
     const TorusMesh wheel(0.2f, 0.02f, {0, 0.6f, 0});
-    for (int frame = 2; frame <= frames; ++frame) {
-        const double due = rate * (frame - 1) / 24;
-        const std::size_t births = static_cast<std::size_t>(due) - born, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, [](std::size_t) { return frame_time; }, dead.of(begin));
+    const auto due = [rate = rate](int frame) { return rate * (frame - 1) / 24; };
+    return run(
+        p, frames, [&](int frame) { return static_cast<std::size_t>(due(frame)); },
+        [&, rate = rate](Random& random, const Birth& birth) {
+            const auto [P, N] = wheel.place(random);
+            const V v = turned(V{5, 2.5f, 0} + 1.5f * N, 0.2443461f, random);
+            const double passed = due(birth.frame) - static_cast<double>(birth.before + birth.i + 1);
+            return Newborn<columns>{{P.x, P.y, P.z, v.x, v.y, v.z, 0, 0.4f + 1.2f * random.next(), 1},
+                                    static_cast<float>(passed / rate)};
+        },
+        [&](std::size_t first, std::size_t last, int, const auto& time_of, auto& dead) {
+            step(p, first, last, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                const auto [P, N] = wheel.place(random);
-                const V v = turned(V{5, 2.5f, 0} + 1.5f * N, 0.2443461f, random);
-                const float values[columns] = {P.x, P.y, P.z, v.x, v.y, v.z, 0, 0.4f + 1.2f * random.next(), 1};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = static_cast<float>((due - static_cast<double>(born + i + 1)) / rate);
-            }
-            step(
-                p, old + begin, old + end, [&](std::size_t i) { return own[i - old]; }, dead.of(old + chunk + begin));
-        });
-        born += births;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

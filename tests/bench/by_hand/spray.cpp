@@ -61,34 +61,19 @@ int main(int count, char** words)
 {
     const auto [rate, frames] = arguments_of(count, words);
     Points<columns> p(static_cast<std::size_t>(rate * 2.6) + chunk);
-    Dead dead;
-    std::size_t born = 0;
-    double due = 0;
-    std::vector<float> own;
     ball();
-    for (int frame = 2; frame <= frames; ++frame) {
-        due += rate * (0.55 + 0.45 * std::cos(9 * (frame - 1) / 24.0)) / 24;
-        const std::size_t births = static_cast<std::size_t>(due) - born, old = p.append(births);
-        own.resize(births);
-        dead.begin(old + births + 2 * chunk);
-        in_parallel(old, [&](std::size_t begin, std::size_t end) {
-            step(
-                p, begin, end, [](std::size_t) { return frame_time; }, dead.of(begin));
+    return run(
+        p, frames,
+        [rate = rate, due = 0.0](int frame) mutable {
+            due += rate * (0.55 + 0.45 * std::cos(9 * (frame - 1) / 24.0)) / 24;
+            return static_cast<std::size_t>(due);
+        },
+        [&](Random& random, const Birth&) {
+            const V v = turned({2.1f, 5.2f, 0}, 0.08726646f, random);
+            const float px = -1.18f + 0.16f * random.next(), pz = -0.08f + 0.16f * random.next();
+            return Newborn<columns>{{px, 0.3f, pz, v.x, v.y, v.z, 0}, frame_time * random.next()};
+        },
+        [&](std::size_t first, std::size_t last, int, const auto& time_of, auto& dead) {
+            step(p, first, last, time_of, dead);
         });
-        in_parallel(births, [&](std::size_t begin, std::size_t end) {
-            Random random(born + begin);
-            for (std::size_t i = begin; i < end; ++i) {
-                const V v = turned({2.1f, 5.2f, 0}, 0.08726646f, random);
-                const float px = -1.18f + 0.16f * random.next(), pz = -0.08f + 0.16f * random.next();
-                const float values[columns] = {px, 0.3f, pz, v.x, v.y, v.z, 0};
-                for (int k = 0; k < columns; ++k) p[k][old + i] = values[k];
-                own[i] = frame_time * random.next();
-            }
-            step(
-                p, old + begin, old + end, [&](std::size_t i) { return own[i - old]; }, dead.of(old + chunk + begin));
-        });
-        born += births;
-        p.remove(dead.all());
-    }
-    return report(p);
 }

@@ -18,8 +18,7 @@ def a_click_on_a_node_shows_the_points_as_they_leave_it(bench):
         line = next(line for line in reported.splitlines() if line.startswith(what))
         assert names <= set(line[len(what):].replace(",", " ").split()), reported
     browser.run("document.querySelector('#graph [data-node=lift]').dispatchEvent(new Event('click'))")
-    browser.wait("rapidView.picture.message.after === 'lift'")
-    assert "line 12" in browser.run("return document.getElementById('node').innerText")
+    browser.wait("rapidView.picture.message.after === 'lift' && /line 12/.test(document.getElementById('node').innerText)")
     browser.type("\ue00c")
     browser.wait("rapidView.picture.message.after === ''")
     assert browser.run("return rapidView.picture.message.box[1][1]") < 7

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <type_traits>
 
 #include "runtime/points/id_index.h"
@@ -419,9 +420,17 @@ private:
 
 int Step::needed_substeps(int iterations) const
 {
-    Vec3d acceleration = Vec3d::Zero();
+    // The points of a group may be the pile: of the accelerations with and without that of each group, the largest
+    // counts.
+    Vec3d common = Vec3d::Zero();
+    std::map<std::string, Vec3d> of_groups;
     for (const auto& force : flow.dynamics.forces())
-        if (const std::optional<Uniform> uniform = force->uniform()) acceleration += uniform->a;
+        if (const std::optional<Uniform> uniform = force->uniform())
+            (force->group.empty() ? common : of_groups.try_emplace(force->group, Vec3d::Zero()).first->second) +=
+                uniform->a;
+    Vec3d acceleration = common;
+    for (const auto& [group, a] : of_groups)
+        if ((common + a).norm() > acceleration.norm()) acceleration = common + a;
     double of_one = 1;  // iteration
     for (const auto& constraint : flow.dynamics.constraints())
         at_node(*constraint, [&] {

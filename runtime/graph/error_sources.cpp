@@ -17,6 +17,7 @@
 #include "runtime/graph/point_edit.h"
 #include "runtime/graph/point_function.h"
 #include "runtime/graph/step_shape.h"
+#include "runtime/shapes/level_set/density_grid.h"
 #include "runtime/shapes/level_set/grid_sequence.h"
 #include "runtime/shapes/motion/animated.h"
 #include "runtime/shapes/motion/deforming.h"
@@ -70,6 +71,8 @@ std::string approximation_by(const Object& object)
         voxel = shape->smallest_feature();
     if (voxel) return fmt::format("a level set of voxel {:.4g} m", *voxel);
     if (dynamic_cast<const LevelSetSequence*>(&object)) return "level sets of files";
+    if (dynamic_cast<const DensityGrid*>(&object) || dynamic_cast<const GridSequence<DensityGrid>*>(&object))
+        return "a fog";
     if (dynamic_cast<const VectorGrid*>(&object) || dynamic_cast<const GridSequence<VectorGrid>*>(&object))
         return "a grid of vectors";
     return {};
@@ -81,7 +84,7 @@ bool takes_shape(const Param& param)
     return mentions("shape") || mentions("mesh") || mentions("level set") || mentions("grid") || mentions("curve");
 }
 
-// Finds the sources of one simulation that has a Solve.
+// Finds the sources of one simulation.
 class Search {
 public:
     Search(const Plan& plan, std::size_t simulation, ErrorSources& found)
@@ -89,12 +92,10 @@ public:
     {
         for (const PlannedNode& node : plan.nodes)
             if (node.carries.count(simulation)) nodes_.push_back(&node);
-        for (const PlannedNode* node : nodes_) add_inputs_of_motion(*node);
-        // Ages decide when a point ends, not where it is; hits are only recorded.
-        for (const char* name : {"age", "life", "id"}) columns_.erase(name);
-        for (const char* name : Hits::names) columns_.erase(name);
         for (const PointCoupling& coupling : couplings_of(plan))
             is_coupled_ |= coupling.node->type->kind == NodeKind::Dynamic;
+        for (const PlannedNode* node : nodes_) add_inputs_of_motion(*node);
+        if (is_coupled_) columns_.insert("life");
     }
 
     void run()
@@ -114,7 +115,16 @@ private:
     {
         if (!acts_in_solve(planned)) return;
         const Uses uses = uses_of(planned);
-        for (const auto* names : {&uses.reads, &uses.may, &uses.takes}) columns_.insert(names->begin(), names->end());
+        std::set<std::string> inputs;
+        for (const auto* names : {&uses.reads, &uses.may, &uses.takes}) inputs.insert(names->begin(), names->end());
+        if (planned.node->type->kind == NodeKind::Solve) {
+            // Ages decide when a point ends, not where it is; hits are only recorded.
+            for (const char* name : {"age", "life", "id"}) inputs.erase(name);
+            for (const char* name : Hits::names) inputs.erase(name);
+        } else if (inputs.count("age")) {
+            add(UnmeasuredError::Graph, planned.node->name, "which reads age, constant through a frame");
+        }
+        columns_.insert(inputs.begin(), inputs.end());
         for (const auto* names : {&uses.reads_groups, &uses.takes_groups}) groups_.insert(names->begin(), names->end());
     }
 
@@ -134,9 +144,13 @@ private:
         const bool adds_points = node.type->has(Stage::Emission);
         if (!planned.in_loop) {
             if (contains(written_by(planned), "P"))
-                add(UnmeasuredError::Graph, node.name, fmt::format("which changes P after {}", planned_.solve->name));
+                add(UnmeasuredError::Graph, node.name,
+                    planned_.solve ? fmt::format("which changes P after {}", planned_.solve->name)
+                                   : fmt::format("which changes P {}", rate()));
             return;
         }
+        if (adds_points && is_coupled_)
+            add(UnmeasuredError::Graph, node.name, fmt::format("whose births meet other points {}", rate()));
         const auto declared = declared_errors().find(node.type->name);
         if (declared != declared_errors().end()) {
             if (!declared->second.empty()) add(UnmeasuredError::Graph, node.name, declared->second);
@@ -294,8 +308,7 @@ ErrorSources error_sources_of(const Plan& plan)
 {
     ErrorSources found;
     found.is_closed_form = true;
-    for (std::size_t s = 0; s < plan.simulations.size(); ++s)
-        if (plan.simulations[s].solve) Search(plan, s, found).run();
+    for (std::size_t s = 0; s < plan.simulations.size(); ++s) Search(plan, s, found).run();
     return found;
 }
 

@@ -146,9 +146,14 @@ std::string incomplete_error(const RunTotals& totals, const ErrorBudget& budget)
     return fmt::format("{}; twice the substeps give the same positions within rounding{}", unmeasured, of_frame);
 }
 
-std::string error_text(const RunTotals& totals, const std::optional<ErrorBudget>& budget)
+std::string error_text(const RunStatistics& run, const RunTotals& totals, const std::optional<ErrorBudget>& budget)
 {
-    if (!was_solved(totals)) return "";
+    if (!was_solved(totals)) {
+        std::vector<std::string> texts;
+        for (const UnmeasuredError& error : run.errors.unmeasured) texts.push_back(error.text);
+        if (texts.empty() || *totals.points.most == 0) return "";
+        return line("error", fmt::format("not estimated: {}", fmt::join(texts, "; ")));
+    }
     if (!budget) return line("error", "not estimated");
     return line("error",
                 budget->is_complete ? complete_error(*totals.error.worst, *budget) : incomplete_error(totals, *budget));
@@ -200,7 +205,8 @@ std::string result_text(const RunStatistics& run, const RunTotals& totals, const
                          fmt::format("{} is stiff: estimated error {}; {} substeps would give {}", one.node,
                                      length_text(better->error), better->substeps, length_text(better->error_after)));
     if (!text.empty()) return text;
-    const bool is_known = !was_solved(totals) || (budget && budget->is_complete);
+    const bool is_known =
+        was_solved(totals) ? budget && budget->is_complete : run.errors.unmeasured.empty() || *totals.points.most == 0;
     return line("result", is_known ? "all fine" : "nothing to look at, but not all of the error is estimated");
 }
 
@@ -209,8 +215,8 @@ std::string result_text(const RunStatistics& run, const RunTotals& totals, const
 std::string summary(const RunStatistics& run, const RunTotals& totals)
 {
     const std::optional<ErrorBudget> budget = worst_budget(totals, run.errors);
-    return points_text(totals) + frame_count_text(run, totals) + slowest_text(totals) + error_text(totals, budget) +
-           files_text(totals) + result_text(run, totals, budget);
+    return points_text(totals) + frame_count_text(run, totals) + slowest_text(totals) +
+           error_text(run, totals, budget) + files_text(totals) + result_text(run, totals, budget);
 }
 
 std::string advice(const std::vector<Stiffness>& stiff)

@@ -113,6 +113,38 @@ local parents = rapid.create { points = two } :gravity {} :solve {}
 return rapid.create {} :spawn { name = "drops", from = parents, rate = 100 } :gravity {} :solve {}]])
   end)
 
+  it("births among points that act on each other", function()
+    leaves_out({ graph = "emit1, whose births meet other points once per frame" }, [[
+      return rapid.create {} :emit { source = rapid.mesh.sphere { radius = 1 }, rate = 200 }
+        :interact { radius = 0.5, separation = 1 } :solve {}]])
+  end)
+
+  it("ages on which motion depends", function()
+    for node, text in pairs {
+      [":drag { name = 'brake', linear = rapid.attr 'age' }"] = "brake, which reads age, constant through a frame",
+      [":action('slow', function(p, step) p.v = p.v * (1 - p.age * step.dt) end)"] = "slow, which reads age",
+    } do
+      leaves_out({ graph = text }, "return rapid.create {} "
+        .. ":emit { source = rapid.mesh.sphere {}, rate = 99, speed = 1 } " .. node .. " :solve {}")
+    end
+  end)
+
+  it("ends of lives among points that act on each other, and hits that motion reads", function()
+    graph("cut, which changes life", ":points('cut', function(p) p.life = 1 end) "
+      .. ":interact { radius = 2, separation = 1 }")
+    graph("push, which changes hitv", ":points('push', function(p) p.hitv = vec3(1, 0, 0) end) "
+      .. ":action('pull', function(p, step) p.v = p.v + p.hitv * step.dt end)")
+  end)
+
+  it("nodes that change positions in a simulation without a solve", function()
+    local _, summary = sources_of "return rapid.create { points = two } :points('go', function(p) p.P = 1.1 * p.P end)"
+    assert.truthy(summary:find("error    not estimated: go, which changes P once per frame\n", 1, true), summary)
+    assert.falsy(summary:find("all fine", 1, true), summary)
+    leaves_out({ graph = "go, which changes P once per frame" }, [[
+      return rapid.create { points = two } :gravity {} :solve {} :merge(
+        rapid.create { points = two, name = "others" } :points("go", function(p) p.P = 1.1 * p.P end))]])
+  end)
+
   it("nodes that change positions after the solve", function()
     leaves_out({ graph = "mirror, which changes P after solve1" },
       "return rapid.create { points = two } :gravity {} :solve {} :points('mirror', function(p) p.P = -p.P end)")
@@ -134,6 +166,12 @@ describe("a run names what approximates a shape:", function()
     shapes("collide1.shape, a level set of voxel 0.05 m", ":gravity {} :collide { shape = " .. ball .. " }")
     shapes("attract1.shape, a level set of voxel 0.05 m", ":attract { shape = " .. ball .. " }")
     shapes("emit1.source, a level set of voxel 0.05 m", ":emit { source = " .. ball .. ", rate = 100 }")
+  end)
+
+  it("fogs", function()
+    leaves_out({ graph = "emit1", shapes = "emit1.source, a fog" }, [[
+      local fog = rapid.fog.from_points(two, { radius = 0.5, voxel = 0.2 })
+      return rapid.create {} :emit { source = fog, rate = 99 } :contact { radius = 0.01 } :solve {}]])
   end)
 
   it("level sets and moving shapes that an action reaches", function()

@@ -61,8 +61,6 @@ private:
         const std::filesystem::path file = context.resolve(path);
         if (std::error_code none; !std::filesystem::exists(file, none))
             throw Error(fmt::format("there is no mesh file \"{}\"", file.string()));
-        if (file.extension() != ".gltf" && file.extension() != ".glb")
-            throw Error(fmt::format("animation is for .gltf and .glb, and \"{}\" is neither", path));
         auto mesh = std::make_shared<GltfAnimatedMesh>(file, *animation, speed.value_or(1), order());
         warn_of_skipped(*mesh->rest(), context);
         return std::make_shared<AnimatedMesh>(std::move(mesh), constant_motion(pose()));

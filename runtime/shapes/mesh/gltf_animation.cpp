@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "runtime/base/error.h"
+#include "runtime/files/input_file.h"
+#include "runtime/files/skipped_contents.h"
 
 namespace rapid {
 namespace {
@@ -29,34 +31,46 @@ const GltfAnimation& animation_of(const GltfFile& file, const std::string& name)
                             name, list.empty() ? "none" : list, did_you_mean(name, names)));
 }
 
-// Corners share a vertex if they coincide at rest and in some poses: what touches at rest may part later.
-std::vector<std::int32_t> join_in_all(const std::vector<std::vector<Vec3f>>& poses)
+GltfFile read_animated(const std::filesystem::path& path)
 {
-    std::vector<std::int32_t> joined = join_by_position(poses.front());
-    for (std::size_t p = 1; p < poses.size(); ++p) {
-        const std::vector<std::int32_t> further = join_by_position(poses[p]);
-        std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> classes;
-        for (std::size_t i = 0; i < joined.size(); ++i)
-            joined[i] =
-                classes.try_emplace({joined[i], further[i]}, static_cast<std::int32_t>(classes.size())).first->second;
+    std::string extension = without_gz(path).extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
+    if (extension != ".gltf" && extension != ".glb") throw Error("animation is for .gltf and .glb, and it is neither");
+    return read_gltf(path);
+}
+
+// Returns what `read` returns. Its errors name the file.
+template <class F>
+auto with_name(const std::string& name, const F& read)
+{
+    try {
+        return read();
+    } catch (const Error& error) {
+        throw Error(fmt::format("cannot read the mesh \"{}\": {}", name, error.message()), error.kind());
     }
-    return joined;
 }
 
 }  // namespace
 
 GltfAnimatedMesh::GltfAnimatedMesh(const std::filesystem::path& path, const std::string& name, double speed,
                                    FrameSequence order)
-    : file_(read_gltf(path)), animation_(&animation_of(file_, name)), name_(path.string()), speed_(speed), order_(order)
+    : name_(path.string()),
+      file_(with_name(name_, [&] { return read_animated(path); })),
+      animation_(with_name(name_, [&] { return &animation_of(file_, name); })),
+      speed_(speed),
+      order_(order)
 {
     if (order.before == FrameSequence::None || order.after == FrameSequence::None)
         throw Error("before and after of an animation are \"hold\", \"repeat\" or \"mirror\"");
-    for (const GltfChannel& channel : animation_->channels)
+    for (const GltfChannel& channel : animation_->channels) {
         duration_ = std::max<double>(duration_, channel.times.back());
-    std::vector<std::vector<Vec3f>> poses = {posed(file_).positions};
-    constexpr int parts = 8;
-    for (int k = 0; k <= parts; ++k) poses.push_back(posed(file_, animation_, duration_ * k / parts).positions);
-    vertex_of_ = join_in_all(poses);
+        if (channel.path != GltfChannel::Weights && file_.nodes[channel.node].transform.matrix)
+            add_skipped(file_.skipped, fmt::format("the animation of node {}, which has a matrix; export translation, "
+                                                   "rotation and scale instead",
+                                                   channel.node));
+    }
+    vertex_of_ = join_moved_alike(file_);
     rest_ = posed_at(0);
 }
 
@@ -78,7 +92,7 @@ double GltfAnimatedMesh::time_at(double seconds, double fps) const
 
 MeshPtr GltfAnimatedMesh::posed_at(double time) const
 {
-    const MeshFile mesh = posed(file_, animation_, time);
+    const MeshFile mesh = with_name(name_, [&] { return posed(file_, animation_, time); });
     for (const Vec3f& P : mesh.positions)
         if (!P.allFinite()) throw Error(fmt::format("\"{}\" has a vertex that is not finite at {} s", name_, time));
     return joined(mesh, vertex_of_, name_);

@@ -18,7 +18,8 @@ class GltfAnimatedMesh final : public DeformingMesh {
 public:
     // name: of the animation; empty for the only one. order: what happens before the first and after the last key, and
     // the frames by which the animation is delayed; by default it begins at time 0. speed: seconds of the animation per
-    // second. Throws Error if there is no such animation, or if read_gltf() does.
+    // second. Throws Error, which names the file, if its extension is not .gltf or .glb, if there is no such animation,
+    // or if read_gltf() does.
     GltfAnimatedMesh(const std::filesystem::path& path, const std::string& name, double speed, FrameSequence order);
 
     const MeshPtr& rest() const override { return rest_; }
@@ -34,9 +35,9 @@ public:
 private:
     MeshPtr posed_at(double time) const;
 
+    std::string name_;  // of the file
     GltfFile file_;
     const GltfAnimation* animation_;
-    std::string name_;  // of the file
     double speed_, duration_ = 0;
     FrameSequence order_;
     std::vector<std::int32_t> vertex_of_;  // maps corners to vertices

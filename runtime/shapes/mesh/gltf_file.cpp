@@ -70,6 +70,14 @@ std::string from_uri(std::string_view uri)
     return path;
 }
 
+const json& element(const json& list, const char* what, const json& index)
+{
+    const auto number = index.get<std::int64_t>();
+    if (number < 0 || static_cast<std::size_t>(number) >= list.size())
+        throw Error(fmt::format("it refers to {} {}; there are {}, numbered from 0", what, number, list.size()));
+    return list.at(static_cast<std::size_t>(number));
+}
+
 // The values of an accessor: shape [count, numbers].
 struct Values {
     std::size_t count = 0, numbers = 1;
@@ -110,19 +118,22 @@ public:
     const json& json_of(const char* name) const { return json_.at(name); }
     bool has(const char* name) const { return json_.contains(name); }
 
+    const json& accessor(const json& index) const { return element(list("accessors"), "accessor", index); }
+
     // Returns the values of an accessor. Without a buffer view they are zeros, which a sparse accessor changes.
     Values values(const json& index)
     {
-        const json& accessor = list("accessors").at(index.get<std::size_t>());
+        const json& accessor = this->accessor(index);
+        const auto number = index.get<std::size_t>();
         const Component& component = component_of(accessor.at("componentType").get<int>());
         Values values;
         values.count = accessor.at("count").get<std::size_t>();
         values.numbers = numbers_of(accessor.at("type").get<std::string>());
         const double scale = accessor.value("normalized", false) ? 1 / component.largest : 1;
-        const auto scaled = [scale](double number) { return scale == 1 ? number : std::max(number * scale, -1.0); };
+        const auto scaled = [scale](double value) { return scale == 1 ? value : std::max(value * scale, -1.0); };
         std::optional<View> view;
         if (accessor.contains("bufferView"))
-            view = view_of(accessor, component, values.numbers, values.count);
+            view = view_of(number, accessor, component, values.numbers, values.count);
         else if (const double bytes = 8.0 * static_cast<double>(values.numbers) * static_cast<double>(values.count);
                  !fits_in_memory(bytes))
             throw memory_exceeded(fmt::format("an accessor of {} values", values.count), bytes, "split the file");
@@ -135,8 +146,8 @@ public:
         const json& places = sparse->at("indices");
         const Component& place_component = component_of(places.at("componentType").get<int>());
         const auto changed = sparse->at("count").get<std::size_t>();
-        const View at = view_of(places, place_component, 1, changed);
-        const View changes = view_of(sparse->at("values"), component, values.numbers, changed);
+        const View at = view_of(number, places, place_component, 1, changed);
+        const View changes = view_of(number, sparse->at("values"), component, values.numbers, changed);
         for (std::size_t i = 0; i < changed; ++i) {
             const double place = at.number(i, 0, place_component);
             if (!(place >= 0 && place < static_cast<double>(values.count)))
@@ -182,7 +193,8 @@ private:
             throw Error(fmt::format("it is glTF {}, which can't be read; export glTF 2.0", text));
     }
 
-    // Returns the JSON text of a binary file and sets the first buffer.
+    // Returns the JSON text of a binary file and keeps its binary chunk. The first chunk of a type counts, and what
+    // follows the length in the header does not.
     std::span<const unsigned char> take_chunks(std::span<const unsigned char> file)
     {
         constexpr std::size_t header = 12, head = 8;
@@ -190,59 +202,81 @@ private:
                 file.size() < header ? 0 : load_scalar<std::uint32_t>(file.data() + 4, ByteOrder::Little);
             version != 2)
             throw Error(fmt::format("it is binary glTF {}, which can't be read; export glTF 2.0", version));
+        file = file.first(
+            std::min<std::size_t>(file.size(), load_scalar<std::uint32_t>(file.data() + 8, ByteOrder::Little)));
         std::span<const unsigned char> text;
         for (std::size_t at = header; at + head <= file.size();) {
             const auto size = load_scalar<std::uint32_t>(file.data() + at, ByteOrder::Little);
             const auto type = load_scalar<std::uint32_t>(file.data() + at + 4, ByteOrder::Little);
             if (size > file.size() - at - head) throw Error("the file ends within a chunk");
             const auto chunk = file.subspan(at + head, size);
-            if (type == json_chunk) text = chunk;
-            if (type == binary_chunk) buffers_[0] = Bytes(chunk.begin(), chunk.end());
+            if (type == json_chunk && text.empty()) text = chunk;
+            if (type == binary_chunk && !binary_) binary_ = Bytes(chunk.begin(), chunk.end());
             at += head + size;
         }
         return text;
     }
 
-    const Bytes& buffer(std::size_t number)
+    const Bytes& buffer(const json& index)
     {
+        const json& buffer = element(list("buffers"), "buffer", index);
+        const auto number = index.get<std::size_t>();
         const auto [found, is_new] = buffers_.try_emplace(number);
-        if (!is_new) return found->second;
-        constexpr std::string_view data = "data:", encoding = ";base64,";
-        const auto uri = list("buffers").at(number).at("uri").get<std::string>();
-        if (uri.starts_with(data)) {
-            const std::size_t begin = uri.find(encoding);
-            if (begin == std::string::npos) throw Error(fmt::format("buffer {} is not valid base64", number));
-            found->second = from_base64(std::string_view(uri).substr(begin + encoding.size()));
-            return found->second;
+        Bytes& bytes = found->second;
+        if (!is_new) return bytes;
+        if (number == 0 && binary_ && !buffer.contains("uri"))
+            bytes = std::move(*binary_);
+        else
+            bytes = bytes_of(buffer.at("uri").get<std::string>(), number);
+        if (const auto length = buffer.value("byteLength", std::size_t{0}); bytes.size() < length)
+            throw Error(fmt::format("buffer {} has {} bytes; its byteLength is {}", number, bytes.size(), length));
+        return bytes;
+    }
+
+    Bytes bytes_of(const std::string& uri, std::size_t number) const
+    {
+        if (uri.starts_with("data:")) {
+            const std::size_t comma = uri.find(',');
+            if (comma == std::string::npos)
+                throw Error(fmt::format("buffer {} has a data URI without a comma before its data", number));
+            const std::string data = from_uri(std::string_view(uri).substr(comma + 1));
+            if (std::string_view(uri).substr(0, comma).ends_with(";base64")) return from_base64(data);
+            return {data.begin(), data.end()};
         }
         const std::string name = from_uri(uri);
         try {
             const InputFile file(folder_ / name);
-            found->second.assign(file.bytes().begin(), file.bytes().end());
+            return {file.bytes().begin(), file.bytes().end()};
         } catch (const Error& error) {
             throw Error(fmt::format("its buffer \"{}\" {}", name, error.message()));
         }
-        return found->second;
     }
 
     // Returns the values of an accessor, or of a part of a sparse one.
-    View view_of(const json& place, const Component& component, std::size_t numbers, std::size_t count)
+    View view_of(std::size_t accessor, const json& place, const Component& component, std::size_t numbers,
+                 std::size_t count)
     {
-        const json& view = list("bufferViews").at(place.at("bufferView").get<std::size_t>());
-        const Bytes& bytes = buffer(view.at("buffer").get<std::size_t>());
+        const json& index = place.at("bufferView");
+        const json& view = element(list("bufferViews"), "buffer view", index);
+        const Bytes& bytes = buffer(view.at("buffer"));
         const std::size_t value = numbers * scalar_bytes(component.type);
         const std::size_t stride = view.value("byteStride", value);
         const std::size_t first = view.value("byteOffset", std::size_t{0}),
                           inner = place.value("byteOffset", std::size_t{0});
-        if (first > bytes.size() || inner > bytes.size() - first || stride > bytes.size() ||
-            (count > 0 && (bytes.size() - first - inner < value ||
-                           (count - 1) > (bytes.size() - first - inner - value) / std::max<std::size_t>(stride, 1))))
-            throw Error(fmt::format("an accessor of {} values goes beyond its buffer", count));
+        const std::size_t length = view.value("byteLength", bytes.size() - std::min(first, bytes.size()));
+        if (first > bytes.size() || length > bytes.size() - first)
+            throw Error(fmt::format("buffer view {} goes beyond its buffer", index.get<std::size_t>()));
+        if (inner > length || stride > bytes.size() ||
+            (count > 0 &&
+             (length - inner < value || (count - 1) > (length - inner - value) / std::max<std::size_t>(stride, 1))))
+            throw Error(fmt::format("accessor {} of {} values goes beyond its buffer view {}", accessor, count,
+                                    index.get<std::size_t>()));
         return {bytes.data() + first + inner, stride};
     }
 
     const std::filesystem::path folder_;
     json json_;
+    std::optional<Bytes> binary_;  // the binary chunk
     std::map<std::size_t, Bytes> buffers_;
 };
 
@@ -399,8 +433,7 @@ private:
     {
         static const std::set<std::string> taken = {"P", "v", "id", "N", "Cd", "Alpha", "uv", ""};
         const std::string stem = name.substr(1);
-        const json& accessor = document_.list("accessors").at(number.get<std::size_t>());
-        const auto type = accessor.at("type").get<std::string>();
+        const auto type = document_.accessor(number).at("type").get<std::string>();
         if (taken.count(stem) > 0 || (type != "SCALAR" && type != "VEC3"))
             return add_skipped(file_.skipped, fmt::format("the attribute \"{}\"", name));
         const Values values = values_at_vertices(name, number);
@@ -517,7 +550,7 @@ private:
             const json& target = json_channel.at("target");
             const auto path = paths.find(target.at("path").get<std::string>());
             if (path == paths.end() || !target.contains("node")) continue;  // the animation of an extension
-            const json& sampler = json_animation.at("samplers").at(json_channel.at("sampler").get<std::size_t>());
+            const json& sampler = element(json_animation.at("samplers"), "sampler", json_channel.at("sampler"));
             GltfChannel& channel = animation.channels.emplace_back();
             channel.node = check(target.at("node").get<std::size_t>(), file_.nodes.size(), "an animation has the node");
             channel.path = path->second;
@@ -621,6 +654,9 @@ GltfFile read_gltf(const std::filesystem::path& path)
 {
     try {
         return GltfReader(path).read();
+    } catch (const json::out_of_range& error) {
+        const std::string_view text = error.what();  // "[json.exception.out_of_range.403] key 'count' not found"
+        throw Error(fmt::format("it is incomplete: {}", text.substr(text.find("] ") + 2)));
     } catch (const json::exception& error) {
         throw Error(fmt::format("its JSON is damaged: {}", error.what()));
     }

@@ -86,6 +86,10 @@ struct GltfFile {
 // deform it. The corners and triangles are the same at all times.
 MeshFile posed(const GltfFile& file, const GltfAnimation* animation = nullptr, double time = 0);
 
+// Returns the vertex of each corner of posed(). Corners share a vertex if all that moves them is the same: their place,
+// node and instance, morph targets and joints. These coincide in every pose.
+std::vector<std::int32_t> join_moved_alike(const GltfFile& file);
+
 // Reads a .gltf with its buffers, or a .glb. Throws Error if it is not glTF 2.0, requires an extension that can't be
 // read, or if an index or offset points outside the file.
 GltfFile read_gltf(const std::filesystem::path& path);

@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <compare>
 #include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
 
 #include "runtime/base/error.h"
 #include "runtime/base/memory_budget.h"
@@ -240,7 +245,79 @@ private:
     GroupsOfFaces groups_;
 };
 
+// What the position of a corner depends on in all poses.
+struct MovedCorner {
+    std::size_t copy;  // of a mesh at a node
+    const GltfPrimitive* primitive;
+    std::size_t vertex;
+    bool skinned;
+
+    Vec3f offset(const GltfPrimitive::Target& target) const
+    {
+        return vertex < target.positions.size() ? target.positions[vertex] : Vec3f(Vec3f::Zero());
+    }
+    std::size_t influences() const
+    {
+        return skinned ? std::min(primitive->joints.size(), primitive->weights.size()) / primitive->positions.size()
+                       : 0;
+    }
+
+    std::strong_ordering operator<=>(const MovedCorner& other) const
+    {
+        const std::size_t targets = primitive->targets.size(), sets = influences();
+        if (const auto order = std::tuple(copy, targets, sets) <=>
+                               std::tuple(other.copy, other.primitive->targets.size(), other.influences());
+            order != 0)
+            return order;
+        if (const auto order = compare(primitive->positions[vertex], other.primitive->positions[other.vertex]);
+            order != 0)
+            return order;
+        for (std::size_t k = 0; k < targets; ++k)
+            if (const auto order = compare(offset(primitive->targets[k]), other.offset(other.primitive->targets[k]));
+                order != 0)
+                return order;
+        for (std::size_t k = 0; k < sets; ++k)
+            for (std::size_t c = 0; c < 4; ++c)
+                if (const auto order = influence(k, c) <=> other.influence(k, c); order != 0) return order;
+        return std::strong_ordering::equal;
+    }
+
+private:
+    static std::uint32_t bits(float number) { return std::bit_cast<std::uint32_t>(number + 0.0f); }  // -0 is 0
+    static std::strong_ordering compare(const Vec3f& a, const Vec3f& b)
+    {
+        return std::tuple(bits(a.x()), bits(a.y()), bits(a.z())) <=> std::tuple(bits(b.x()), bits(b.y()), bits(b.z()));
+    }
+    // Returns the weight and joint. A joint without weight does not count.
+    std::pair<std::uint32_t, std::uint32_t> influence(std::size_t set, std::size_t c) const
+    {
+        const std::size_t at = set * primitive->positions.size() + vertex;
+        const float weight = primitive->weights[at][c];
+        return {bits(weight), weight > 0 ? primitive->joints[at][c] : 0};
+    }
+};
+
 }  // namespace
+
+std::vector<std::int32_t> join_moved_alike(const GltfFile& file)
+{
+    std::map<MovedCorner, std::int32_t> vertices;
+    std::vector<std::int32_t> vertex_of;
+    std::size_t copy = 0;
+    for (const std::size_t k : file.shown) {
+        const GltfNode& node = file.nodes[k];
+        if (!node.mesh) continue;
+        const std::size_t last = copy + std::max<std::size_t>(1, node.instances.size());
+        for (; copy < last; ++copy)
+            for (const GltfPrimitive& primitive : file.meshes[*node.mesh].primitives)
+                for (std::size_t i = 0; i < primitive.positions.size(); ++i)
+                    vertex_of.push_back(vertices
+                                            .try_emplace({copy, &primitive, i, node.skin.has_value()},
+                                                         static_cast<std::int32_t>(vertices.size()))
+                                            .first->second);
+    }
+    return vertex_of;
+}
 
 MeshFile posed(const GltfFile& file, const GltfAnimation* animation, double time)
 {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "runtime/shapes/mesh/detailed_mesh.h"
 #include "tests/files/temporary_folder.h"
 #include "tests/test.h"
 
@@ -29,6 +30,7 @@ public:
             R"("animations":[{"name":"part","samplers":[{"input":1,"output":2}],)"
             R"("channels":[{"sampler":0,"target":{"node":1,"path":"translation"}}]}]})");
     }
+    const TemporaryFolder& folder() const { return folder_; }
     GltfAnimatedMesh read(const std::string& name, double speed = 1, FrameSequence order = {}) const
     {
         return {folder_ / "a.gltf", name, speed, order};
@@ -69,6 +71,79 @@ TEST_CASE("corners that coincide at rest and part in an animation are vertices o
     CHECK(mesh.rest()->positions.size() == 6);
     CHECK(mesh.rest()->triangles.size() == 2);
     CHECK(mesh.rest()->area() == 1);
+}
+
+TEST_CASE("corners share a vertex only if they move alike, however short the movement", "[mesh][gltf]")
+{
+    // Two triangles of one mesh share two places. The morph target moves the second triangle by 1 m along z, with the
+    // weights 0, 1, 0, 1, ..., 0 at 17 keys in 4 s, so that they meet at each eighth of it.
+    std::vector<float> buffer = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+    for (int i = 0; i < 6; ++i) buffer.insert(buffer.end(), {0, 0, i < 3 ? 0.0f : 1.0f});
+    for (int k = 0; k < 17; ++k) buffer.push_back(static_cast<float>(k) / 4);
+    for (int k = 0; k < 17; ++k) buffer.push_back(static_cast<float>(k % 2));
+    const TemporaryFolder folder;
+    folder.write("a.bin", std::string(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float)));
+    const auto vertices = [&](const std::string& target) {
+        const auto path = folder.write(
+            "a.gltf", R"({"buffers":[{"uri":"a.bin"}],"bufferViews":[{"buffer":0}],"accessors":[)"
+                      R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":6},)"
+                      R"({"bufferView":0,"byteOffset":72,"componentType":5126,"type":"VEC3","count":6},)"
+                      R"({"bufferView":0,"byteOffset":144,"componentType":5126,"type":"SCALAR","count":17},)"
+                      R"({"bufferView":0,"byteOffset":212,"componentType":5126,"type":"SCALAR","count":17}],)"
+                      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"targets":[)" +
+                          target +
+                          R"(]}]}],"nodes":[{"mesh":0}],"animations":[{"samplers":[{"input":2,"output":3}],)"
+                          R"("channels":[{"sampler":0,"target":{"node":0,"path":"weights"}}]}]})");
+        return GltfAnimatedMesh(path, "", 1, {}).rest()->positions.size();
+    };
+    CHECK(vertices(R"({"POSITION":1})") == 6);
+    CHECK(vertices("{}") == 4);
+}
+
+TEST_CASE("corners with the same joints and weights share a vertex, and others do not", "[mesh][gltf]")
+{
+    GltfPrimitive primitive;
+    primitive.positions.assign(4, Vec3f(1, 2, 3));
+    primitive.joints = {{0, 1, 0, 0}, {0, 1, 5, 0}, {0, 2, 0, 0}, {0, 1, 0, 0}};
+    primitive.weights = {{0.5f, 0.5f, 0, 0}, {0.5f, 0.5f, 0, 0}, {0.5f, 0.5f, 0, 0}, {0.25f, 0.75f, 0, 0}};
+    GltfFile file;
+    file.meshes.resize(1);
+    file.meshes[0].primitives = {primitive};
+    file.nodes.resize(1);
+    file.nodes[0].mesh = file.nodes[0].skin = 0;
+    file.shown = {0};
+    CHECK(join_moved_alike(file) == std::vector<std::int32_t>{0, 0, 1, 2});
+    file.nodes[0].skin.reset();
+    CHECK(join_moved_alike(file) == std::vector<std::int32_t>{0, 0, 0, 0});
+    file.nodes[0].instances.assign(2, Eigen::Affine3d::Identity());
+    CHECK(join_moved_alike(file) == std::vector<std::int32_t>{0, 0, 0, 0, 1, 1, 1, 1});
+}
+
+TEST_CASE("an animated file may be compressed and its extension in capitals, and errors name the file", "[mesh][gltf]")
+{
+    const Parting file;
+    const auto named = [&](const char* name) {
+        std::filesystem::copy_file(file.folder() / "a.gltf", file.folder() / name);
+        return GltfAnimatedMesh(file.folder() / name, "part", 1, {}).rest()->positions.size();
+    };
+    CHECK(named("A.GLTF") == 6);
+    CHECK(named("b.glb.gz") == 6);
+    CHECK_THAT(error_of([&] { named("a.obj"); }),
+               Contains("a.obj\": animation is for .gltf and .glb, and it is neither"));
+    CHECK_THAT(error_of([&] { GltfAnimatedMesh(file.folder().write("c.gltf", "{"), "", 1, {}); }),
+               Contains("cannot read the mesh \"") && Contains("c.gltf\": its JSON is damaged"));
+}
+
+TEST_CASE("the animation of a node with a matrix is reported", "[mesh][gltf]")
+{
+    const Parting file;
+    std::string text = file_text(file.folder() / "a.gltf");
+    text.replace(text.rfind(R"({"mesh":0}])"), 10, R"({"mesh":0,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,5,0,0,1]})");
+    const GltfAnimatedMesh mesh(file.folder().write("b.gltf", text), "", 1, {});
+    const auto& detailed = dynamic_cast<const DetailedMesh&>(*mesh.rest());
+    REQUIRE(detailed.skipped.size() == 1);
+    CHECK_THAT(detailed.skipped[0], Contains("the animation of node 1, which has a matrix"));
+    CHECK(mesh.at({.fps = 10, .start = 1}, 21)->bounds().max().x() == 6);
 }
 
 TEST_CASE("an animation that a file lacks is refused with those that it has", "[mesh][gltf]")

@@ -192,7 +192,10 @@ TEST_CASE("what a glTF file gets wrong, or requires in vain, is an error that na
     CHECK_THAT(gltf.error(one_mesh("", "", R"({"children":[2]},{"children":[2]},{"mesh":0})")),
                Contains("node 2 has two parents"));
     CHECK_THAT(gltf.error(one_mesh("", "", R"({"mesh":1})")), Contains("a node has the mesh 1; there are 1, from 0"));
-    CHECK_THAT(gltf.error(one_mesh(R"(,"NORMAL":7)")), Contains("its JSON is damaged"));
+    CHECK_THAT(gltf.error(one_mesh(R"(,"NORMAL":7)")),
+               Contains("it refers to accessor 7; there are 2, numbered from 0"));
+    CHECK_THAT(gltf.error(one_mesh(R"(,"NORMAL":-1)")), Contains("it refers to accessor -1; there are 2"));
+    CHECK_THAT(gltf.error(R"("meshes":[{}])"), Contains("it is incomplete: key 'primitives' not found"));
 
     const TemporaryFolder folder;
     const auto refusal = [&](const std::string& text) {
@@ -258,6 +261,82 @@ TEST_CASE("an accessor of glTF is read within its buffer, or refused", "[mesh][g
                                                 {"1", "4", "18446744073709551612"}})
         CHECK_THAT(error_of([&, &count = count, &stride = stride, &offset = offset] { heat(count, stride, offset); }),
                    Contains("goes beyond its buffer"));
+}
+
+namespace {
+
+// Returns the attribute HEAT of a document whose accessor 0 has three numbers from view 0 on buffer 0.
+std::vector<float> heat_of(const std::filesystem::path& path)
+{
+    return std::get<std::vector<float>>(read_gltf(path).meshes.at(0).primitives.at(0).values.at("HEAT"));
+}
+std::string heat_document(const std::string& buffer, const std::string& view = "")
+{
+    return R"({"meshes":[{"primitives":[{"attributes":{"POSITION":0,"_HEAT":0}}]}],"accessors":[{"bufferView":0,)"
+           R"("componentType":5126,"count":3,"type":"SCALAR"}],"bufferViews":[{"buffer":0)" +
+           view + R"(}],"buffers":[{)" + buffer + "}]}";
+}
+
+std::string bytes_of(const std::vector<float>& numbers)
+{
+    return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float)};
+}
+std::string bytes_of(std::uint32_t number) { return {reinterpret_cast<const char*>(&number), sizeof number}; }
+
+// Returns a binary file of a document and chunks of numbers. `after`: bytes behind its end.
+std::string binary_gltf(std::string document, const std::vector<std::vector<float>>& chunks, const std::string& after)
+{
+    document.resize((document.size() + 3) / 4 * 4, ' ');
+    std::string all = bytes_of(static_cast<std::uint32_t>(document.size())) + "JSON" + document;
+    for (const std::vector<float>& chunk : chunks)
+        all += bytes_of(static_cast<std::uint32_t>(chunk.size() * sizeof(float))) + std::string("BIN\0", 4) +
+               bytes_of(chunk);
+    return "glTF" + bytes_of(2) + bytes_of(static_cast<std::uint32_t>(12 + all.size())) + all + after;
+}
+
+}  // namespace
+
+TEST_CASE("an accessor is within its buffer view, which is within its buffer, which has its length", "[mesh][gltf]")
+{
+    const TemporaryFolder folder;
+    const auto error = [&](const std::string& length, const std::string& view) {
+        const std::string uri = R"("uri":"data:;base64,AAAAAAAAgD8AAABA","byteLength":)" + length;
+        return error_of([&, path = folder.write("a.gltf", heat_document(uri, view))] { read_gltf(path); });
+    };
+    CHECK(error("12", R"(,"byteLength":12)") == "");
+    CHECK(error("12", R"(,"byteLength":11)") == "accessor 0 of 3 values goes beyond its buffer view 0");
+    CHECK(error("12", R"(,"byteLength":13)") == "buffer view 0 goes beyond its buffer");
+    CHECK(error("13", "") == "buffer 0 has 12 bytes; its byteLength is 13");
+}
+
+TEST_CASE("data URIs of glTF are base64 or bytes, and percent-encoded or not", "[mesh][gltf]")
+{
+    const TemporaryFolder folder;
+    const auto heat = [&](const std::string& uri) {
+        return heat_of(folder.write("a.gltf", heat_document(R"("uri":")" + uri + R"(","byteLength":12)")));
+    };
+    const std::vector<float> numbers = {0, 0.9f, 2};
+    CHECK(heat("data:application/octet-stream;base64,AAAAAGZmZj8AAABA") == numbers);
+    CHECK(heat("data:application/gltf-buffer;base64,%41AAAAGZmZj8AAAB%41") == numbers);
+    CHECK(heat("data:application/octet-stream,%00%00%00%00fff%3F%00%00%00%40") == numbers);
+    CHECK_THAT(error_of([&] { heat("data:application/octet-stream"); }), Contains("buffer 0 has a data URI without"));
+}
+
+TEST_CASE("the first binary chunk within the length of a .glb is its first buffer, unless that has a URI",
+          "[mesh][gltf]")
+{
+    const TemporaryFolder folder;
+    const std::vector<float> first = {1, 2, 3}, second = {4, 5, 6};
+    const auto heat = [&](const std::string& buffer, const std::vector<std::vector<float>>& chunks,
+                          const std::string& after) {
+        return heat_of(folder.write("a.glb", binary_gltf(heat_document(buffer), chunks, after)));
+    };
+    CHECK(heat(R"("byteLength":12)", {first}, "") == first);
+    CHECK(heat(R"("byteLength":12)", {first}, std::string(20, 'x')) == first);
+    CHECK(heat(R"("byteLength":12)", {first, second}, "") == first);
+    folder.write("a.bin", bytes_of(second));
+    CHECK(heat(R"("uri":"a.bin","byteLength":12)", {first}, "") == second);
+    CHECK_THAT(error_of([&] { heat(R"("byteLength":12)", {}, ""); }), Contains("key 'uri' not found"));
 }
 
 TEST_CASE("a skin moves vertices by the mean of their joints, and its node does not", "[mesh][gltf]")

@@ -92,8 +92,8 @@ void check_distances(FloatGrid& grid)
 {
     const double voxel = grid.voxelSize()[0], gradient = gradient_near_surface(grid);
     constexpr double tolerance = 0.1, most = 2;  // features of a voxel's size lower the gradient
-    if (gradient > 1 / most && gradient < most) return;
-    if (std::abs(gradient * voxel - 1) < tolerance) {
+    const bool fits_voxels = std::abs(std::log(gradient * voxel)) < std::abs(std::log(gradient));
+    if (fits_voxels && std::abs(gradient * voxel - 1) < tolerance) {
         SkippedContents::note(fmt::format("the distances of grid \"{}\" are in voxels; they are multiplied by {:g} m",
                                           grid.getName(), voxel));
         const auto metres = [voxel](float distance) { return static_cast<float>(distance * voxel); };
@@ -101,6 +101,7 @@ void check_distances(FloatGrid& grid)
         openvdb::tools::changeBackground(grid.tree(), metres(grid.background()));
         return;
     }
+    if (gradient > 1 / most && gradient < most) return;
     SkippedContents::note(
         fmt::format("the values of grid \"{}\" change by {:.3g} per metre at its surface; distances change by 1, "
                     "so that points will stop at a wrong distance: rebuild the level set",

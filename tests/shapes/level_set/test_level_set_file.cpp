@@ -213,6 +213,29 @@ TEST_CASE("distances in voxels become metres, and values that are not distances 
                                      Catch::EndsWith("rebuild the level set"));
 }
 
+TEST_CASE("distances in voxels of about a metre are told from distances in metres", "[level set][file]")
+{
+    const float voxel = GENERATE(0.6f, 1.0f, 1.5f);
+    const bool in_voxels = GENERATE(false, true);
+    CAPTURE(voxel, in_voxels);
+    const LevelSetFolder folder;
+    openvdb::initialize();
+    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(10 * voxel, openvdb::Vec3f(0), voxel, 3);
+    const float unit = in_voxels ? voxel : 1;
+    for (auto value = grid->beginValueAll(); value; ++value) value.setValue(*value / unit);
+    openvdb::tools::changeBackground(grid->tree(), grid->background() / unit);
+    folder.write_grids("sphere.vdb", {grid});
+    const SkippedContents notes;
+    const auto read = read_level_set(folder / "sphere.vdb", "");
+    CHECK(notes.list().size() == (in_voxels && voxel != 1 ? 1 : 0));
+    for (const double outside : {-1.0, 0.5, 2.0}) {
+        const Vec3d P((10 + outside) * voxel, 0, 0);
+        double phi;
+        read->distance({&P, 1}, {&phi, 1}, {});
+        CHECK(phi == Approx(outside * voxel).margin(0.05 * voxel));
+    }
+}
+
 TEST_CASE("a level set from a file is widened without moving its surface", "[level set][file]")
 {
     const LevelSetFolder folder;

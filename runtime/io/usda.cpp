@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <iterator>
@@ -64,9 +65,6 @@ struct UsdPoints {
     std::vector<UsdArray> arrays;
     Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  // to metres, y up
 };
-
-// Throws Error if the text is not USD, has no Points prim or several, or has several time samples.
-UsdPoints usda_points(std::string_view text);
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 bool is_word(char c)
@@ -170,15 +168,15 @@ class UsdaReader {
 public:
     explicit UsdaReader(std::string_view text) : text_(text) {}
 
+    // Throws Error if the text is not USD, has no Points prim or several, or has several time samples.
     UsdPoints read()
     {
         if (!text_.starts_with("#usda")) throw Error("not a USD text file: it does not begin with \"#usda\"");
-        if (skip_space(), is_at('(')) read_metadata();
-        prims_.push_back({.to_world = to_metres_});
+        read_layer_metadata();
+        prims_.emplace_back();
         while (skip_space(), at_ < text_.size()) {
             if (is_at('}') && prims_.size() > 1) {
-                ++at_;
-                prims_.pop_back();
+                close_prim();
             } else {
                 read_statement();
             }
@@ -187,7 +185,9 @@ public:
             throw wrong(
                 fmt::format("the file ends within {}", prims_.back().is_points ? "the prim of points" : "a prim"));
         if (!found_) throw Error("there is no prim of the type Points");
-        return {{std::move_iterator(arrays_.begin()), std::move_iterator(arrays_.end())}, to_world_};
+        Eigen::Affine3d to_world = to_metres_;
+        for (std::size_t k = maps_.size(); k-- > 0;) to_world = to_world * maps_[k];
+        return {{std::move_iterator(arrays_.begin()), std::move_iterator(arrays_.end())}, to_world};
     }
 
 private:
@@ -217,15 +217,14 @@ private:
         if (text_.substr(at_, 2) == "[]") at_ += 2;
         return text_.substr(begin, at_ - begin);
     }
-    void skip_to(std::string_view end, std::size_t from)
-    {
-        const std::size_t found = text_.find(end, from);
-        if (found == std::string_view::npos) throw wrong(fmt::format("no {} follows", end));
-        at_ = found + end.size();
-    }
     // Skips a string, a path of a file or prim, or one other character.
     void skip_mark()
     {
+        const auto skip_to = [&](std::string_view end, std::size_t from) {
+            const std::size_t found = text_.find(end, from);
+            if (found == std::string_view::npos) throw wrong(fmt::format("no {} follows", end));
+            at_ = found + end.size();
+        };
         const char c = text_[at_];
         if (c == '"' || c == '\'') {
             const std::string three(3, c);
@@ -288,28 +287,38 @@ private:
 
     // A prim whose body is being read.
     struct Prim {
-        bool is_points = false;
-        Eigen::Affine3d to_parent = Eigen::Affine3d::Identity();
-        Eigen::Affine3d to_world = Eigen::Affine3d::Identity();      // with that of the prim itself
+        bool is_points = false, holds_points = false;
         std::map<std::string, std::vector<double>> operations = {};  // xformOp:..., as numbers
+        std::vector<std::string> order = {};                         // xformOpOrder
+        std::size_t order_at = 0;
     };
 
-    // Reads the unit and axis of the layer, which are in brackets.
-    void read_metadata()
+    // Reads metadata in brackets. read_value(name) returns false for values that it leaves to be skipped.
+    template <class F>
+    void read_metadata(const F& read_value)
     {
-        double metres = 1;
-        bool z_up = false;
         ++at_;
         while (skip_space(), !is_at(')')) {
             if (at_ >= text_.size()) throw wrong("the file ends within its metadata");
             const std::string_view name = at_word() ? word() : std::string_view();
             if (name.empty()) {
-                skip_mark_or_brackets();
+                skip_value();
                 continue;
             }
             if (skip_space(), !is_at('=')) continue;
             ++at_;
             skip_space();
+            if (!read_value(name)) skip_value();
+        }
+        ++at_;
+    }
+
+    // Reads the unit and axis of the layer.
+    void read_layer_metadata()
+    {
+        double metres = 0;
+        bool z_up = false;
+        const auto read_value = [&](std::string_view name) {
             if (name == "metersPerUnit") {
                 const std::vector<double> numbers = numbers_of_value();
                 metres = numbers.size() == 1 ? numbers[0] : 0;
@@ -317,53 +326,66 @@ private:
             } else if (name == "upAxis") {
                 z_up = text_value() == "Z";
             } else {
-                skip_value();
+                return false;
             }
+            return true;
+        };
+        if (skip_space(), is_at('(')) read_metadata(read_value);
+        if (metres == 0) {
+            SkippedContents::note(
+                "it does not state metersPerUnit, so its unit is taken for 1 m; give unit = 0.01 for centimetres");
+            metres = 1;
         }
-        ++at_;
         to_metres_ = Eigen::Scaling(metres);
         // z becomes y, and y becomes -z.
         if (z_up) to_metres_ = to_metres_ * Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3d::UnitX());
         if (z_up) to_metres_.linear() = (to_metres_.linear() / metres).array().round().matrix() * metres;
     }
 
-    // Begins the body of a prim, after its specifier. A class is only there where others refer to it.
+    // Begins the body of a prim, after its specifier. A class is only there where others refer to it, and an inactive
+    // prim is not there.
     void open_prim(std::string_view specifier)
     {
         skip_space();
         const bool is_points = at_word() && word() == "Points";
         skip_space();
         if (is_at('"') || is_at('\'')) skip_mark();
-        if (skip_space(), is_at('(')) skip_value();
+        bool active = true;
+        const auto read_active = [&](std::string_view name) {
+            if (name == "active") active = word() != "false";
+            return name == "active";
+        };
+        if (skip_space(), is_at('(')) read_metadata(read_active);
         if (skip_space(), !is_at('{')) throw wrong("a prim has no { }");
-        if (specifier == "class") return skip_value();
+        if (specifier == "class" || !active) return skip_value();
         ++at_;
         if (is_points && std::exchange(found_, true))
             throw wrong("there are several prims of the type Points; there must be one");
-        const Eigen::Affine3d to_world = prims_.back().to_world;
-        prims_.push_back({.is_points = is_points, .to_parent = to_world, .to_world = to_world});
-        if (is_points) to_world_ = to_world;
+        prims_.push_back({.is_points = is_points, .holds_points = is_points});
     }
 
-    // Applies the operations of a prim, the last one first.
-    void order_operations(const std::vector<std::string>& names)
+    // Ends the body of a prim. Its operations may follow its children and their own order.
+    void close_prim()
     {
-        Prim& prim = prims_.back();
-        prim.to_world = prim.to_parent;
-        for (std::string name : names) {
+        const Prim prim = std::move(prims_.back());
+        prims_.pop_back();
+        prims_.back().holds_points |= prim.holds_points;
+        for (std::size_t k = prim.order.size(); k-- > 0 && prim.holds_points && !is_reset_;) {
+            std::string name = prim.order[k];
             constexpr std::string_view inverse = "!invert!";
-            if (name == "!resetXformStack!") {
-                prim.to_world = to_metres_;
-                continue;
-            }
+            is_reset_ = name == "!resetXformStack!";
+            if (is_reset_) break;
             const bool inverted = name.starts_with(inverse);
             if (inverted) name.erase(0, inverse.size());
             const auto found = prim.operations.find(name);
-            if (found == prim.operations.end()) throw wrong(fmt::format("{} has no value", name));
+            if (found == prim.operations.end()) {
+                at_ = prim.order_at;
+                throw wrong(fmt::format("{} has no value", name));
+            }
             const Eigen::Affine3d map = operation(name, found->second);
-            prim.to_world = prim.to_world * (inverted ? map.inverse() : map);
+            maps_.push_back(inverted ? map.inverse() : map);
         }
-        if (prim.is_points) to_world_ = prim.to_world;
+        ++at_;
     }
 
     // Returns all numbers of a value, or of its only time sample, whatever its brackets.
@@ -394,35 +416,43 @@ private:
     void read_transform(std::string_view name)
     {
         if (name == "xformOpOrder") {
-            std::vector<std::string> names;
+            std::vector<std::string>& names = prims_.back().order;
+            prims_.back().order_at = at_;
+            names.clear();
             expect('[');
             while (skip_space(), !is_at(']')) {
                 names.push_back(text_value());
                 if (skip_space(), !is_at(']')) expect(',');
             }
             ++at_;
-            return order_operations(names);
-        }
-        constexpr std::string_view samples = ".timeSamples";
-        if (!name.ends_with(samples)) {
-            prims_.back().operations[std::string(name)] = numbers_of_value();
             return;
         }
+        const auto read_operation = [&] { prims_.back().operations[std::string(name)] = numbers_of_value(); };
+        if (!name.ends_with(samples)) return read_operation();
         name.remove_suffix(samples.size());
-        expect('{');
+        read_samples(name, read_operation);
+    }
+
+    // Reads the only time sample in { }. Returns false if there is none.
+    template <class F>
+    bool read_samples(std::string_view name, const F& read_sample)
+    {
+        if (!is_at('{')) throw wrong("time samples have no { }");
+        ++at_;
         bool found = false;
         while (skip_space(), !is_at('}')) {
+            if (!at_word()) throw wrong("a time sample has no time");
+            word();  // time, followed by a colon
+            if (skip_space(), is_at(':')) ++at_;
+            skip_space();
             if (std::exchange(found, true))
                 throw wrong(fmt::format(
                     "{} has several time samples; give a file with one frame (usdcat can extract one)", name));
-            if (!at_word()) throw wrong("a time sample has no time");
-            word();
-            if (skip_space(), is_at(':')) ++at_;
-            skip_space();
-            prims_.back().operations[std::string(name)] = numbers_of_value();
+            read_sample();
             if (skip_space(), is_at(',')) ++at_;
         }
         ++at_;
+        return found;
     }
 
     // Reads [custom] TYPE NAME [= VALUE] [(METADATA)], or the beginning of a prim.
@@ -444,16 +474,14 @@ private:
         } else if (name.empty() && !is_at('"') && !is_at('(') && !is_at('{') && !is_at(';')) {
             throw wrong("the property of a prim is missing");
         } else if (!line && at_ < text_.size() && !is_at('}')) {
-            skip_mark_or_brackets();
+            skip_value();
             line = false;
         }
         if (!line && (is_at('(') || is_at('{'))) skip_value();
     }
-    void skip_mark_or_brackets() { is_at('(') || is_at('{') || is_at('[') ? skip_value() : skip_mark(); }
 
     void read_value(std::string_view type, std::string_view name)
     {
-        constexpr std::string_view samples = ".timeSamples";
         if (name == "xformOpOrder" || name.starts_with("xformOp:")) return read_transform(name);
         if (!prims_.back().is_points) return skip_value();
         std::optional<UsdArray> array = array_of(type);
@@ -471,24 +499,7 @@ private:
             return;
         }
         name.remove_suffix(samples.size());
-        if (!is_at('{')) throw wrong("time samples have no { }");
-        ++at_;
-        bool found = false;
-        while (skip_space(), !is_at('}')) {
-            if (!at_word()) throw wrong("a time sample has no time");
-            word();  // time, followed by a colon
-            if (skip_space(), is_at(':')) ++at_;
-            skip_space();
-            if (std::exchange(found, true))
-                throw wrong(fmt::format(
-                    "{} has several time samples; give a file with one frame (usdcat can extract one)", name));
-            if (is_at('['))
-                read_numbers(*array);
-            else
-                skip_value();
-            if (skip_space(), is_at(',')) ++at_;
-        }
-        ++at_;
+        const bool found = read_samples(name, [&] { is_at('[') ? read_numbers(*array) : skip_value(); });
         array->name = std::string(name);
         if (const auto before = by_name_.find(name); before != by_name_.end()) {
             arrays_.erase(before->second);
@@ -553,15 +564,17 @@ private:
 
     std::string_view text_;
     std::size_t at_ = 0;
-    Eigen::Affine3d to_metres_ = Eigen::Affine3d::Identity(), to_world_ = Eigen::Affine3d::Identity();
-    std::vector<Prim> prims_;  // the open ones, the innermost last
+    static constexpr std::string_view samples = ".timeSamples";
+
+    Eigen::Affine3d to_metres_ = Eigen::Affine3d::Identity();
+    std::vector<Eigen::Affine3d> maps_;  // of the prim of points and those around it, the outermost last
+    bool is_reset_ = false;              // by one of the prims, so that those around it do not count
+    std::vector<Prim> prims_;            // the open ones, the innermost last
     bool found_ = false;
     std::list<UsdArray> arrays_;
     std::map<std::string_view, std::list<UsdArray>::iterator> by_name_;
     std::set<std::string_view> names_;  // of all arrays so far, with and without time samples
 };
-
-UsdPoints usda_points(std::string_view text) { return UsdaReader(text).read(); }
 
 constexpr std::string_view primvar = "primvars:";
 
@@ -619,23 +632,19 @@ void put(std::string& text, float value)
     else
         text.append(number, std::to_chars(number, std::end(number), value, std::chars_format::general, 9).ptr);
 }
-template <class Integer>
-void put_integer(std::string& text, Integer value)
+template <std::signed_integral Integer>
+void put(std::string& text, Integer value)
 {
     char number[24];
     text.append(number, std::to_chars(number, std::end(number), value).ptr);
 }
-void put(std::string& text, std::int32_t value) { put_integer(text, value); }
-void put(std::string& text, std::int64_t value) { put_integer(text, value); }
 void put(std::string& text, std::uint8_t value) { text += value ? '1' : '0'; }
 void put_tuple(std::string& text, std::initializer_list<float> numbers)
 {
-    char before = '(';
+    const char* before = "(";
     for (const float number : numbers) {
-        text += before;
-        if (before == ',') text += ' ';
+        text += std::exchange(before, ", ");
         put(text, number);
-        before = ',';
     }
     text += ')';
 }
@@ -728,10 +737,8 @@ private:
     {
         std::string storage;
         const UsdName known = usd_name(name, type_of(AnyColumn(column)), storage);
-        if constexpr (std::is_same_v<T, float>) {
-            // USD's widths are diameters.
+        if constexpr (std::is_same_v<T, float>)  // USD's widths are diameters
             if (known.theirs == "widths") return write_array("float", "widths", column, [](float r) { return 2 * r; });
-        }
         write_array(known.type, known.theirs, column, [](const T& value) { return value; });
     }
 
@@ -835,7 +842,7 @@ void place(PointSet& points, const std::vector<UsdArray>& arrays, const Eigen::A
 PointSet read_usda(const std::filesystem::path& path)
 {
     const InputFile file(path);
-    UsdPoints prim = usda_points(file.text());
+    UsdPoints prim = UsdaReader(file.text()).read();
     std::vector<UsdArray>& arrays = prim.arrays;
     expand_indices(arrays);
     const auto of_points =

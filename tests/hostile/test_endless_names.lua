@@ -13,7 +13,7 @@ end
 
 local place = "property float x\nproperty float y\nproperty float z\n"
 local triangle = "0 0 0\n1 0 0\n0 1 0\n"
-local usda = '#usda 1.0\ndef Points "points"\n{\npoint3f[] points = [(0, 0, 0)]\n%s}\n'
+local usda = '#usda 1.0\n(\nmetersPerUnit = 1\n)\ndef Points "points"\n{\npoint3f[] points = [(0, 0, 0)]\n%s}\n'
 
 local points = {
   ["values.usda"] = usda:format(repeated "float[] primvars:a%d = [1]\n"),

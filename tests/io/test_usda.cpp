@@ -1,3 +1,4 @@
+#include "runtime/files/skipped_contents.h"
 #include "runtime/io/format.h"
 #include "tests/io/random_points.h"
 #include "tests/test.h"
@@ -211,4 +212,59 @@ TEST_CASE("a name that .usda can't hold is an error that says what it can", "[io
                Catch::EndsWith("the name \"wet-ground\" can't be written to .usda; it must consist of letters, digits "
                                "and _, and must not begin with a digit; rename the attribute or group"));
     CHECK(file_names(folder.path()).empty());
+}
+
+namespace {
+
+const std::string metres = "#usda 1.0\n(\n    metersPerUnit = 1\n)\n", place = "point3f[] points = [(1, 2, 3)]\n",
+                  moves = "double3 xformOp:translate = (1, 2, 3)\n",
+                  order = "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+
+}  // namespace
+
+TEST_CASE("the transforms of a .usda hold whatever the order of its properties and prims", "[io][usda]")
+{
+    const TemporaryFolder folder;
+    const auto read = [&](const std::string& text) {
+        folder.write("a.usda", metres + text);
+        return read_points(folder / "a.usda");
+    };
+    const std::string points = "def Points \"p\"\n{\n" + place + "}\n";
+    const auto within = [](const std::string& text) { return "def Xform \"a\"\n{\n" + text + "}\n"; };
+    const Vec3f once(2, 4, 6), twice(3, 6, 9);
+    CHECK(read(within(points + moves + order)).P()[0] == once);
+    CHECK(read(within(order + points + moves)).P()[0] == once);
+    CHECK(read(within(within(points + moves + order) + moves + order)).P()[0] == twice);
+    CHECK(read("def Points \"p\"\n{\n" + order + moves + place + "}\n").P()[0] == once);
+    CHECK(read(within(moves + order) + points).P()[0] == Vec3f(1, 2, 3));  // a prim beside that of the points
+
+    const std::string reset = "uniform token[] xformOpOrder = [\"!resetXformStack!\", \"xformOp:translate\"]\n";
+    CHECK(read(within(within(points + moves + reset) + moves + order)).P()[0] == once);
+}
+
+TEST_CASE("prims of a .usda that are not active are not read", "[io][usda]")
+{
+    const TemporaryFolder folder;
+    const std::string first = "def Points \"p\" (\n    active = false\n)\n{\n" + place + "}\n";
+    folder.write("a.usda", metres + first);
+    CHECK_THAT(error_of([&] { read_points(folder / "a.usda"); }),
+               Catch::EndsWith("there is no prim of the type Points"));
+    folder.write("b.usda",
+                 metres + first + "def Points \"q\" (\n    active = true\n)\n{\n" + place + moves + order + "}\n");
+    CHECK(read_points(folder / "b.usda").P()[0] == Vec3f(2, 4, 6));
+}
+
+TEST_CASE("a .usda without metersPerUnit is read in metres, with a note", "[io][usda]")
+{
+    const TemporaryFolder folder;
+    const std::string points = "def Points \"p\"\n{\n" + place + "}\n";
+    folder.write("a.usda", "#usda 1.0\n" + points);
+    folder.write("b.usda", metres + points);
+    const SkippedContents notes;
+    CHECK(read_points(folder / "b.usda").P()[0] == Vec3f(1, 2, 3));
+    CHECK(notes.list().empty());
+    CHECK(read_points(folder / "a.usda").P()[0] == Vec3f(1, 2, 3));
+    CHECK(notes.list() ==
+          std::vector<std::string>{"it does not state metersPerUnit, so its unit is taken for 1 m; give "
+                                   "unit = 0.01 for centimetres"});
 }

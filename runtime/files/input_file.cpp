@@ -119,7 +119,9 @@ void InputFile::expand()
         expanded = static_cast<std::size_t>(stream.next_out - to.get());
         if (result == Z_MEM_ERROR) throw std::bad_alloc();
         if (result == Z_STREAM_END) {
-            if (used == size_) break;
+            // Tapes and block devices pad a file with zeros.
+            unsigned char* const end = bytes_.get() + size_;
+            if (std::all_of(bytes_.get() + used, end, [](unsigned char byte) { return byte == 0; })) break;
             ::inflateReset(&stream);
         } else if (result != Z_OK && result != Z_BUF_ERROR) {
             throw Error("can't be read: its compressed data is damaged");

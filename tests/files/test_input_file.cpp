@@ -45,12 +45,14 @@ TEST_CASE("a file that gzip compressed is read as it was before", "[files]")
     CHECK((InputFile(folder / "both.gz").text() == text));
 
     const std::string whole = file_text(folder / "both.gz");
+    CHECK((InputFile(folder.write("padded.gz", whole + std::string(1000, '\0'))).text() == text));
     const auto error = [&](const std::string& bytes) {
         return error_of([&] { InputFile(folder.write("c.gz", bytes)); });
     };
     CHECK(error(whole.substr(0, whole.size() - 1)) == "can't be read: its compressed data ends early");
     CHECK(error(whole.substr(0, whole.size() - 8) + std::string(8, 'x')) ==
           "can't be read: its compressed data is damaged");
+    CHECK(error(whole + std::string(10, '\0') + "x") == "can't be read: its compressed data is damaged");
     CHECK(without_gz("x/a.bgeo.gz") == "x/a.bgeo");
     CHECK(without_gz("x.gz/a.bgeo") == "x.gz/a.bgeo");
 }

@@ -594,6 +594,8 @@ void read_array(PointSet& points, const std::string& name, const Array& array)
     read_attribute(points, {array.bytes, array.rows, stride, array.type.order}, attribute);
 }
 
+bool is_positions(const Array& array) { return array.numbers == 3 && array.type.characters == 0 && !array.type.truth; }
+
 PointSet read_npz(const std::filesystem::path& path)
 {
     const InputFile file(path);
@@ -618,12 +620,12 @@ PointSet read_npz(const std::filesystem::path& path)
         if (member.name.ends_with(suffix)) names.push_back(member.name.substr(0, member.name.size() - suffix.size()));
         if (member.name != "P.npy") continue;
         with_array(member, [&](const Array& array) {
-            placed = array.numbers == 3 && array.type.characters == 0 && is_floating(array.type.scalar);
+            placed = is_positions(array);
             if (placed && points.empty()) points.append(array.rows);
         });
     }
     check_column_names(names, "");
-    if (!placed) throw Error("there is no array P of floats with the shape (n, 3)");
+    if (!placed) throw Error("there is no array P of numbers with the shape (n, 3)");
     bool has_id = false;
     for (const ZipReader::Member& member : zip.members()) {
         if (!member.name.ends_with(suffix)) continue;
@@ -645,8 +647,7 @@ PointSet read_npy(const std::filesystem::path& path)
 {
     const InputFile file(path);
     const std::optional<Array> array = array_in(file.bytes());
-    if (!array || array->numbers != 3 || array->type.characters > 0 || !is_floating(array->type.scalar))
-        throw Error("the array is not one of floats with the shape (n, 3)");
+    if (!array || !is_positions(*array)) throw Error("the array is not one of numbers with the shape (n, 3)");
     PointSet points;
     points.append(array->rows);
     if (!points.empty()) read_array(points, "P", *array);

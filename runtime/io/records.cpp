@@ -237,7 +237,8 @@ void read_attribute(PointSet& points, const Records& records, const RecordAttrib
     }
     if (attribute.type == ScalarType::UInt64)
         for (const std::size_t offset : offsets) numbers.check_fits_int64(offset);
-    const bool floating = is_floating(attribute.type) || attribute.scale != 1;
+    const bool positions = attribute.name == "P" && offsets.size() == 3;  // floats, even if stored as integers
+    const bool floating = is_floating(attribute.type) || attribute.scale != 1 || positions;
     if (attribute.name == "id" && offsets.size() == 1) {
         if (is_floating(attribute.type)) numbers.check_ids(offsets[0]);
         points.set("id", numbers.column<std::int64_t, std::int64_t>(offsets));

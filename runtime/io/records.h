@@ -71,9 +71,9 @@ struct Records {
     ByteOrder order;
 };
 
-// Sets an attribute of the points. Three floats become a vec3, four a quaternion. Integers become int32, but id,
-// unsigned 32-bit and wider integers become int64. Throws Error if an id is not an integer, or an integer exceeds
-// int64.
+// Sets an attribute of the points. Three floats, or three integers of P, become a vec3, four floats a quaternion. Other
+// integers become int32, but id, unsigned 32-bit and wider ones become int64. Throws Error if an id is not an integer,
+// or an integer exceeds int64.
 void read_attribute(PointSet& points, const Records& records, const RecordAttribute& attribute);
 // Assigns ids from 0, in order.
 void number_points(PointSet& points);

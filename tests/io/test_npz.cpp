@@ -128,8 +128,10 @@ TEST_CASE("a damaged .npz is an error that says how", "[io][npz]")
         REQUIRE(python(folder, "np.savez('c.npz', " + arrays + ")\n"));
         return error_of([&] { read_points(folder / "c.npz"); });
     };
-    CHECK_THAT(saved("x=np.zeros((3, 3))"), Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
-    CHECK_THAT(saved("P=np.zeros((3, 2))"), Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
-    CHECK_THAT(saved("P=np.zeros((3, 3), int)"),
-               Catch::EndsWith("there is no array P of floats with the shape (n, 3)"));
+    CHECK_THAT(saved("x=np.zeros((3, 3))"), Catch::EndsWith("there is no array P of numbers with the shape (n, 3)"));
+    CHECK_THAT(saved("P=np.zeros((3, 2))"), Catch::EndsWith("there is no array P of numbers with the shape (n, 3)"));
+    REQUIRE(python(folder, "P = np.array([[1, 2, 3], [-4, 5, 6]])\nnp.savez('i.npz', P=P)\nnp.save('i.npy', P)\n"));
+    for (const char* integers : {"i.npz", "i.npy"}) CHECK(read_points(folder / integers).P()[1] == Vec3f(-4, 5, 6));
+    CHECK_THAT(saved("P=np.zeros((3, 3), bool)"),
+               Catch::EndsWith("there is no array P of numbers with the shape (n, 3)"));
 }

@@ -27,6 +27,8 @@ public:
     {
         while (file_.next()) read_statement();
         for (const Face& face : faces_) append(face);
+        for (auto& [name, values] : mesh_.values)  // the last corners may have none
+            std::get<std::vector<Vec3f>>(values).resize(mesh_.positions.size(), Vec3f::Zero());
         mesh_.alphas.assign(mesh_.colours.size(), 1.0f);
         groups_of_faces_.add_to(mesh_);
         return std::move(mesh_);

@@ -91,6 +91,8 @@ TEST_CASE("an index or number of an .obj that is wrong is an error that names th
     const auto mesh = folder.read(vertices + "f 1//1 2//1 3//1\n");
     CHECK(mesh->area() == 0.5);
     CHECK(mesh->skipped == std::vector<std::string>{"faces have a N that the file lacks; it is taken as 0"});
+    const auto mixed = folder.read(vertices + "f 1//1 2//1 3//1\nf 1 3 2\n");
+    CHECK(std::get<std::vector<Vec3f>>(mixed->values.at("N")) == std::vector<Vec3f>(3, Vec3f::Zero()));
     CHECK(folder.error(vertices + "f 1 2 x\n") == "line 4: \"x\" is not a number");
     CHECK(folder.error("v 0 0\n") == "line 1: \"\" is not a number");
 }
